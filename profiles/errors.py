@@ -25,7 +25,11 @@ Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, ex
 
 
 class UserError(Exception):
-    """Something the person at the keyboard can fix; str() is the full sentence."""
+    """Something the person at the keyboard can fix; str() is the full sentence. forcible: --force goes past it."""
+
+    def __init__(self, *sentence: object, forcible: bool = False) -> None:
+        super().__init__(*sentence)
+        self.forcible = forcible
 
 
 def reason(error: OSError) -> str:

@@ -88,9 +88,9 @@ def _run(arguments: Sequence[str] | None) -> int:
             return _complain("interrupted", 130)
         if isinstance(error, OSError) and error.errno in FULL:
             return _complain(f"{error.filename or _full()} cannot be written: no space is left")
-        from machine.app.crash import log_bug
+        from machine.app.crash import bug_in_words
 
-        return _complain(f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, given)}", 3)
+        return _complain(bug_in_words(error, given), 3)
     return int(code or 0)
 
 

@@ -26,6 +26,11 @@ def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
     return Path(file.name)
 
 
+def bug_in_words(error: BaseException, arguments: Sequence[str]) -> str:
+    """The sentence for a person, with the log that the bug got."""
+    return f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, arguments)}"
+
+
 def _thin(folder: Path) -> None:
     """Delete the oldest logs of bugs, so that one more makes no more than KEPT."""
     with suppress(OSError):  # another run may have been quicker

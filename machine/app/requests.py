@@ -12,7 +12,7 @@ STDOUT = Path("-")  # stands for standard output where a file is asked for
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
 UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
-FORCE_GOES_ON = "--force goes on"  # in a sentence: what it refuses is done all the same when it is forced
+FORCE_GOES_ON = "--force goes on"  # how a sentence says that its error is forcible
 
 
 @dataclass(frozen=True)

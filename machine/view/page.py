@@ -3,16 +3,17 @@
 import base64
 import re
 from collections.abc import Sequence
-from hashlib import sha256
 from html import escape
-from importlib import resources
+from pathlib import Path
 
 from machine.program import Alternative, Program
+from machine.view.bundle import bundle, hash_source
 from machine.view.contents import compared, of_parts, of_print
 from machine.view.encoding import with_header
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile
 
+TEMPLATE = Path(__file__).parent / "template"
 MARKER = re.compile(r"<!--(?:TITLE|CSP|DATA)-->|/\*(?:STYLE|SCRIPT)\*/")
 DATA = b'<script type="application/octet-stream" id="tiltprint">'
 
@@ -44,7 +45,8 @@ def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> byte
 
 
 def page(title: str, block: bytes, live: bool = False) -> bytes:
-    """The HTML file. title: any text; block: from machine.view.contents; live: it may ask its own server for the state."""
+    """The HTML file. title: any text; block: from machine.view.bundle import bundle, hash_source
+    from machine.view.contents; live: it may ask its own server for the state."""
     style, script, body = _template()
     put = {
         "<!--TITLE-->": escape(title),
@@ -60,15 +62,9 @@ def policy(style: str, script: str, live: bool) -> str:
     """What the page may do: run its own script, use its own style, draw pictures that it has made itself."""
     asks = "; connect-src 'self'" if live else ""
     pictures = "img-src data: blob:; base-uri 'none'; form-action 'none'"
-    return f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; {pictures}{asks}"
-
-
-def _hash(text: str) -> str:
-    return "sha256-" + base64.b64encode(sha256(text.encode()).digest()).decode()
+    return f"default-src 'none'; script-src {hash_source(script)}; style-src {hash_source(style)}; {pictures}{asks}"
 
 
 def _template() -> tuple[str, str, str]:
-    """Style, scripts in the order of their names, and the page around them."""
-    files = {file.name: file for file in resources.files("machine.view").joinpath("template").iterdir()}
-    scripts = "\n".join(files[name].read_text(encoding="utf-8") for name in sorted(files) if name.endswith(".js"))
-    return files["style.css"].read_text(encoding="utf-8"), scripts, files["page.html"].read_text(encoding="utf-8")
+    """Style, scripts as one, and the page around them."""
+    return (TEMPLATE / "style.css").read_text("utf-8"), bundle(TEMPLATE / "main.js"), (TEMPLATE / "page.html").read_text("utf-8")

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from machine.app.workbench.web.page import workbench_page
+from machine.app.workbench.web.page import OWN
+from machine.view.bundle import bundle
 
 NODE = shutil.which("node")
 FAKE = Path(__file__).with_suffix(".js")
@@ -16,13 +17,13 @@ needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed: the
 
 
 def on_fake_page(act: str) -> Any:
-    """What a function's body gives that runs in place of the page's `main`, by the names of fake_page.js."""
-    page, _ = workbench_page(8000)
-    script, began, _ = page.decode().rpartition("<script>")[2].rpartition("main();")
+    """What a function's body gives that runs in place of the page's `main`: by `printPanel`, `$` and what fake_page.js has."""
     assert NODE is not None
-    assert began
     ends = "process.stdout.write(JSON.stringify(given), () => process.exit(0));"
-    whole = "\n".join([FAKE.read_text("utf-8"), script, f"const given = (() => {{ {act} }})();", ends])
+    names = 'const { printPanel } = modules["page/print-panel"], { $ } = modules["template/page"];'
+    whole = "\n".join(
+        [FAKE.read_text("utf-8"), bundle(OWN / "print-panel.js"), names, f"const given = (() => {{ {act} }})();", ends]
+    )
     run = subprocess.run([NODE, "-"], input=whole, capture_output=True, text=True, timeout=60)
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout)

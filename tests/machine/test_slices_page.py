@@ -113,9 +113,13 @@ def test_the_text_follows_the_slider_and_the_slider_the_text(page: Browser) -> N
 def test_the_page_reads_the_text_out_of_its_rows_letter_for_letter(page: Browser, lines: tuple[str, ...]) -> None:
     profile = program()[0]
     block = base64.b64encode(of_print("text", Program(lines, dry_run(lines, profile), None), profile)).decode()
+    names = "{ ...modules['template/block'], ...modules['template/rows'], ...modules['template/gcode-lines'] }"
     read = "linesOfRows({ header: block.header, rows: rowsOf(block), patternOf: block.array('text')[0] })"
     all_of = f"((text) => Array.from({{ length: text.count }}, (_, k) => text.line(k + 1)))({read})"
-    assert tuple(page.value(f"openBlock('{block}').then((block) => {all_of})")) == lines
+    assert (
+        tuple(page.value(f"(({{ openBlock, rowsOf, linesOfRows }}) => openBlock('{block}').then((block) => {all_of}))({names})"))
+        == lines
+    )
 
 
 def test_a_text_that_is_not_in_the_page_comes_from_the_prints_file_and_from_no_other(
@@ -249,7 +253,8 @@ def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench
     browser.click("#tab-slices")
     scene = "box: [[-4, -4, 0], [4, 4, 4]], shifts: [], wallsAlone: true, plane: null, extras: {}"
     walls = "[[-30, -20, 0], [30, 20, 4]].map((place) => ({ places: new Float32Array(place) }))"
-    framed = browser.value(f"bounds(placesDrawn({{ {scene}, walls: {walls} }}).flat())")
+    names = "{ ...modules['template/math'], ...modules['page/picture'] }"
+    framed = browser.value(f"(({{ bounds, placesDrawn }}) => bounds(placesDrawn({{ {scene}, walls: {walls} }}).flat()))({names})")
     assert framed == [[-30, -20, 0], [30, 20, 4]]  # what is drawn are the copies, not the model
     type_in(browser, "copies", 0)
     browser.wait("$('problem').textContent === '--copies is 0: 1 to 1000 is allowed' && $('copies').value === '1'")

@@ -14,12 +14,13 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not instal
 RING_Y = """(() => { const path = document.querySelector('[data-ring=y] .near'), box = $('rings').getBoundingClientRect();
   const at = (share) => path.getPointAtLength(share * path.getTotalLength());
   return [at(0.5), at(0.6)].map(({ x, y }) => [x + box.x, y + box.y]); })()"""
-SLIPPED = """(() => { let seed = 7; const random = () => (seed = seed * 16807 % 2147483647) / 2147483647 - 0.5;
+SLIPPED = """(({ add, scaled, sub, unit }, { faceMet }) => { let seed = 7;
+  const random = () => (seed = seed * 16807 % 2147483647) / 2147483647 - 0.5;
   const place = () => [random(), random(), random()], ends = () => [place(), place()];
   return Array.from({ length: 2000 }, () => { const [a, b] = ends(), [c, d] = ends(), along = random() + 0.5;
     const on = add(scaled(a, along), scaled(b, 1 - along)), from = scaled(place(), 100);
     return faceMet({ corners: [a, b, c, b, a, d].flat(), count: 2 }, from, unit(sub(on, from)));
-  }).filter((face) => face < 0).length; })()"""
+  }).filter((face) => face < 0).length; })(modules["template/math"], modules["page/triangles"])"""
 TURNED = "$('undo').getAttribute('aria-label') === 'undo: turn the model'"
 
 

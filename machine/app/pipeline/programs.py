@@ -63,8 +63,9 @@ def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
     if not errors:
         return
     if force:
-        say(f"the dry run found {len(errors)} errors; going on because of --force")
+        say(f"the dry run found {len(errors)} errors", forced=True)
         return
     raise MoveError(
-        f"the dry run found {len(errors)} errors, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})"
+        f"the dry run found {len(errors)} errors, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})",
+        forcible=True,
     )

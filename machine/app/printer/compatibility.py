@@ -156,9 +156,9 @@ def ready_program(
 
 def refuse(sentence: str, force: bool) -> None:
     if sentence and not force:
-        raise PrinterError(f"{sentence} ({FORCE_GOES_ON})")
+        raise PrinterError(f"{sentence} ({FORCE_GOES_ON})", forcible=True)
     if sentence:
-        say(f"{sentence}; going on because of --force")
+        say(sentence, forced=True)
 
 
 def firmware_mismatch(answer: Answer, machine: Machine) -> str:

@@ -13,7 +13,6 @@ from machine.network.server import ACTIVE
 from machine.network.servers import open_server
 from profiles.errors import PortError, UserError
 
-STOP = "emergency stop: "  # begins all that is told of one
 STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 

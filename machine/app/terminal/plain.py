@@ -2,6 +2,9 @@
 
 import re
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TextIO
 
 # C0 and C1 controls, DEL, what turns the direction of writing around (CVE-2021-42574), line separators, halves of characters that
 # stand for bytes of a file name.
@@ -23,10 +26,33 @@ def plain_lines(text: str) -> str:
     return "\n".join(_escaped(line) for line in text.split("\n"))
 
 
+Listener = Callable[[str, bool], None]  # given what is said, and whether it is what --force goes past
+_listener: Listener | None = None
+
+
+@contextmanager
+def said_to(listener: Listener) -> Iterator[None]:
+    """Meanwhile all that the program says, in whatever thread, goes to a listener in place of stdout and stderr."""
+    global _listener
+    _listener = listener
+    try:
+        yield
+    finally:
+        _listener = None
+
+
 def show(text: str) -> None:
     """A result on stdout."""
-    sys.stdout.write(plain_lines(text))
-    sys.stdout.flush()
+    put(text, sys.stdout)
+
+
+def put(text: str, stream: TextIO, forced: bool = False) -> None:
+    """Text for a person, on a stream or to the listener. forced: it is what --force goes past."""
+    if _listener is not None:
+        _listener(plain_lines(text).rstrip("\n"), forced)
+        return
+    stream.write(plain_lines(f"{text.rstrip()}; going on because of --force\n" if forced else text))
+    stream.flush()
 
 
 def _escaped(text: str) -> str:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import Protocol
 
-from machine.app.terminal.plain import plain_line, plain_lines
+from machine.app.terminal.plain import plain_line, put
 
 PLAIN_EVERY_S = 5.0
 PLAIN_AGAIN_S = 60.0  # what has not changed is said again: still alive
@@ -19,15 +19,14 @@ class Report(Protocol):
     def __call__(self, text: str, share: float | None = None) -> None: ...
 
 
-def say(text: str) -> None:
-    """One line on stderr."""
-    say_lines(plain_line(text))
+def say(text: str, *, forced: bool = False) -> None:
+    """One line on stderr. forced: it is what --force goes past."""
+    put(f"{plain_line(text)}\n", sys.stderr, forced)
 
 
 def say_lines(text: str) -> None:
     """Several lines on stderr."""
-    sys.stderr.write(f"{plain_lines(text)}\n")
-    sys.stderr.flush()
+    put(f"{text}\n", sys.stderr)
 
 
 def is_terminal() -> bool:

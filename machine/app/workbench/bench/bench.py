@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.carried import Placing, carried_part, carried_zones
 from machine.app.workbench.bench.effect import Effect, effect_of_change
-from machine.app.workbench.bench.following import following_stops, gone_in_words, part_after
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.bench.part_settings import following, option
+from machine.app.workbench.bench.part_settings import option, renumbered
+from machine.app.workbench.bench.placing import Placing, moved_part, moved_zones
+from machine.app.workbench.bench.renumbering import gone_in_words, number_after, renumbered_stops
 from machine.app.workbench.bench.settings import USUAL
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
@@ -101,8 +101,10 @@ class History:
     undone: tuple[Step, ...] = ()
 
     def do(self, word: str, bench: Bench) -> "History":
-        """A further step; pauses go with their parts, and what was undone is forgotten."""
-        kept, gone = following_stops(bench.stops, self.now.bench.cuts or (), bench.cuts or ())
+        """A further step, none for the same bench; pauses go with their parts, and what was undone is forgotten."""
+        if bench is self.now.bench:
+            return self
+        kept, gone = renumbered_stops(bench.stops, self.now.bench.cuts or (), bench.cuts or ())
         after = bench if kept == bench.stops else replace(bench, stops=kept)
         lost = [(stop.part, stop.option) for stop in gone] + [
             (own.part, f"--part {option(own)}") for own in _gone(self.now.bench, bench)
@@ -146,7 +148,7 @@ def _gone(before: Bench, after: Bench) -> list[PartSettings]:
     if (before.cuts, before.rotation) == (after.cuts, after.rotation):
         return []  # a person has taken them back
     left = {own.part for own in after.profile.parts}
-    return [own for own in before.profile.parts if part_after(before.cuts or (), after.cuts or (), own.part) not in left]
+    return [own for own in before.profile.parts if number_after(before.cuts or (), after.cuts or (), own.part) not in left]
 
 
 def emptied(bench: Bench) -> Bench:
@@ -161,7 +163,7 @@ def with_model(bench: Bench, model: Model) -> Bench:
 
 def with_model_anew(bench: Bench, model: Model | None) -> Bench:
     """The same model read, turned or cut anew: pauses and copies stay, and what part 1 has of its own."""
-    profile = following(bench.profile, bench.cuts or (), ())
+    profile = renumbered(bench.profile, bench.cuts or (), ())
     return replace(emptied(bench), model=model, profile=profile, stops=bench.stops, copies=bench.copies)
 
 
@@ -201,10 +203,10 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
     if turn is not None:
         start = start.after(Placing.of(before.model.mesh(), turn, 0.0))
     move = _placing(bench, factor).after(start)
-    planes = {part: carried_part(part, move) for part in before.cuts or ()}
+    planes = {part: moved_part(part, move) for part in before.cuts or ()}
     cuts = None if before.cuts is None else tuple(planes[part] for part in before.cuts)
     locked = frozenset(planes[part] for part in before.locked)
-    return replace(bench, cuts=cuts, locked=locked, zones=carried_zones(before.zones, move))
+    return replace(bench, cuts=cuts, locked=locked, zones=moved_zones(before.zones, move))
 
 
 def _placing(bench: Bench, factor: float = 1.0) -> Placing:
@@ -221,7 +223,7 @@ def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
 
 def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:
     """Other planes; what is locked of them stays so, and settings of single parts go with their planes."""
-    profile = following(bench.profile, bench.cuts or (), cuts)
+    profile = renumbered(bench.profile, bench.cuts or (), cuts)
     return replace(bench, cuts=cuts, locked=bench.locked & frozenset(cuts), profile=profile)
 
 

@@ -36,15 +36,15 @@ def export_command(bench: Bench) -> str:
     words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
     settings = list(given.settings)
     if not bench.planned and bench.turned is not None:
-        settings = [each for each in settings if each.partition("=")[0].strip() != "process.rotate_deg"]
+        settings = [setting for setting in settings if setting.partition("=")[0].strip() != "process.rotate_deg"]
         settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.12g}' for angle in turns_deg(bench))}]")
     words += [word for setting in settings for word in ("--set", setting)]
     if bench.planned:
         words += ["--plan", f"{stem}-plan.toml"]
     else:
         words += ["--parts", "1"]
-        for each in bench.profile.parts:
-            words += ["--part", option(each)]
+        for own in bench.profile.parts:
+            words += ["--part", option(own)]
     if bench.copies != 1:
         words += ["--copies", str(bench.copies)]
     words += [word for stop in bench.stops for word in stop.option.split()]

@@ -60,8 +60,8 @@ def effect_of(key: str) -> Effect:
 
 def effect_of_change(before: Profile, after: Profile) -> Effect:
     """The greatest effect of all that differs between two profiles, the settings of single parts aside: no search reads them."""
-    one, other = (dict(_leaves("", profile.model_dump(exclude={"parts"}))) for profile in (before, after))
-    changed = {key for key in one.keys() | other.keys() if one.get(key) != other.get(key)}
+    old, new = (dict(_leaves("", profile.model_dump(exclude={"parts"}))) for profile in (before, after))
+    changed = {key for key in old.keys() | new.keys() if old.get(key) != new.get(key)}
     return max(map(effect_of, changed), default=Effect.NONE)
 
 

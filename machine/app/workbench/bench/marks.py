@@ -1,12 +1,11 @@
 """Marks: boxes and faces on which a person wants no cut, no seam or no support: the zones of the plan."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.bench.planes import MOST_MM, is_number, rotation_rows
+from machine.app.workbench.bench.values import MOST_MM, Asked, number, rotation_rows, vector, whole
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
@@ -14,61 +13,45 @@ from mdp.plans.plan_file import ZONE_KINDS
 from mdp.plans.reading import MOST_ZONES
 from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones, faces_of
 from profiles.errors import PlanError
-from profiles.frozen import Vector
 
-MARKS = ("mark", "unmark")
 WORDS = {"keep": "mark: no cut here", "no_seam": "mark: no seam here", "no_support": "mark: no support here"}
 
 
-def marked(bench: Bench, asked: dict[str, Any]) -> tuple[str, Zones]:
-    """A word for what a command does to the zones, and the zones after it. Raises PlanError for what makes no sense.
+def mark(bench: Bench, asked: Asked) -> tuple[str, Zones]:
+    """A word for a further zone of `kind`, and the zones with it: a box `min_mm`, `max_mm`, along `axes` where it leans, or the
+    faces around `point_mm` as far as `angle_deg`; in place of the zone `number`, if one is given. Raises PlanError."""
+    kind, zones = _zones(bench, asked)
+    index = whole(asked, "number", 1, len(zones)) - 1 if "number" in asked else len(zones)
+    if index >= MOST_ZONES:
+        raise PlanError(f"there are {index} zones of {kind}: {MOST_ZONES} are allowed")
+    return WORDS[kind], replace(bench.zones, **{kind: (*zones[:index], _zone(asked, bench), *zones[index + 1 :])})
 
-    mark: a box `min_mm`, `max_mm`, along `axes` of its own where it leans, or the faces around `point_mm` as far as `angle_deg`,
-    becomes a zone of `kind`, in place of that of `number`, if one is given; unmark: the zone `number` of `kind` goes.
-    """
-    if bench.model is None:
-        raise PlanError("there is no model on the workbench yet: choose a file first")
+
+def unmark(bench: Bench, asked: Asked) -> tuple[str, Zones]:
+    """The same without the zone `number` of `kind`. Raises PlanError."""
+    kind, zones = _zones(bench, asked)
+    index = whole(asked, "number", 1, len(zones)) - 1
+    return "take a mark away", replace(bench.zones, **{kind: (*zones[:index], *zones[index + 1 :])})
+
+
+def _zones(bench: Bench, asked: Asked) -> tuple[str, tuple[AnyZone, ...]]:
     kind = asked.get("kind")
     if kind not in ZONE_KINDS:
         raise PlanError(f"kind is {kind!r}: {', '.join(ZONE_KINDS)} are allowed")
-    zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
-    place = _place(asked.get("number"), len(zones)) if asked.get("do") == "unmark" or "number" in asked else len(zones)
-    if asked.get("do") == "unmark":
-        return "take a mark away", replace(bench.zones, **{kind: (*zones[:place], *zones[place + 1 :])})
-    if place >= MOST_ZONES:
-        raise PlanError(f"there are {place} zones of {kind}: {MOST_ZONES} are allowed")
-    return WORDS[kind], replace(bench.zones, **{kind: (*zones[:place], _zone(asked, bench), *zones[place + 1 :])})
+    return kind, getattr(bench.zones, kind)
 
 
-def _place(number: Any, count: int) -> int:
-    if not isinstance(number, int) or isinstance(number, bool) or not 1 <= number <= count:
-        raise PlanError(f"number is {number!r}: {f'1 to {count} is allowed' if count else 'there is none yet'}")
-    return number - 1
-
-
-def _zone(asked: dict[str, Any], bench: Bench) -> AnyZone:
+def _zone(asked: Asked, bench: Bench) -> AnyZone:
     if "point_mm" not in asked:
-        low, high = _vector(asked, "min_mm"), _vector(asked, "max_mm")
+        low, high = vector(asked, "min_mm", MOST_MM), vector(asked, "max_mm", MOST_MM)
         if not all(least < most for least, most in zip(low, high, strict=True)):
             raise PlanError(f"min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
-        return Zone(low, high, None if asked.get("axes") is None else rotation_rows(asked["axes"], "axes"))
-    point, angle_deg = _vector(asked, "point_mm"), asked.get("angle_deg")
-    if not is_number(angle_deg) or not 0.0 <= angle_deg <= MOST_GROWN_DEG:
-        raise PlanError(f"angle_deg is {angle_deg!r}: 0 to {MOST_GROWN_DEG:g} is allowed")
-    zone, mesh = Grown(point, float(angle_deg)), standing_mesh(bench)
+        return Zone(low, high, None if asked.get("axes") is None else rotation_rows(asked, "axes"))
+    point = vector(asked, "point_mm", MOST_MM)
+    zone, mesh = Grown(point, number(asked, "angle_deg", 0.0, MOST_GROWN_DEG)), standing_mesh(bench)
     if (away_mm := zone.away_mm(mesh)) > FARTHEST_MM:
         raise PlanError(f"point_mm is {list(point)}, {away_mm:.3g} mm from the model: up to {FARTHEST_MM:g} is allowed")
     return zone
-
-
-def _vector(asked: dict[str, Any], key: str) -> Vector:
-    value = asked.get(key)
-    if not isinstance(value, list) or len(value) != 3 or not all(map(is_number, value)):
-        raise PlanError(f"{key}: three numbers are expected")
-    if max(map(abs, value)) > MOST_MM:
-        raise PlanError(f"{key} is {value}: {-MOST_MM:g} to {MOST_MM:g} is allowed")
-    x, y, z = (float(each) for each in value)
-    return x, y, z
 
 
 def standing_mesh(bench: Bench) -> Mesh:

@@ -31,7 +31,7 @@ def with_setting(given: Given, key: str, value: str | None) -> Given:
 
 def with_typed(given: Given, key: str, value: str | None, before: Profile) -> Given:
     """The same for what a person types: nothing, where the profile has nothing, is no change. Raises ProfileError."""
-    changed, unchanged = (with_setting(given, key, each) for each in (value, None))
+    changed, unchanged = (with_setting(given, key, new) for new in (value, None))
     if value == "" and profile_as_given(changed, before) == profile_as_given(unchanged, before):
         return unchanged
     return changed
@@ -130,7 +130,7 @@ def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
     between; `text`: a line of it; `block`: lines of G-code; `rows`: a list or a table as TOML."""
     way = next(way for way in schema.get("anyOf", [schema]) if way.get("type") != "null")
     kind = "choice" if "enum" in way else str(way.get("type"))
-    numbers = kind == "array" and all(each.get("type") in ("number", "integer") for each in way.get("prefixItems", [{}]))
+    numbers = kind == "array" and all(item.get("type") in ("number", "integer") for item in way.get("prefixItems", [{}]))
     if kind == "string":
         kind = "block" if way.get("format") == GCODE else "text"
     elif numbers:

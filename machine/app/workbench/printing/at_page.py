@@ -13,46 +13,38 @@ from machine.app.printer.watch_page import state_of
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.printer_messages import PrinterMessages
 from machine.app.terminal.progress import Report
-from machine.app.workbench.printing.teller import Teller
+from machine.app.workbench.printing.reporter import StateReporter
 from machine.dryrun.timeline import Timeline
 from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
 
 WORDS_KEPT = 50
-COMMANDS = {
-    "pause": Command.PAUSE,
-    "resume": Command.RESUME,
-    "cancel": Command.CANCEL,
-    "emergency": Command.EMERGENCY_STOP,
-    "feed": Command.FEED,
-    "flow": Command.FLOW,
-}
-LEAVE = "leave"  # a print on a server goes on without this program
-ANSWERS = ("begin", "cancel", "emergency", LEAVE)  # to the question whether to begin
+BEGIN, LEAVE = "begin", "leave"  # LEAVE: a print on a server goes on without this program
+ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the question whether to begin
 
 
 class AtPage:
     """hear() and leave() from the thread that listens to the server, all else from the one that prints."""
 
-    def __init__(self, teller: Teller) -> None:
+    def __init__(self, reporter: StateReporter) -> None:
         self.control, self.stop, self.words = Control(), Flag(), PrinterMessages(WORDS_KEPT)
         self.agreed = False  # to what was found: from then on something may move
-        self._teller = teller
+        self._reporter = reporter
         self._answers: SimpleQueue[bool] = SimpleQueue()
         self._gives_up, self._halts = Flag(), Flag()
 
-    def hear(self, word: str, value: float = 100.0) -> None:
-        """What the person wants: to begin, one of COMMANDS, or LEAVE."""
-        if word in COMMANDS:
-            self.control.ask(COMMANDS[word], value)
-        if word in ("cancel", LEAVE):
+    def hear(self, word: Command | str, value: float = 100.0) -> None:
+        """What the person wants: a command of a print, BEGIN or LEAVE."""
+        if isinstance(word, Command):
+            self.control.ask(word, value)
+        if word in (Command.CANCEL, LEAVE):
             self._gives_up.set()
         if word == LEAVE:
             self.stop.set()
-        if word == "emergency":
+        if word == Command.EMERGENCY_STOP:
             self._halts.set()
         if word in ANSWERS:
-            self._answers.put(word == "begin")
+            self._answers.put(word == BEGIN)
 
     def leave(self) -> None:
         """The server is gone, and nobody can command any more: the print ends as if it had been cancelled, but one on a print
@@ -68,11 +60,16 @@ class AtPage:
     @contextmanager
     def uploading(self) -> Iterator[Report]:
         """How far the file has been handed over, as its state."""
-        yield lambda text, share=None: self._teller.tell(phase="uploading", upload=(text, share))
+        yield lambda text, share=None: self._reporter.tell(phase="uploading", upload=(text, share))
 
     def gives_up(self) -> bool:
         """Whether there is to be no print on a server, as long as none has begun; an emergency stop is given to the printer."""
         return (self._gives_up.is_set() or self.stop.is_set()) and not self._halts.is_set()
+
+    def has_stopped(self) -> bool:
+        """Whether the print has been stopped at once, at its end: the order was heard and is not waiting any more."""
+        waiting = iter(self.control.take, None)
+        return self._halts.is_set() and all(request.command != Command.EMERGENCY_STOP for request in waiting)
 
     def gone(self) -> bool:
         """Whether a print on a server is left."""
@@ -82,8 +79,8 @@ class AtPage:
     def show(self, observers: Observers, course: Timeline) -> Iterator["_Shown"]:
         """The print as its state."""
         journal = "" if observers.journal is None else str(observers.journal.path)
-        self._teller.tell(log=log_told(observers.log), journal=journal)
-        yield _Shown(self._teller, course, self.words)
+        self._reporter.tell(log=log_told(observers.log), journal=journal)
+        yield _Shown(self._reporter, course, self.words)
 
 
 def log_told(log: SerialLog) -> str:
@@ -95,15 +92,15 @@ class _Shown:
     """A display whose screen is the state that the pages are told. Moments are counted: a print of which nothing changes, as a
     paused one on a print server, is heard of all the same."""
 
-    def __init__(self, teller: Teller, course: Timeline, words: PrinterMessages) -> None:
-        self._teller, self._course, self._words = teller, course, words
+    def __init__(self, reporter: StateReporter, course: Timeline, words: PrinterMessages) -> None:
+        self._reporter, self._course, self._words = reporter, course, words
         self._opened = False  # before, a person is asked
         self._moments = 0
 
     def open(self) -> None:
         """The pages show it from now on."""
         self._opened = True
-        self._teller.tell(phase="printing", upload=None)
+        self._reporter.tell(phase="printing", upload=None)
 
     def __call__(self, progress: Progress) -> None:
         if not self._opened:
@@ -113,7 +110,7 @@ class _Shown:
         words = tuple(plain_line(word) for word in self._words.last)
         self._moments += 1
         moment = told(progress, self._course) | {"moment": self._moments}
-        self._teller.tell(phase=phase, progress=moment, words=words)
+        self._reporter.tell(phase=phase, progress=moment, words=words)
 
 
 def told(progress: Progress, course: Timeline) -> dict[str, Any]:

@@ -28,10 +28,10 @@ def print_on_server(order: PrintOrder, person: AtPage, checks: Checks) -> State:
     address = order.printing.port
     with server_session(address, f"{order.name} to {address}", "print" if order.starts else "send") as (server, log):
         job = _checked(order, server, checks)
-        checks.teller.tell(phase="ready")
+        checks.reporter.tell(phase="ready")
         if not person.agrees():
             return LEFT
-        checks.teller.tell(phase="uploading", log=log_told(log))
+        checks.reporter.tell(phase="uploading", log=log_told(log))
         try:
             if not order.starts:
                 file = hand_over(server, GcodeUpload(job.name, job.program.lines), job.name, person)
@@ -49,7 +49,7 @@ def follow_on_server(order: FollowOrder, person: AtPage, checks: Checks) -> Stat
         server.greet()
         now = running_print(server)
         person.agreed, name = True, file_name(now)  # from now on it may be stopped
-        checks.teller.tell(name=name)
+        checks.reporter.tell(name=name)
         end = follow_there(server, now, Observers(log), person)
     return _ended(end, name, address)
 
@@ -68,7 +68,7 @@ def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> LoadedPr
             check_free(server.name, server.status())
         check_server_machine(parse_server_address(order.printing.port), greeting, profile.machine, order.force)
     program = program_of(order)
-    checks.teller.tell(figures=figures(program))
+    checks.reporter.tell(figures=figures(program))
     with checks.that(CLEAN):
         ready_for_server(greeting, program, profile, order.name, order.force)
     if order.starts:

@@ -1,16 +1,19 @@
 """Checks: what is found before a print, told as it is found."""
 
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from machine.app.pipeline import compilers
 from machine.app.workbench.printing.order import PrintOrder, State
-from machine.app.workbench.printing.teller import Said, Teller
+from machine.app.workbench.printing.reporter import StateReporter
 from machine.dryrun.dryrun import dry_run, summary
 from machine.program import Program
 from profiles.errors import PlanError
 
+LINES_KEPT = 100  # of what the program says
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
 DONE: State = {"end": "done", "sentence": "the print is done"}
@@ -18,25 +21,41 @@ STOPPED: State = {"end": "stopped", "sentence": "the print was stopped"}
 LEFT: State = {"end": "left", "sentence": "nothing was printed"}
 
 
-class Checks:
-    """What has been found in order, told as it is found; where --force goes past something, the words for that stand instead."""
+@dataclass(frozen=True)
+class Check:
+    """What has been found; forced: what speaks against the print, which --force goes past."""
 
-    def __init__(self, teller: Teller, said: Said) -> None:
-        self.teller = teller
-        self._said = said
-        self._passed: tuple[str, ...] = ()
+    text: str
+    forced: bool = False
+
+
+class Checks:
+    """What has been found in order, and the last lines that the program has said, both told as they come."""
+
+    def __init__(self, reporter: StateReporter) -> None:
+        self.reporter = reporter
+        self._done: tuple[Check, ...] = ()
+        self._lines: deque[str] = deque(maxlen=LINES_KEPT)
+
+    def hear(self, text: str, forced: bool) -> None:
+        """What the program says; what --force goes past is a check."""
+        if forced:
+            self.add(text, forced=True)
+        self._lines.extend(line for line in text.split("\n") if line.strip())
+        self.reporter.tell(said=tuple(self._lines))
 
     @contextmanager
     def that(self, text: str) -> Iterator[None]:
-        """A check that raises where it is not passed. text: what it has shown."""
-        before = self._said.count
+        """A check that raises where it is not passed. text: what it has shown, unless --force goes past it."""
+        before = self._done
         yield
-        self.add("; ".join(self._said.since(before)) or text)
+        if self._done == before:
+            self.add(text)
 
-    def add(self, text: str) -> None:
-        """What is so, whatever speaks for or against it."""
-        self._passed = (*self._passed, text)
-        self.teller.tell(checks=self._passed)
+    def add(self, text: str, *, forced: bool = False) -> None:
+        """What is so."""
+        self._done = (*self._done, Check(text, forced))
+        self.reporter.tell(checks=tuple(map(asdict, self._done)))
 
 
 def program_of(order: PrintOrder) -> Program:
@@ -54,11 +73,11 @@ def program_of(order: PrintOrder) -> Program:
 
 def figures(program: Program) -> dict[str, Any]:
     """What a person is told of a program."""
-    values, found = summary(program.run), program.run.findings
+    values, findings = summary(program.run), program.run.findings
     return {
         "time_s": values["time_s"],
         "filament_mm": values["filament_mm"],
         "lines": len(program.lines),
-        "findings": [f"{each.severity}: {each.message}" for each in found[:MOST_FINDINGS]],
+        "findings": [f"{finding.severity}: {finding.message}" for finding in findings[:MOST_FINDINGS]],
         "errors": len(program.run.errors),
     }

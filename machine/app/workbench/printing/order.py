@@ -73,6 +73,7 @@ def first_state(order: Order) -> State:
         "end": "",
         "sentence": "",
         "forcible": False,
+        "stop_given": False,
     }
 
 

@@ -5,6 +5,7 @@ from machine.app.printer.compatibility import check_dialect, check_speed
 from machine.app.printer.server_checks import check_server_dialect
 from machine.app.requests import PrintRequest
 from machine.app.workbench.printing.order import PrintOrder
+from machine.app.workbench.session.commands import Need, check_need
 from machine.app.workbench.session.session import Session
 from machine.firmware.line import check_baud
 from machine.network.address import is_server_address, parse_server_address
@@ -16,12 +17,12 @@ def order_of(session: Session, printing: PrintRequest, force: bool, starts: bool
     """The G-code that the session would save, for the profile that it was made with. Raises PlanError where there is none,
     PrinterError for a machine or a rate that cannot print there, MoveError where the slices' dry run found errors; force: not for
     those."""
-    bench = session.bench
     if session.closed:
         raise PlanError("this bench is not open any more: print from another one")
-    if bench.model is None:
-        raise PlanError("there is no model on the workbench yet: choose a file first")
-    sliced = session.slicing.needed()
+    check_need(session, Need.MODEL)
+    slices = session.slicing.needed()
+    bench, sliced = slices.bench, slices.sliced
+    assert bench.model is not None
     known = sliced.known
     _check_place(printing, known.profile.machine)
     if not force:  # what that goes past the print itself says

@@ -6,7 +6,7 @@ The emergency stop alone is every page's: who sees that something goes wrong mus
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from os.path import realpath
@@ -15,21 +15,18 @@ from typing import Any
 
 from machine.app.printer.journal_folder import ResumableJournal, resumable_journals
 from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
-from machine.app.workbench.bench.planes import is_number
-from machine.app.workbench.printing.at_page import LEAVE
 from machine.app.workbench.printing.order import Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
-from machine.app.workbench.work.news import News
+from machine.app.workbench.work.observable import Observable
 from machine.firmware.line import check_baud
 from machine.link.port import stable_name
 from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import PrinterError
 
 MOST_OVER = 5  # prints that are over stay to be looked at, the newest ones
-WORDS, PERCENTS = ("pause", "resume", LEAVE), ("feed", "flow")  # what goes to the print as it is
 
 
-class Prints(News):
+class Prints(Observable):
     """All from the event loop; pages wait for `changed`."""
 
     def __init__(self) -> None:
@@ -46,7 +43,7 @@ class Prints(News):
     @property
     def running(self) -> list[RunningPrint]:
         """Those of which something goes on."""
-        return [each for each in self.prints if not each.over]
+        return [job for job in self.prints if not job.over]
 
     def snapshot(self) -> dict[str, Any]:
         """What every page is told."""
@@ -56,8 +53,8 @@ class Prints(News):
             "asking": self._over is not None,
             "journals": self._journals_told(),
             "prints": [
-                {**each.state, "number": each.number, "holder": each.holder, "held": bool(self._pages[each.holder])}
-                for each in self.prints
+                {**job.state, "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
+                for job in self.prints
             ],
         }
 
@@ -65,27 +62,12 @@ class Prints(News):
     def page(self, page: str) -> Iterator[None]:
         """A page that is there; one that goes leaves its prints alone, and their command to whoever takes it."""
         self._pages[page] += 1
-        self.tell()
+        self.notify()
         try:
             yield
         finally:
             self._pages[page] -= 1
-            self.tell()
-
-    def command(self, page: str, asked: dict[str, Any], order: Callable[[dict[str, Any]], Order]) -> None:
-        """Do what a page asks for; order: makes one of what it asks for. Raises UserError for what cannot be done."""
-        word = asked.get("do")
-        if word == "ports":
-            self._look_for_ports(_whole(asked, "baud", 115200))
-        elif word == "journals":
-            self._look_for_journals()
-        elif word in ("check", "go_on", "follow"):
-            self._begin(page, order(asked))
-        elif word == "emergency":
-            self._stop_at_once(asked.get("print"))
-        else:
-            self._command_one(page, self._named(asked.get("print")), asked)
-        self.tell()
+            self.notify()
 
     def close(self) -> None:
         """End the asking; the prints end by themselves, heaters off, for their pipes end with this process."""
@@ -95,32 +77,31 @@ class Prints(News):
     async def end_all(self) -> list[str]:
         """End every print as a cancel does, but leave those on print servers, and wait for that; the last words of each."""
         running = self.running
-        for each in running:
-            each.end()
-        while any(not each.over for each in running):
+        for job in running:
+            job.end()
+        while any(not job.over for job in running):
             await self.changed(self.version)
-        return [
-            line for each in running for line in (*each.state["said"][-2:], f"{each.state['port']}: {each.state['sentence']}")
-        ]
+        return [line for job in running for line in (*job.state["said"][-2:], f"{job.state['port']}: {job.state['sentence']}")]
 
-    def _begin(self, page: str, order: Order) -> None:
+    def begin(self, page: str, order: Order) -> None:
+        """Have something printed, commanded by a page. Raises PrinterError where the port, or the journal, is in use."""
         port = order.printing.port
         starts = not isinstance(order, PrintOrder) or order.starts
-        if starts and any(each.state["starts"] and _same(each.state["port"], port) for each in self.running):
+        if starts and any(job.state["starts"] and _same(job.state["port"], port) for job in self.running):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
         if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
             raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
         self._forget_old(port)
         self._last += 1
-        begun = RunningPrint(self._last, order, page, self.tell)
+        begun = RunningPrint(self._last, order, page, self.notify)
         self.prints.append(begun)
         self._start(self._print(begun))
 
     def _forget_old(self, port: str) -> None:
         """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:
         only what is listed can be stopped."""
-        over = [each for each in self.prints if each.over and not _same(each.state["port"], port)][-MOST_OVER:]
-        self.prints = [each for each in self.prints if not each.over or each in over]
+        over = [job for job in self.prints if job.over and not _same(job.state["port"], port)][-MOST_OVER:]
+        self.prints = [job for job in self.prints if not job.over or job in over]
 
     async def _print(self, begun: RunningPrint) -> None:
         try:
@@ -128,38 +109,19 @@ class Prints(News):
         except Exception as error:  # noqa: BLE001 - the print is told to be over, whatever it was
             begun.fail(error)
 
-    def _stop_at_once(self, number: object) -> None:
+    def stop_at_once(self, number: object) -> None:
         """The one that was named, all when none was or there never was such a one: in doubt everything stops. One that is over
         already, in the list or not any more, stops no other: a button is pressed twice in a fright, and a press may come late."""
         known = isinstance(number, int) and 0 < number <= self._last
-        for each in self.prints if known else self.running:
-            if each.number == number or not known:
-                each.stop_at_once()
+        for job in self.prints if known else self.running:
+            if job.number == number or not known:
+                job.stop_at_once()
 
-    def _command_one(self, page: str, named: RunningPrint, asked: dict[str, Any]) -> None:
-        word = asked.get("do")
-        if word == "take":
-            named.holder = page
-            return
-        if named.holder != page:
-            raise PrinterError("another page commands this print: take the command over first")
-        if word == "begin":
-            named.begin()
-        elif word == "cancel":
-            named.cancel()
-        elif word == "forget" and named.over:
-            self.prints.remove(named)
-        elif word in PERCENTS:
-            named.say((word, float(_whole(asked, "percent", 100))))
-        elif word in WORDS and (word != LEAVE or named.state["server"]):
-            named.say((word,))
-        else:
-            raise PrinterError("what the page has sent is no command of a print")
-
-    def _named(self, number: object) -> RunningPrint:
-        for each in self.prints:
-            if each.number == number:
-                return each
+    def numbered(self, number: object) -> RunningPrint:
+        """The print of a number. Raises PrinterError where it is not there."""
+        for running in self.prints:
+            if running.number == number:
+                return running
         raise PrinterError("this print is not there any more")
 
     def _journals_told(self) -> list[dict[str, Any]] | None:
@@ -167,13 +129,14 @@ class Prints(News):
         if self._journals is None:
             return None
         in_use = self._journals_in_use()
-        return [asdict(each) | {"path": str(each.path)} for each in self._journals if str(each.path) not in in_use]
+        return [asdict(journal) | {"path": str(journal.path)} for journal in self._journals if str(journal.path) not in in_use]
 
     def _journals_in_use(self) -> set[str]:
         """The journals of prints that run, and of those whose rest is printed."""
-        return {path for each in self.running for path in (each.state["journal"], each.state["resumes"]) if path}
+        return {path for job in self.running for path in (job.state["journal"], job.state["resumes"]) if path}
 
-    def _look_for_journals(self) -> None:
+    def look_for_journals(self) -> None:
+        """Read which prints can be gone on with."""
         if not self._reads_journals:
             self._reads_journals = True
             self._start(self._read_journals())
@@ -183,9 +146,10 @@ class Prints(News):
             self._journals = await asyncio.to_thread(resumable_journals)
         finally:
             self._reads_journals = False
-            self.tell()
+            self.notify()
 
-    def _look_for_ports(self, baud: int) -> None:
+    def look_for_ports(self, baud: int) -> None:
+        """Ask at every port who answers. Raises PrinterError for a rate that is not possible."""
         check_baud(baud)
         if self._over is None:
             self._over = Flag()
@@ -193,13 +157,13 @@ class Prints(News):
 
     async def _ask_ports(self, baud: int, over: Flag) -> None:
         try:
-            used = [each.state["port"] for each in self.running]
+            used = [job.state["port"] for job in self.running]
             devices = await asyncio.to_thread(known_ports)
             reports = await asyncio.to_thread(ask_ports, devices, baud, over, [*used, *map(stable_name, used)])
-            self._ports = [_port(each) for each in reports]
+            self._ports = [_port(report) for report in reports]
         finally:
             self._over = None
-            self.tell()
+            self.notify()
 
     def _start(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
@@ -216,10 +180,3 @@ def _same(one: str, other: str) -> bool:
     if is_server_address(one) and is_server_address(other):
         return parse_server_address(one).url == parse_server_address(other).url
     return stable_name(one) == stable_name(other)
-
-
-def _whole(asked: dict[str, Any], key: str, otherwise: int) -> int:
-    value = asked.get(key, otherwise)
-    if not is_number(value) or value != int(value):
-        raise PrinterError(f"{key} is {str(value)[:40]!r}: a whole number is expected")
-    return int(value)

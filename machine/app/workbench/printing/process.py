@@ -7,42 +7,35 @@ lifted; one on a print server goes on there. It leads a session of its own, so t
 alone, which ends it in that same way.
 """
 
-import os
-import pickle
 import sys
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from contextlib import suppress
 from threading import Thread
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
-from machine.app.crash import log_bug
-from machine.app.requests import FORCE_GOES_ON
+from machine.app.crash import bug_in_words
+from machine.app.terminal.plain import said_to
 from machine.app.workbench.printing.at_page import AtPage
-from machine.app.workbench.printing.at_port import print_at_port
+from machine.app.workbench.printing.at_port import go_on, print_at_port
 from machine.app.workbench.printing.at_server import follow_on_server, print_on_server
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
-from machine.app.workbench.printing.rest import go_on
-from machine.app.workbench.printing.teller import Said, Teller
-from machine.app.workbench.work.worker import LENGTH
+from machine.app.workbench.printing.reporter import StateReporter
+from machine.app.workbench.work.worker import read_frames, take_pipes
 from machine.network.address import is_server_address
 from profiles.errors import UserError
 
 
 def main() -> None:
     """Print what the server orders, once."""
-    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    with open(os.devnull, "r+b") as nowhere:  # what libraries print must not reach the pipe
-        os.dup2(nowhere.fileno(), 0)
-        os.dup2(nowhere.fileno(), 1)
-    order: Order = _read(asked)
-    teller = Teller(answers, first_state(order))
-    person = AtPage(teller)
+    asked, answers = take_pipes()
+    order: Order = next(read_frames(asked))
+    reporter = StateReporter(answers, first_state(order))
+    person, checks = AtPage(reporter), Checks(reporter)
     Thread(target=_listen, args=(asked, person), daemon=True).start()
-    said = Said(teller)
-    with redirect_stdout(said), redirect_stderr(said):
-        end = carry_out(order, person, Checks(teller, said))
-    teller.tell(phase="over", **end)
-    teller.close()
+    with said_to(checks.hear):
+        end = carry_out(order, person, checks)
+    reporter.tell(phase="over", stop_given=person.has_stopped(), **end)
+    reporter.close()
 
 
 def carry_out(order: Order, person: AtPage, checks: Checks) -> State:
@@ -57,27 +50,18 @@ def carry_out(order: Order, person: AtPage, checks: Checks) -> State:
         return print_at_port(order, person, checks)
     except UserError as error:
         end = "failed" if person.agreed else "refused"
-        return {"end": end, "sentence": str(error), "forcible": FORCE_GOES_ON in str(error)}
+        return {"end": end, "sentence": str(error), "forcible": error.forcible}
     except KeyboardInterrupt:
         return {"end": "failed", "sentence": "ended at once: whether the heaters are off is not known, look at the printer"}
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file; the stream has left the printer safe
-        log = log_bug(error, sys.argv)
-        return {"end": "failed", "sentence": f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"}
-
-
-def _read(asked: BinaryIO) -> Any:
-    """The next value of the pipe. Raises EOFError when there is none."""
-    head = asked.read(LENGTH.size)
-    if len(head) < LENGTH.size:
-        raise EOFError
-    return pickle.loads(asked.read(*LENGTH.unpack(head)))
+        return {"end": "failed", "sentence": bug_in_words(error, sys.argv)}
 
 
 def _listen(asked: BinaryIO, person: AtPage) -> None:
     """In a thread: what the server says; when it is gone, the print is left."""
-    with suppress(EOFError, OSError):
-        while True:
-            person.hear(*_read(asked))
+    with suppress(OSError):
+        for words in read_frames(asked):
+            person.hear(*words)
     person.leave()
 
 

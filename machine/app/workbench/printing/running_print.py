@@ -1,18 +1,18 @@
 """Running print: the server's end of a print: its process, its newest state, and what is done when the process dies."""
 
 import asyncio
-import pickle
 import sys
 from collections.abc import Callable
 from contextlib import suppress
 
-from machine.app.crash import log_bug
-from machine.app.printer.rescue import STOP, cancel_on_server, rescue
+from machine.app.crash import bug_in_words
+from machine.app.printer.rescue import cancel_on_server, rescue
 from machine.app.requests import SIMULATED
-from machine.app.workbench.printing.at_page import LEAVE
+from machine.app.workbench.printing.at_page import BEGIN, LEAVE
 from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.work.processes import Process, end_process, start_process
-from machine.app.workbench.work.worker import LENGTH, frame
+from machine.app.workbench.work.worker import frame, read_frame
+from machine.link.pending_commands import Command
 from profiles.errors import PrinterError, UserError
 
 COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
@@ -54,8 +54,7 @@ class RunningPrint:
         ended = lost = False
         with suppress(asyncio.IncompleteReadError, ConnectionError):
             while True:
-                (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
-                state: State = pickle.loads(await process.stdout.readexactly(length))
+                state: State = await read_frame(process.stdout)
                 ended = state["phase"] == "over"
                 lost = ended and self._has_lost_an_order(state)
                 self._become(**state | ({"phase": "leaving"} if lost else {}))
@@ -79,14 +78,12 @@ class RunningPrint:
         if self.state["phase"] != "ready" or not self.asking or self._given_up:
             raise PrinterError("this print cannot begin now: it is not ready, or over")
         self._begun = True
-        self.say(("begin",))
+        self.say((BEGIN,))
 
     def fail(self, error: Exception) -> None:
         """It could not be printed at all, by a fault of this program."""
-        log = log_bug(error, sys.argv)
         self._kill()
-        sentence = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}; look at the printer"
-        self._become(phase="over", end="failed", sentence=sentence)
+        self._become(phase="over", end="failed", sentence=f"{bug_in_words(error, sys.argv)}; look at the printer")
 
     def cancel(self) -> None:
         """End it, heaters off; before it has begun at once. What has opened a journal to go on with takes it away itself."""
@@ -99,15 +96,19 @@ class RunningPrint:
         if asking and not isinstance(self._order, ResumeOrder):
             self._kill()
             return
-        self.say(("cancel",))
+        self.say((Command.CANCEL,))
         self._cancelled = not asking
         if asking:
             asyncio.get_running_loop().call_later(LEAVE_S, self._kill)
 
+    def leave(self) -> None:
+        """Let a print server go on with it by itself."""
+        self.say((LEAVE,))
+
     def end(self) -> None:
         """End it because the workbench ends: as a cancel does, but what a print server prints goes on there."""
         if self.state["server"] and not self.asking:
-            self.say((LEAVE,))
+            self.leave()
         else:
             self.cancel()
 
@@ -122,7 +123,7 @@ class RunningPrint:
             self._ended = True
             self._kill()
         else:
-            self.say(("emergency",))
+            self.say((Command.EMERGENCY_STOP,))
             asyncio.get_running_loop().call_later(EMERGENCY_S, self._kill)
 
     def _kill(self) -> None:
@@ -130,7 +131,7 @@ class RunningPrint:
 
     def _has_lost_an_order(self, ended: State) -> bool:
         """Whether the following of a print on a server has ended before it took what it was told last."""
-        stop_lost = self._emergency and not ended["sentence"].startswith(STOP)
+        stop_lost = self._emergency and not ended["stop_given"]
         return bool(ended["server"] and self._begun and (stop_lost or (self._cancelled and _goes_on(ended))))
 
     def _order_late(self) -> None:

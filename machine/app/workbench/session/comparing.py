@@ -3,7 +3,7 @@
 import asyncio
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.session.desk import WAITING, Desk
+from machine.app.workbench.session.base import WAITING, SessionBase
 from machine.app.workbench.session.slicing import Slicing
 from machine.program import Alternative
 
@@ -11,10 +11,10 @@ from machine.program import Alternative
 class Comparing:
     """text: how far the comparison under way is, "" where there is none."""
 
-    def __init__(self, desk: Desk, slicing: Slicing) -> None:
+    def __init__(self, session: SessionBase, slicing: Slicing) -> None:
         self.text = ""
         self._done: tuple[Bench, tuple[Alternative, ...]] | None = None
-        self._desk, self._slicing = desk, slicing
+        self._session, self._slicing = session, slicing
         self._task: asyncio.Task[None] | None = None
 
     def rows(self) -> tuple[Alternative, ...]:
@@ -25,11 +25,10 @@ class Comparing:
         return slices.sliced.cost, *self._done[1]
 
     def begin(self) -> None:
-        """Compare, if that is not done yet. Raises PlanError where what lies on the bench is not sliced."""
-        self._slicing.needed()
+        """Compare what is sliced, if that is not done yet."""
         if not self.text and not self.rows():
-            self.text = WAITING if self._desk.long.pool.full else "comparing"
-            self._task = self._desk.start(self._compare(self._desk.bench))
+            self.text = WAITING if self._session.long.pool.full else "comparing"
+            self._task = self._session.start(self._compare(self._session.bench))
 
     def stop(self) -> None:
         """End the comparison."""
@@ -39,9 +38,9 @@ class Comparing:
     async def _compare(self, bench: Bench) -> None:
         def follow(text: str) -> None:
             self.text = text
-            self._desk.tell()
+            self._session.notify()
 
         try:
-            self._done = bench, await self._desk.long.run("compare_bench", bench, tell=follow)
+            self._done = bench, await self._session.long.run("compare_bench", bench, tell=follow)
         finally:
             self.text = ""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench, with_front, with_rotation
-from machine.app.workbench.session.desk import WAITING, Desk
+from machine.app.workbench.session.base import WAITING, SessionBase
 from machine.app.workbench.work.cutting import LAY_TOO, Found, Searched, SearchWay
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
@@ -34,20 +34,18 @@ def search_way(asked: dict[str, Any]) -> SearchWay:
 class Finding:
     """search: the one under way; notes: of the last one."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, session: SessionBase) -> None:
         self.search: Search | None = None
         self.notes: tuple[str, ...] = ()
-        self._desk = desk
+        self._session = session
         self._task: asyncio.Task[None] | None = None
         self._pricing: asyncio.Task[None] | None = None  # of the best of a search that was stopped
-        desk.followers.append(self._follow)
+        session.followers.append(self._follow)
 
     def begin(self, way: SearchWay = BY_DEFAULT) -> None:
-        """Search for the parts of what lies on the bench, if no search is under way. Raises PlanError without a model, and where
-        it is to be laid down although planes or marks belong to it as it lies."""
-        bench = self._desk.bench
-        if bench.model is None:
-            raise PlanError("there is no model on the workbench yet: choose a file first")
+        """Search for the parts of the model on the bench, if no search is under way. Raises PlanError where it is to be laid down
+        although planes or marks belong to it as it lies."""
+        bench = self._session.bench
         if way.orient and (bench.locked or bench.zones != NO_ZONES):
             raise PlanError(
                 f"{LAY_TOO}: locked planes and marks belong to the model as it lies; unlock them and take the marks away, or find"
@@ -56,8 +54,8 @@ class Finding:
         if self.search is None:
             if self._pricing is not None:
                 self._pricing.cancel()
-            self.search = Search(bench, Searched(WAITING if self._desk.long.pool.full else "beginning"))
-            self._task = self._desk.start(self._find(bench, way))
+            self.search = Search(bench, Searched(WAITING if self._session.long.pool.full else "beginning"))
+            self._task = self._session.start(self._find(bench, way))
 
     def stop(self) -> None:
         """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known."""
@@ -65,41 +63,41 @@ class Finding:
         if search is None or self._task is None:
             return
         self._task.cancel()
-        self._desk.start(self._desk.long.warm())
+        self._session.start(self._session.long.warm())
         best = search.searched.best
         if best is not None and best.planes:
-            self._desk.do("stop the search", with_front(self._desk.bench, [replace(best, chosen=True)]))
-            self._pricing = self._desk.start(self._price(self._desk.bench))
+            self._session.do("stop the search", with_front(self._session.bench, [replace(best, chosen=True)]))
+            self._pricing = self._session.start(self._price(self._session.bench))
 
     async def _find(self, bench: Bench, way: SearchWay) -> None:
         def follow(searched: Searched) -> None:
             if self.search is not None and self.search.bench is bench:
                 self.search = Search(bench, searched)
-                self._desk.tell()
+                self._session.notify()
 
         try:
-            found: Found = await self._desk.long.run("find_parts", bench, way, tell=follow)
+            found: Found = await self._session.long.run("find_parts", bench, way, tell=follow)
             self.notes = found.notes
-            now = self._desk.bench
+            now = self._session.bench
             laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
-            self._desk.do("find parts", with_front(laid, found.front))
+            self._session.do("find parts", with_front(laid, found.front))
         finally:
             if self.search is not None and self.search.bench is bench:
                 self.search = None
 
     async def _price(self, taken: Bench) -> None:
-        rows = await self._desk.long.run("measure_plan", taken, plan_of_bench(taken, "the search"))
-        self._desk.amend(taken, replace(taken, rows=tuple(rows)))
+        rows = await self._session.long.run("measure_plan", taken, plan_of_bench(taken, "the search"))
+        self._session.amend(taken, replace(taken, rows=tuple(rows)))
 
     def _follow(self) -> None:
         """A search ends whose model is not there any more or lies otherwise, or whose settings, marks or locked planes are others
         now."""
-        search, bench = self.search, self._desk.bench
+        search, bench = self.search, self._session.bench
         if search is not None and _other(search.bench, bench):
             self.search = None
             if self._task is not None:
                 self._task.cancel()
-                self._desk.start(self._desk.long.warm())
+                self._session.start(self._session.long.warm())
 
 
 def _other(begun: Bench, now: Bench) -> bool:

@@ -3,36 +3,36 @@
 from contextlib import suppress
 
 from machine.app.workbench.bench.bench import Bench, places_to_price, with_prices
-from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.base import SessionBase
 from profiles.errors import UserError
 
 
 class Pricing:
     """Work in the background; slices and searches go between two rows."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, session: SessionBase) -> None:
+        self._session = session
         self._at_work = False
-        desk.followers.append(self._follow)
+        session.followers.append(self._follow)
 
     def _follow(self) -> None:
-        if not self._desk.bench.priced and not self._at_work:
+        if not self._session.bench.priced and not self._at_work:
             self._at_work = True
-            self._desk.start(self._price_all())
+            self._session.start(self._price_all())
 
     async def _price_all(self) -> None:
         """Until nothing on the bench is without a price, whatever is changed meanwhile."""
         try:
-            while not self._desk.bench.priced:
-                await self._price(self._desk.bench)
+            while not self._session.bench.priced:
+                await self._price(self._session.bench)
         finally:
             self._at_work = False
 
     async def _price(self, bench: Bench) -> None:
         prices = {}
-        for place in places_to_price(bench):
+        for row in places_to_price(bench):
             with suppress(UserError):  # then it has none
-                prices[place] = await self._desk.long.run("price_row", bench, place)
-            if self._desk.bench is not bench:
+                prices[row] = await self._session.long.run("price_row", bench, row)
+            if self._session.bench is not bench:
                 return
-        self._desk.become(self._desk.history.amended(with_prices(bench, prices)))
+        self._session.become(self._session.history.amended(with_prices(bench, prices)))

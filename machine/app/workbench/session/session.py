@@ -1,8 +1,8 @@
-"""Session: one bench, the work under way for it, and what its pages may ask for."""
+"""Session: one bench, and the work under way for it."""
 
 import asyncio
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from weakref import finalize
@@ -19,23 +19,18 @@ from machine.app.workbench.bench.bench import (
     with_scaled_model,
 )
 from machine.app.workbench.bench.command_line import turned_by
-from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.effect import Effect, effect_of_change
-from machine.app.workbench.bench.marks import MARKS
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.bench.planes import EDITS, edited, instead_of
-from machine.app.workbench.bench.settings import check_block, profile_as_given, with_name, with_typed
+from machine.app.workbench.bench.settings import check_block, profile_as_given
+from machine.app.workbench.session.base import SessionBase
 from machine.app.workbench.session.comparing import Comparing
-from machine.app.workbench.session.desk import Desk
-from machine.app.workbench.session.finding import Finding, search_way
+from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.marking import Marking
-from machine.app.workbench.session.open_bench import OpenBench
-from machine.app.workbench.session.pieces import Pieces
 from machine.app.workbench.session.pricing import Pricing
 from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
-from machine.app.workbench.session.trying import Trying
+from machine.app.workbench.session.trials import PlaneTrials
 from machine.app.workbench.work.models import Resting
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.plans.plan_file import PlanFile
@@ -45,19 +40,31 @@ from profiles.errors import PlanError
 from profiles.profile import Profile
 
 
-class Session(Desk):
-    """A desk with all that is done on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
+@dataclass(frozen=True)
+class OpenBench:
+    """What the pages of all benches are told of each: its number, its model's name, how many parts that is cut into (0: not yet),
+    and the work under way in a word."""
+
+    number: int
+    name: str
+    parts: int
+    work: str
+
+
+class Session(SessionBase):
+    """A bench with all work on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
     this one too."""
 
     def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
         super().__init__(Bench(profile, given=given), pools)
         self.slicing, self.readiness = Slicing(self), Readiness(self)
-        self.trying = Trying(self, self.readiness)
+        self.trials = PlaneTrials(self, self.readiness)
         self.finding = Finding(self)
         self.comparing = Comparing(self, self.slicing)
-        self.pieces, self._pricing, self.standing = Pieces(self), Pricing(self), StandingModel(self)
-        self._settling = asyncio.Lock()
-        self.marking = Marking(self, self.trying)
+        self._pricing, self.standing = Pricing(self), StandingModel(self)
+        self._settling, self._drawing = asyncio.Lock(), asyncio.Lock()
+        self._pieces: tuple[Bench, Path] | None = None  # drawn last
+        self.marking = Marking(self, self.trials)
         self._ranking: asyncio.Task[None] | None = None
         self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
@@ -107,59 +114,29 @@ class Session(Desk):
                 rows = await self.quick.run("measure_plan", bench, plan)
             self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
-    def command(self, asked: dict[str, Any]) -> None:
-        """Do what a page asks for. Raises UserError for what cannot be done."""
-        self.problem = ""
-        ask = asked.get("ask")
-        match asked.get("do"):
-            case "search":
-                self.finding.begin(search_way(asked))
-            case "stop":
-                self.finding.stop()
-                self.slicing.stop()
-                self.comparing.stop()
-            case "slice":
-                self.slicing.begin()
-            case "compare":
-                self.comparing.begin()
-            case "set":
-                value = asked.get("value")
-                key = str(asked.get("key"))
-                text = None if value is None else str(value)
-                self.take_given(f"set {key}", lambda given: with_typed(given, key, text, self.bench.profile), key, ask)
-            case "reset":
-                self.take_given("take all changes back", lambda given: replace(given, settings=()), ask=ask)
-            case "profile":
-                name = str(asked.get("name"))
-                kind = str(asked.get("kind"))
-                self.take_given(f"take {name}", lambda given: with_name(given, kind, name), ask=ask)
-            case "try":
-                self.trying.move(edited(self.bench, {**asked, "do": "move"})[1])
-            case name if name in EDITS:
-                self.start(self.trying.take(lambda bench: edited(bench, asked), instead_of(asked)))
-            case "neck":
-                self.start(self.trying.take_neck(asked.get("part")))
-            case name if name in MARKS:
-                self.start(self.marking.take(asked))
-            case "demo":
-                self.start(self.open_demo(str(asked.get("name"))))
-            case _:
-                self.advance(obey(self.history, asked))
-                self.answer(ask)
-        self.tell()
-
     async def made(self, word: str, task: str, *given: Any) -> Any:
         """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
-        if self.bench.model is None or not self.bench.planned:
-            raise PlanError("there are no parts to save yet: find them first")
         with self.waiting(word):
             return await self.quick.run(task, self.bench, *given)
 
-    def take_given(self, word: str, change: Callable[[Given], Given], key: str = "", ask: object = None) -> None:
-        """Take other names and settings; those of the bench by then, for several may be asked for at once. key: the one that is
-        set; ask: name of the command."""
+    async def pieces(self) -> Path:
+        """The parts as bodies of their own, as `work.pieces` packs them, cut once for all that ask. Raises UserError where they
+        cannot be cut."""
+        bench = self.bench
+        async with self._drawing:
+            if self._pieces is None or self._pieces[0].shaped != bench.shaped:
+                out = self.new_file()
+                await self.quick.run("draw_pieces", bench, out)
+                if self._pieces is not None:
+                    self._pieces[1].unlink(missing_ok=True)
+                self._pieces = bench, out
+            return self._pieces[1]
+
+    def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> Coroutine[Any, Any, None]:
+        """The work of taking other names and settings; those of the bench by then, for several may be asked for at once. key: the
+        one that is set. Raises ProfileError."""
         check_block(profile_as_given(change(self.bench.given), self.bench.profile), key)  # refused at once
-        self.start(self._settle(word, change), ask)
+        return self._settle(word, change)
 
     async def _settle(self, word: str, change: Callable[[Given], Given]) -> None:
         async with self._settling:
@@ -185,7 +162,7 @@ class Session(Desk):
                 return with_model_turned_as_read(bench, model, turn, new.scale / old.scale), ""
             bench = with_scaled_model(bench, model, new.scale / old.scale)
         if bench.cuts is not None and effect_of_change(before.profile, bench.profile) == Effect.FRONT:
-            trial = await self.trying.attempt(bench, bench.cuts)
+            trial = await self.trials.attempt(bench, bench.cuts)
             if trial.refused:
                 why = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
                 return replace(with_cuts(bench, ()), cuts=None), why

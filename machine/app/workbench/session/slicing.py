@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.session.desk import WAITING, Desk
+from machine.app.workbench.session.base import WAITING, SessionBase
 from machine.app.workbench.work.slices import Sliced, SlicesSoFar
 from profiles.errors import PlanError
 
@@ -36,35 +36,35 @@ class Slices:
 class Slicing:
     """under_way: what is sliced now; done: the last slices."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, session: SessionBase) -> None:
         self.under_way: SlicingUnderWay | None = None
         self.done: Slices | None = None
-        self._desk = desk
+        self._session = session
         self._count = 0
         self._task: asyncio.Task[None] | None = None
-        desk.followers.append(self._follow)
+        session.followers.append(self._follow)
 
     def latest(self) -> Slices | None:
         """The last slices of the model on the bench, though it may have been turned, cut or set otherwise since."""
-        return self.done if self.done is not None and self.done.bench.model is self._desk.bench.model else None
+        return self.done if self.done is not None and self.done.bench.model is self._session.bench.model else None
 
     @property
     def out_of_date(self) -> bool:
         """Whether the last slices are of something else than what lies on the bench now."""
-        return self.done is not None and self.done.bench.printed != self._desk.bench.printed
+        return self.done is not None and self.done.bench.printed != self._session.bench.printed
 
-    def shown(self) -> Sliced | None:
-        """The slices of what lies on the bench now; None where they are of something else."""
-        return None if self.done is None or self.out_of_date else self.done.sliced
+    def lacking(self) -> str:
+        """Why there are no slices of what lies on the bench now; "" where there are."""
+        if self.latest() is None:
+            return "what is on the workbench is not sliced yet: slice it first"
+        return "what is on the workbench has changed since it was sliced: slice it again" if self.out_of_date else ""
 
-    def needed(self) -> Sliced:
-        """The same. Raises PlanError where there are none."""
-        sliced = self.shown()
-        if sliced is None and self.latest() is not None:
-            raise PlanError("what is on the workbench has changed since it was sliced: slice it again")
-        if sliced is None:
-            raise PlanError("what is on the workbench is not sliced yet: slice it first")
-        return sliced
+    def needed(self) -> Slices:
+        """The slices of what lies on the bench now. Raises PlanError where there are none."""
+        if sentence := self.lacking():
+            raise PlanError(sentence)
+        assert self.done is not None
+        return self.done
 
     def walls_of(self, number: int, part: int) -> bytes | None:
         """What is seen of a part of the slices of a number; None where it is not there, or not there yet."""
@@ -74,15 +74,13 @@ class Slicing:
         return None
 
     def begin(self) -> None:
-        """Slice what lies on the bench, if nothing is being sliced. Raises PlanError without a model."""
-        bench = self._desk.bench
-        if bench.model is None:
-            raise PlanError("there is no model on the workbench yet: choose a file first")
+        """Slice the model on the bench, if nothing is being sliced."""
+        bench = self._session.bench
         if self.under_way is None:
             self._count += 1
-            begins = WAITING if self._desk.long.pool.full else "cutting the parts"
+            begins = WAITING if self._session.long.pool.full else "cutting the parts"
             self.under_way = SlicingUnderWay(bench, self._count, begins)
-            self._task = self._desk.start(self._slice(self.under_way))
+            self._task = self._session.start(self._slice(self.under_way))
 
     def stop(self) -> None:
         """End the slicing."""
@@ -98,11 +96,11 @@ class Slicing:
             if self.under_way is None or self.under_way.number != begun.number:
                 return
             self.under_way = SlicingUnderWay(begun.bench, begun.number, so_far.text, so_far.shares, walls)
-            self._desk.tell()
+            self._session.notify()
 
         try:
-            files = self._desk.new_file(), self._desk.new_file()
-            sliced: Sliced = await self._desk.long.run("slice_bench", begun.bench, *files, tell=follow)
+            files = self._session.new_file(), self._session.new_file()
+            sliced: Sliced = await self._session.long.run("slice_bench", begun.bench, *files, tell=follow)
             if self.done is not None:
                 self.done.sliced.page.unlink(missing_ok=True)
                 self.done.sliced.gcode.unlink(missing_ok=True)
@@ -112,6 +110,6 @@ class Slicing:
                 self.under_way = None
 
     def _follow(self) -> None:
-        if self.under_way is not None and self.under_way.bench.printed != self._desk.bench.printed:
+        if self.under_way is not None and self.under_way.bench.printed != self._session.bench.printed:
             self.stop()
-            self._desk.add_problem(ENDED)
+            self._session.add_problem(ENDED)

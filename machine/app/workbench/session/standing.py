@@ -3,7 +3,7 @@
 from hashlib import sha256
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.base import SessionBase
 from machine.app.workbench.work.standing import Standing
 from profiles.errors import MeshError
 
@@ -11,35 +11,35 @@ from profiles.errors import MeshError
 class StandingModel:
     """The last one that is known, and of what."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, session: SessionBase) -> None:
+        self._session = session
         self._wanted: tuple[object, ...] = ()
         self._known: Standing | None = None
-        desk.followers.append(self._follow)
+        session.followers.append(self._follow)
 
     @property
     def now(self) -> Standing | None:
         """Of what lies on the bench; None: there is no model, or it is not known yet."""
-        return self._known if self._wanted and self._wanted == _asked(self._desk.bench) else None
+        return self._known if self._wanted and self._wanted == _asked(self._session.bench) else None
 
     @property
     def pedestal_key(self) -> str:
         """What tells the pedestal from others: the page asks for its triangles by it; "": there is none."""
-        bench = self._desk.bench
+        bench = self._session.bench
         if self.now is None or not self.now.pedestal or bench.model is None:
             return ""
         return sha256(repr((bench.model.key, bench.rotation, bench.profile.search.pedestal_mm)).encode()).hexdigest()[:16]
 
     def _follow(self) -> None:
-        asked = _asked(self._desk.bench)
+        asked = _asked(self._session.bench)
         if asked == self._wanted:
             return
         self._wanted, self._known = asked, None
         if asked:
-            self._desk.start(self._work(self._desk.bench, asked))
+            self._session.start(self._work(self._session.bench, asked))
 
     async def _work(self, bench: Bench, asked: tuple[object, ...]) -> None:
-        standing: Standing = await self._desk.hand.run("stand", bench)
+        standing: Standing = await self._session.hand.run("stand", bench)
         if self._wanted == asked:
             self._known = standing
             if standing.refusal:

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 
 from machine.app.workbench.bench.bench import History, Step, emptied
-from machine.app.workbench.session.open_bench import OpenBench
-from machine.app.workbench.session.session import Session
+from machine.app.workbench.session.session import OpenBench, Session
 from machine.app.workbench.work.worker_pool import WorkerPools
 from profiles.errors import PlanError
 
@@ -53,7 +52,7 @@ class Workbench:
         for session in self.sessions.values():
             if session.benches != benches:
                 session.benches = benches
-                session.tell()
+                session.notify()
 
 
 def _described(number: int, session: Session) -> OpenBench:

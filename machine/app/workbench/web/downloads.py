@@ -66,7 +66,7 @@ async def print_walls(session: Session, request: Request) -> Response:
 
 async def shared_page(session: Session, request: Request) -> Response:
     """The same as a file to save, with the comparison with one piece where that has been worked out."""
-    page, alternatives, name = session.slicing.needed().page, session.comparing.rows(), f"{file_stem(session.bench)}.html"
+    page, alternatives, name = session.slicing.needed().sliced.page, session.comparing.rows(), f"{file_stem(session.bench)}.html"
     if not alternatives:
         return FileResponse(page, headers=_saved_as(name), media_type="text/html")
     out = session.new_file()
@@ -76,7 +76,7 @@ async def shared_page(session: Session, request: Request) -> Response:
 
 async def gcode(session: Session, request: Request) -> Response:
     """The G-code; with errors only for who has said that he wants it all the same, as with `export --force`."""
-    sliced = session.slicing.needed()
+    sliced = session.slicing.needed().sliced
     if (errors := sliced.errors) and request.query_params.get("force") != "yes":
         raise PlanError(
             f"the dry run found {len(errors)} errors, the first: {errors[0].message}: no G-code is saved unless you say that you"

@@ -8,6 +8,7 @@ from weakref import WeakKeyDictionary
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.snapshot import snapshot
 from profiles.errors import PlanError
@@ -80,7 +81,7 @@ async def _hear(session: Session, socket: WebSocket) -> None:
         text, asked = await receive(socket), dict[str, Any]()
         try:
             asked = parsed(text, MOST_COMMAND)
-            session.command(asked)
+            obey(session, asked)
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
             session.answer(asked.get("ask"), session.refuse(error))
 

@@ -5,26 +5,19 @@ import secrets
 from collections.abc import Awaitable, Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
-from machine.app.crash import log_bug
-from machine.app.requests import FORCE_GOES_ON, PrintRequest
-from machine.app.workbench.bench.planes import is_number
-from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
-from machine.app.workbench.printing.ordering import order_of
+from machine.app.crash import bug_in_words, log_bug
+from machine.app.workbench.printing.commands import PageOfPrints, obey
 from machine.app.workbench.printing.prints import Prints
-from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.line import parsed, receive, refuse_closed, send, until_either_ends
-from machine.network.address import is_server_address, parse_server_address
-from profiles.errors import JournalError, PrinterError, UserError
+from profiles.errors import UserError
 
 MOST_COMMAND = 10_000  # characters
-LONGEST_PORT = 300
 
 
 def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
@@ -44,7 +37,7 @@ def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], A
         await socket.accept()
         with prints.page(page):
             try:
-                await until_either_ends(_tell(prints, socket), _hear(prints, session, socket, page))
+                await until_either_ends(_tell(prints, socket), _hear(socket, PageOfPrints(page, session, prints)))
             except ExceptionGroup as bugs:
                 log_bug(bugs.exceptions[0], ())
 
@@ -55,9 +48,9 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
     """What answers a request for the log of a print, as far as it is written."""
 
     async def answer(request: Request) -> Response:
-        for each in prints.prints:
-            log = each.state["log"]
-            if each.number == request.path_params["print"] and log and Path(log).is_file():
+        for job in prints.prints:
+            log = job.state["log"]
+            if job.number == request.path_params["print"] and log and Path(log).is_file():
                 return FileResponse(log, media_type="text/plain")
         return Response("there is no log of this print\n", 404)
 
@@ -77,54 +70,13 @@ def _text(prints: Prints, version: int) -> str:
     return json.dumps(prints.snapshot())
 
 
-async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) -> None:
+async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
     while True:
         text = await receive(socket)
         try:
             asked = parsed(text, MOST_COMMAND)
-            prints.command(page, asked, lambda given: _order(session, given))
+            obey(page, asked)
         except UserError as error:
-            await send(socket, json.dumps({"problem": str(error), "forcible": FORCE_GOES_ON in str(error)}))
+            await send(socket, json.dumps({"problem": str(error), "forcible": error.forcible}))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
-            log = log_bug(error, ())
-            told = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"
-            await send(socket, json.dumps({"problem": told}))
-
-
-def _order(session: Session, asked: dict[str, Any]) -> Order:
-    """What a page wants: what lies on its bench printed, the rest of a print that was cut off, or to follow what a server prints.
-
-    Raises UserError.
-    """
-    if asked.get("do") == "follow":
-        return FollowOrder(_server(asked))
-    if asked.get("do") != "go_on":
-        sends_only = asked.get("send_only") is True
-        printing = _server(asked) if sends_only else _printing(asked)
-        return order_of(session, printing, asked.get("force") is True, not sends_only)
-    journal, machine = (str(asked.get(each) or "").strip() for each in ("journal", "machine"))
-    if not journal:
-        raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")
-    for name in (journal, machine):
-        if "\0" in name:
-            raise JournalError(f"{name!r:.100} is no file's name: it has a character that no name has")
-    return ResumeOrder(Path(journal).absolute(), _printing(asked), machine)
-
-
-def _server(asked: dict[str, Any]) -> PrintRequest:
-    printing = _printing(asked)
-    parse_server_address(printing.port)
-    return printing
-
-
-def _printing(asked: dict[str, Any]) -> PrintRequest:
-    """Where to print, as the options --port, --baud and --sim-speed say. Raises PrinterError."""
-    port = str(asked.get("port") or "").strip()
-    if not port or len(port) > LONGEST_PORT:
-        raise PrinterError("no printer is chosen: choose a port, or sim for the simulated one")
-    if is_server_address(port):
-        parse_server_address(port)  # here, for all pages are told of a print's port: a password in it must not come so far
-    baud, speed = asked.get("baud", 115200), asked.get("sim_speed", 0.0)
-    if not is_number(baud) or not is_number(speed) or baud != int(baud):
-        raise PrinterError(f"baud {str(baud)[:40]}, sim_speed {str(speed)[:40]}: numbers are expected, a whole one for the rate")
-    return PrintRequest(port, int(baud), float(speed))
+            await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

@@ -27,7 +27,7 @@ class ProfileFiles:
             return False
         kept = str(shutil.copy(path, self._received.new_file(path.name)))
         try:
-            session.take_given(f"take {path.name}", lambda given: named(given, kind, kept))
+            session.start(session.take_given(f"take {path.name}", lambda given: named(given, kind, kept)))
         except ProfileError as error:
             remove_file(Path(kept))
             raise ProfileError(str(error).replace(f"{Path(kept).parent}{os.sep}", "")) from None

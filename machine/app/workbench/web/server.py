@@ -13,6 +13,7 @@ from starlette.websockets import WebSocket
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import settings_list
 from machine.app.workbench.printing.prints import Prints
+from machine.app.workbench.session.commands import Need, check_need
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.benches import bench_routes
@@ -37,9 +38,7 @@ from machine.app.workbench.web.snapshot import marks_key
 from machine.app.workbench.web.uploads import Uploads
 from profiles.places import KINDS, known
 
-Answer = Callable[[Request], Awaitable[Response]]
-
-
+Act = Callable[[Session, Request], Awaitable[Response]]
 BELOW = "/{token}/{session:int}/"
 
 
@@ -58,8 +57,8 @@ def application(
 
 def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
 
-    def route(path: str, act: Callable[[Session, Request], Awaitable[Response]], method: str = "GET") -> Route:
-        return Route(BELOW + path, _answering(workbench, act), methods=[method])
+    def route(path: str, act: Act, method: str = "GET", need: Need = Need.NOTHING) -> Route:
+        return Route(BELOW + path, _answering(workbench, act, need), methods=[method])
 
     routes = [
         route("", _page(port)),
@@ -69,11 +68,11 @@ def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
         route("left/{number:int}", uploads.open_left, "POST"),
-        route("plan.toml", plan),
+        route("plan.toml", plan, need=Need.PARTS),
         route("profile/{kind}.toml", profile),
-        route("pieces", _pieces),
-        route("parts.zip", folder),
-        route("pictures.zip", pictures),
+        route("pieces", _pieces, need=Need.PARTS),
+        route("parts.zip", folder, need=Need.PARTS),
+        route("pictures.zip", pictures, need=Need.PARTS),
         route("print/{key}", print_page),
         route("print/{key}/text", print_text),
         route("walls/{number:int}/{part:int}", print_walls),
@@ -85,7 +84,7 @@ def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
     return Starlette(routes=[*bench_routes(workbench), *routes])
 
 
-def _page(port: int) -> Callable[[Session, Request], Awaitable[Response]]:
+def _page(port: int) -> Act:
     content, policy = workbench_page(port)
 
     async def answer(session: Session, request: Request) -> Response:
@@ -94,12 +93,13 @@ def _page(port: int) -> Callable[[Session, Request], Awaitable[Response]]:
     return answer
 
 
-def _answering(workbench: Workbench, act: Callable[[Session, Request], Awaitable[Response]]) -> Answer:
+def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request], Awaitable[Response]]:
     async def answer(request: Request) -> Response:
         session = workbench.sessions.get(request.path_params["session"])
         if session is None:
             return Response(f"{CLOSED}\n", 404)
         try:
+            check_need(session, need)
             return await act(session, request)
         except ClientDisconnect:  # the page has gone while it sent a file
             return Response(status_code=400)
@@ -138,7 +138,7 @@ async def _pedestal(session: Session, request: Request) -> Response:
 
 
 async def _pieces(session: Session, request: Request) -> Response:
-    return FileResponse(await session.pieces.file(), media_type="application/octet-stream")
+    return FileResponse(await session.pieces(), media_type="application/octet-stream")
 
 
 async def _marks(session: Session, request: Request) -> Response:
@@ -148,7 +148,7 @@ async def _marks(session: Session, request: Request) -> Response:
     return Response(await session.quick.run("mark_faces", bench), media_type="application/octet-stream")
 
 
-def _settings(files: ProfileFiles) -> Callable[[Session, Request], Awaitable[Response]]:
+def _settings(files: ProfileFiles) -> Act:
     async def answer(session: Session, request: Request) -> Response:
         given = files.as_shown(session.bench.given)
         bench = replace(session.bench, given=given)

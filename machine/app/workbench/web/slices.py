@@ -16,17 +16,17 @@ def slices_told(session: Session) -> dict[str, Any]:
         "comparing": session.comparing.text,
         "compared": [
             {
-                "name": each.name,
-                "note": "; ".join(filter(None, (each.orientation, each.message))),
-                "time_s": each.time_s,
-                "filament_mm": each.filament_mm,
-                "filament_g": each.filament_g,
-                "support_mm3": each.support_mm3,
-                "support_area_mm2": each.risky_mm2,
-                "seam_mm": each.seam_mm,
-                "findings": each.findings,
+                "name": alternative.name,
+                "note": "; ".join(filter(None, (alternative.orientation, alternative.message))),
+                "time_s": alternative.time_s,
+                "filament_mm": alternative.filament_mm,
+                "filament_g": alternative.filament_g,
+                "support_mm3": alternative.support_mm3,
+                "support_area_mm2": alternative.risky_mm2,
+                "seam_mm": alternative.seam_mm,
+                "findings": alternative.findings,
             }
-            for each in session.comparing.rows()
+            for alternative in session.comparing.rows()
         ],
     }
 
@@ -50,7 +50,7 @@ def _sliced(session: Session) -> dict[str, Any] | None:
         "ready": sorted(slices.walls),
         "time_s": sliced.time_s,
         "filament_mm": sliced.filament_mm,
-        "findings": [asdict(each) for each in sliced.findings[:MOST_FINDINGS]],
+        "findings": [asdict(finding) for finding in sliced.findings[:MOST_FINDINGS]],
         "more_findings": max(len(sliced.findings) - MOST_FINDINGS, 0),
-        "errors": [each.message for each in sliced.errors[:MOST_FINDINGS]],
+        "errors": [error.message for error in sliced.errors[:MOST_FINDINGS]],
     }

@@ -7,6 +7,7 @@ from typing import Any
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.planes import Cuts
+from machine.app.workbench.session.commands import Need, lacking
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.slices import slices_told
 from machine.view.front import front_record
@@ -33,6 +34,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "answers": session.answers,
         "busy": session.busy,
         "preparing": session.readiness.preparing > 0,
+        "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": history.now.word if history.before else "",
         "redo": history.undone[-1].word if history.undone else "",
         "model": None if bench.model is None else _model(bench.model),
@@ -45,8 +47,8 @@ def snapshot(session: Session) -> dict[str, Any]:
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATFORM_TOLERANCE_MM,
         "resting": [
-            {"rotation": each.rotation, "words": each.words, "overhang_mm2": each.overhang_mm2, "height_mm": each.height_mm}
-            for each in resting
+            {"rotation": rest.rotation, "words": rest.words, "overhang_mm2": rest.overhang_mm2, "height_mm": rest.height_mm}
+            for rest in resting
         ],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
         **slices_told(session),
@@ -58,16 +60,16 @@ def snapshot(session: Session) -> dict[str, Any]:
         "trial": _trial(session),
         "zones": _zones(bench),
         "marks": marks_key(bench),
-        "refused": asdict(session.trying.refused) if session.problem and session.trying.refused else None,
+        "refused": asdict(session.trials.refused) if session.problem and session.trials.refused else None,
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
-        "part_settings": [{"part": each.part, "keys": list(each.process)} for each in bench.profile.parts],
+        "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
         "priced": bench.priced,
         "stops": [asdict(stop) for stop in bench.stops],
         "copies": bench.copies,
         "machine": machine_bodies(bench.profile.machine, known=True),
-        "benches": [asdict(each) for each in session.benches],
+        "benches": [asdict(bench) for bench in session.benches],
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }
@@ -103,9 +105,9 @@ def _model(model: Model) -> dict[str, Any]:
 
 def _trial(session: Session) -> dict[str, Any] | None:
     """The figures of the planes that were tried last, or why they cannot be cut."""
-    if session.trying.trial is None or session.trying.trial[0].sought != session.bench.sought:
+    if session.trials.trial is None or session.trials.trial[0].sought != session.bench.sought:
         return None
-    _, cuts, trial = session.trying.trial
+    _, cuts, trial = session.trials.trial
     return {"cuts": _cuts(cuts), **asdict(trial)}
 
 

@@ -37,8 +37,8 @@ class Uploads:
         rows = []
         for number, path in enumerate(self._left):
             with suppress(OSError):
-                told = path.stat()
-                rows.append({"number": number, "name": path.name, "bytes": told.st_size, "written_s": told.st_mtime})
+                status = path.stat()
+                rows.append({"number": number, "name": path.name, "bytes": status.st_size, "written_s": status.st_mtime})
         return JSONResponse(rows)
 
     async def open_left(self, session: Session, request: Request) -> Response:
@@ -73,8 +73,8 @@ class Uploads:
 
 
 async def _receive(request: Request, path: Path, name: str, most_mib: int) -> None:
-    told, size = request.headers.get("content-length", ""), 0
-    _check_size(name, int(told) if told.isascii() and told.isdigit() and len(told) < 20 else 0, most_mib)
+    length, size = request.headers.get("content-length", ""), 0
+    _check_size(name, int(length) if length.isascii() and length.isdigit() and len(length) < 20 else 0, most_mib)
     with path.open("wb") as file:
         async for piece in request.stream():
             size += len(piece)

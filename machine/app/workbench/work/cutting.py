@@ -81,12 +81,12 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
     if way.orient:
         lying = lay_down(mesh, profile, pricing, search)
         turn = None if lying.orientation is None else lying.orientation.rotation
-        found = lying.decomposition
-        return Found(found.front, (*found.notes, laid_in_words(lying.orientation)), turn)
-    found = search(mesh)
-    better = None if locked.parts or locked.zones != NO_ZONES else find_better_way(mesh, found, profile, pricing)
-    advice = better_in_words(found, better)
-    return Found(found.front, (*found.notes, *([f"{advice}: find parts and {LAY_TOO}"] if advice else [])))
+        decomposition = lying.decomposition
+        return Found(decomposition.front, (*decomposition.notes, laid_in_words(lying.orientation)), turn)
+    decomposition = search(mesh)
+    better = None if locked.parts or locked.zones != NO_ZONES else find_better_way(mesh, decomposition, profile, pricing)
+    advice = better_in_words(decomposition, better)
+    return Found(decomposition.front, (*decomposition.notes, *([f"{advice}: find parts and {LAY_TOO}"] if advice else [])))
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
@@ -109,14 +109,17 @@ def make_plan(tell: Tell, bench: Bench) -> str:
 
 def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
     """The folder of `decompose -o` with the parts as the bench has them, as a zip."""
-    made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
-    parts = [(part_file(part.index), stl(part.mesh)) for part in made.parts]
+    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    parts = [(part_file(part.index), stl(part.mesh)) for part in decomposition.parts]
     model, _, plan, scene = FOLDER_FILES
-    write_zip(out, [*parts, (model, threemf(made)), (plan, _plan_text(made, bench).encode()), (scene, glb(made))])
+    write_zip(
+        out,
+        [*parts, (model, threemf(decomposition)), (plan, _plan_text(decomposition, bench).encode()), (scene, glb(decomposition))],
+    )
 
 
-def _plan_text(made: Decomposition, bench: Bench) -> str:
-    return plan_text(plan_of(made, bench.zones, bench.turned, bench.profile.parts))
+def _plan_text(decomposition: Decomposition, bench: Bench) -> str:
+    return plan_text(plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts))
 
 
 def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:

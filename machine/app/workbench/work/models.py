@@ -1,14 +1,20 @@
-"""Models: reading one, and the ways in which it rests, as tasks of the workbench."""
+"""Models: reading one, the ways in which it rests, and what a person marks on it, as tasks of the workbench."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from machine.app.pipeline import compilers
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.marks import mark, named_faces, unmark
 from machine.app.workbench.bench.model import Model
+from machine.app.workbench.bench.values import Asked
 from machine.app.workbench.work.processes import Tell
 from mdp.directions.orientation import in_words, side_in_words
 from mdp.read import read_mesh
 from mdp.search.laying import distinct_orientations
+from mdp.zone import Zones
 from profiles.errors import MeshError
 from profiles.profile import Profile
 
@@ -37,10 +43,25 @@ def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, .
     compilers.wait_for(compilers.JUDGE)
     return tuple(
         Resting(
-            tuple(tuple(float(value) for value in row) for row in each.rotation),
-            side_in_words(each) or in_words(each),
-            each.risky_mm2,
-            each.height_mm,
+            tuple(tuple(float(value) for value in row) for row in orientation.rotation),
+            side_in_words(orientation) or in_words(orientation),
+            orientation.risky_mm2,
+            orientation.height_mm,
         )
-        for each in distinct_orientations(model.mesh(), profile)
+        for orientation in distinct_orientations(model.mesh(), profile)
     )
+
+
+def mark_bench(tell: Tell, bench: Bench, asked: Asked) -> tuple[str, Zones]:
+    """What `bench.marks.mark` makes of a command. Raises PlanError."""
+    return mark(bench, asked)
+
+
+def unmark_bench(tell: Tell, bench: Bench, asked: Asked) -> tuple[str, Zones]:
+    """The same of `bench.marks.unmark`."""
+    return unmark(bench, asked)
+
+
+def mark_faces(tell: Tell, bench: Bench) -> bytes:
+    """(m,) of each face of the model in which kinds of zones that are no boxes it is: a bit each, in their order."""
+    return bytes(np.packbits(named_faces(bench), axis=0, bitorder="little")[0])

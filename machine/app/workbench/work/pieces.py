@@ -1,10 +1,15 @@
-"""Pieces: the parts as bodies of their own for the page, as a block like the one of `view`, with what of them needs support."""
+"""Pieces: the parts drawn, as tasks of the workbench: as bodies of their own for the page, a block like the one of `view`, with
+what of them needs support, and as the pictures that `decompose` makes."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
+from machine.app.pictures.front_picture import front_picture
+from machine.app.pictures.picture import contact_sheet, parts_picture
+from machine.app.pictures.png import png_bytes
+from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
-from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
+from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench, write_zip
 from machine.app.workbench.work.processes import Tell
 from machine.planning.fit import check_parts
 from machine.view.encoding import pack
@@ -35,3 +40,15 @@ def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
     except MoveError as error:
         return str(error)
     return ""
+
+
+def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
+    """A zip of what `--png`, `--sheet` and `--front` draw of the parts as the bench has them."""
+    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME), prices=True)
+    compilers.wait_for(compilers.PICTURES)
+    images = {
+        "parts.png": parts_picture(decomposition, bench.profile),
+        "order.png": contact_sheet(decomposition, bench.profile.machine),
+        "front.png": front_picture(decomposition, bench.profile),
+    }
+    write_zip(out, [(name, png_bytes(image)) for name, image in images.items()])

@@ -58,14 +58,14 @@ async def hear_the_ends(within_s: float) -> None:
     with suppress(TimeoutError):
         async with asyncio.timeout(within_s):
             await asyncio.gather(*_here().starting, return_exceptions=True)
-            await asyncio.gather(*(_hear_the_end(each) for each in _here().started))
+            await asyncio.gather(*(_hear_the_end(process) for process in _here().started))
 
 
 async def _start(command: tuple[str, ...]) -> Process:
     pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
     process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True)
     started = _here().started
-    started.difference_update([each for each in started if _is_heard(each)])
+    started.difference_update([process for process in started if _is_heard(process)])
     started.add(process)
     return process
 

@@ -58,10 +58,10 @@ class Sliced:
 def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
     """The parts on the bench sliced, planned, written to these files and dry-run, as `export --plan` does with its pauses and
     copies; uncut, the model in one piece."""
-    made, profile = _plated(bench)
+    decomposition, profile = _plated(bench)
     shares: tuple[float, ...] = ()
     ready: set[int] = set()
-    told = ""
+    said = ""
 
     def follow(slicing: SlicingProgress) -> None:
         nonlocal shares
@@ -72,19 +72,19 @@ def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
         )
         ready.update(fresh)
         if fresh:
-            drawn = {number: walls(made.parts[number - 1], piece) for number, piece in fresh.items()}
-            tell(SlicesSoFar(told or "slicing", shares, drawn))
+            drawn = {number: walls(decomposition.parts[number - 1], piece) for number, piece in fresh.items()}
+            tell(SlicesSoFar(said or "slicing", shares, drawn))
 
     def report(text: str, share: float | None = None) -> None:
-        nonlocal told
-        if text != told:
-            told = text
+        nonlocal said
+        if text != said:
+            said = text
             tell(SlicesSoFar(text, shares))
 
-    program = build(made, profile, pictures=True, stops=bench.stops, report=report, on_slices=follow)
+    program = build(decomposition, profile, pictures=True, stops=bench.stops, report=report, on_slices=follow)
     report("drawing the page")
     values = summary(program.run)
-    contents = print_page(made.name, program, profile), ("\n".join(program.lines) + "\n").encode()
+    contents = print_page(decomposition.name, program, profile), ("\n".join(program.lines) + "\n").encode()
     for file, content in zip((page, gcode), contents, strict=True):
         file.write_bytes(content)
     return Sliced(
@@ -100,8 +100,8 @@ def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
 
 def compare_bench(tell: Tell, bench: Bench) -> tuple[Alternative, ...]:
     """What the model on the bench costs in one piece, as it stands and laid down, as `export --compare` tells it."""
-    made, profile = _plated(bench)
-    return in_one_part(made, profile, lambda text, share=None: tell(text))
+    decomposition, profile = _plated(bench)
+    return in_one_part(decomposition, profile, lambda text, share=None: tell(text))
 
 
 def share_page(tell: Tell, page: Path, alternatives: tuple[Alternative, ...], out: Path) -> None:

@@ -5,10 +5,8 @@ from collections.abc import Callable
 from typing import Any
 
 from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, measure_plan, price_row
-from machine.app.workbench.work.marks import mark_bench, mark_faces
-from machine.app.workbench.work.models import rank_resting, read_model
-from machine.app.workbench.work.pictures import make_pictures
-from machine.app.workbench.work.pieces import draw_pieces
+from machine.app.workbench.work.models import mark_bench, mark_faces, rank_resting, read_model, unmark_bench
+from machine.app.workbench.work.pieces import draw_pieces, make_pictures
 from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
 from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
@@ -27,6 +25,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         draw_pieces,
         stand,
         mark_bench,
+        unmark_bench,
         mark_faces,
         slice_bench,
         compare_bench,

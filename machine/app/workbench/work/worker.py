@@ -8,6 +8,8 @@ import pickle
 import signal
 import struct
 import sys
+from asyncio import StreamReader
+from collections.abc import Iterator
 from contextlib import suppress
 from queue import SimpleQueue
 from threading import Thread
@@ -23,13 +25,31 @@ def frame(value: Any) -> bytes:
     return LENGTH.pack(len(content)) + content
 
 
+def read_frames(pipe: BinaryIO) -> Iterator[Any]:
+    """The values that come through a pipe, until it ends."""
+    while len(head := pipe.read(LENGTH.size)) == LENGTH.size:
+        yield pickle.loads(pipe.read(*LENGTH.unpack(head)))
+
+
+async def read_frame(stream: StreamReader) -> Any:
+    """The next value that comes through a pipe. Raises IncompleteReadError at its end."""
+    (length,) = LENGTH.unpack(await stream.readexactly(LENGTH.size))
+    return pickle.loads(await stream.readexactly(length))
+
+
+def take_pipes() -> tuple[BinaryIO, BinaryIO]:
+    """This process's pipes from and to its parent; what work prints does not reach them."""
+    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    with open(os.devnull, "r+b") as nowhere:
+        os.dup2(nowhere.fileno(), 0)
+        os.dup2(nowhere.fileno(), 1)
+    return asked, answers
+
+
 def main() -> None:
     """Do what is asked until the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent speaks, and ends this process
-    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    with open(os.devnull, "r+b") as nowhere:  # what work prints must not reach the pipe
-        os.dup2(nowhere.fileno(), 0)
-        os.dup2(nowhere.fileno(), 1)
+    asked, answers = take_pipes()
     waiting: SimpleQueue[Any] = SimpleQueue()
     Thread(target=_listen, args=(asked, waiting), daemon=True).start()
     from machine.app.workbench.work.tasks import TASKS
@@ -40,7 +60,7 @@ def main() -> None:
 
 
 def _result(task: Any, given: tuple[Any, ...], answers: BinaryIO) -> tuple[str, Any]:
-    from machine.app.crash import log_bug
+    from machine.app.crash import bug_in_words
     from profiles.errors import UserError
 
     try:
@@ -48,8 +68,7 @@ def _result(task: Any, given: tuple[Any, ...], answers: BinaryIO) -> tuple[str, 
     except UserError as error:
         return REFUSED, str(error)
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file, and the workbench goes on
-        log = log_bug(error, sys.argv)
-        return REFUSED, f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"
+        return REFUSED, bug_in_words(error, sys.argv)
 
 
 def _answer(answers: BinaryIO, value: Any) -> None:
@@ -60,8 +79,8 @@ def _answer(answers: BinaryIO, value: Any) -> None:
 def _listen(asked: BinaryIO, waiting: "SimpleQueue[Any]") -> None:
     """In a thread: take what the parent asks; when it is gone, end this process and all that it has started."""
     with suppress(OSError):
-        while len(head := asked.read(LENGTH.size)) == LENGTH.size:
-            waiting.put(pickle.loads(asked.read(*LENGTH.unpack(head))))
+        for task in read_frames(asked):
+            waiting.put(task)
     if hasattr(os, "killpg"):
         os.killpg(0, signal.SIGKILL)  # it leads a group of its own
     os._exit(1)

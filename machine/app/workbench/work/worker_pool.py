@@ -5,7 +5,6 @@ that is cancelled is stopped at once by ending its process.
 """
 
 import asyncio
-import pickle
 import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from machine.app.workbench.work.processes import Process, end_process, start_process
-from machine.app.workbench.work.worker import DONE, LENGTH, TELLS, frame
+from machine.app.workbench.work.worker import DONE, TELLS, frame, read_frame
 from profiles.errors import UserError
 
 REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
@@ -82,8 +81,8 @@ class WorkerPool:
 
     async def _take(self, tasks: "TaskQueue") -> Worker:
         """The process that these tasks had last, else a new one, else the one that has rested longest."""
-        self._idle = [each for each in self._idle if each.process.returncode is None]
-        own = [each for each in self._idle if each.tasks is tasks]
+        self._idle = [worker for worker in self._idle if worker.process.returncode is None]
+        own = [worker for worker in self._idle if worker.tasks is tasks]
         if not own and self._may_start:
             self._starting += 1
             try:
@@ -159,8 +158,7 @@ async def _answer(process: Process, asked: Any, tell: Callable[[Any], None]) -> 
     process.stdin.write(frame(asked))
     await process.stdin.drain()
     while True:
-        (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
-        kind, value = pickle.loads(await process.stdout.readexactly(length))
+        kind, value = await read_frame(process.stdout)
         if kind != TELLS:
             return kind, value
         tell(value)

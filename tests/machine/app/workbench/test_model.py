@@ -4,6 +4,7 @@ import asyncio
 import gc
 import pickle
 import weakref
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.model import Model
+from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.snapshot import snapshot
 from machine.app.workbench.work.models import read_model
@@ -92,12 +94,12 @@ def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more
 
     async def forget(session: Session) -> tuple[bool, bool]:
         file = the_model(session).mesh_file
-        session.command({"do": "undo"})
+        obey(session, {"do": "undo"})
         gc.collect()
         undone = file.is_file()
-        session.command({"do": "redo"})
-        session.command({"do": "undo"})
-        session.do("something else", session.bench)
+        obey(session, {"do": "redo"})
+        obey(session, {"do": "undo"})
+        session.do("something else", replace(session.bench, copies=2))
         await until_idle(session)
         gc.collect()
         return undone, file.is_file()

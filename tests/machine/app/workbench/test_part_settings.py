@@ -10,22 +10,22 @@ import pytest
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, History, Step, with_cuts, with_model_turned_as_read
+from machine.app.workbench.bench.changes import reset_part, set_part, stand, turn
 from machine.app.workbench.bench.command_line import export_command, turned_by, turns_deg
-from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.settings import settings_list, with_setting
 from machine.planning.stops import parse_stops
 from mdp.plans.plan_file import PlannedPart
 from mdp.pose import UP, about
 from profiles.errors import PlanError, ProfileError
 from profiles.profile import load
-from tests.machine.app.workbench.models import model
+from tests.machine.app.workbench.models import changed, model
 
 LOW, MIDDLE, HIGH = (PlannedPart((0.0, 0.0, 1.0), offset) for offset in (10.0, 20.0, 30.0))
 BENCH = Bench(load(), model(), cuts=(LOW, MIDDLE))
 
 
-def obeyed(bench: Bench, **asked: object) -> Bench:
-    return obey(History(Step("", bench)), asked).now.bench
+def with_own(bench: Bench, part: int, key: str, value: str | None) -> Bench:
+    return set_part(bench, {"part": part, "key": key, "value": value})
 
 
 def own(bench: Bench) -> dict[int, dict[str, object]]:
@@ -33,14 +33,12 @@ def own(bench: Bench) -> dict[int, dict[str, object]]:
 
 
 def test_a_part_has_values_of_its_own_that_are_marked_and_go_back() -> None:
-    bench = obeyed(
-        obeyed(BENCH, do="set_part", part=2, key="process.walls", value="5"), do="set_part", part=2, key="seam", value="rear"
-    )
+    bench = with_own(with_own(BENCH, 2, "process.walls", "5"), 2, "seam", "rear")
     assert own(bench) == {2: {"walls": 5, "seam": "rear"}}
     row = next(row for row in settings_list(bench.profile, Given(), 2) if row["key"] == "process.walls")
     assert (row["value"], row["changed"]) == (5, True)
-    assert own(obeyed(bench, do="set_part", part=2, key="process.walls", value=None)) == {2: {"seam": "rear"}}
-    assert own(obeyed(bench, do="reset_part", part=2)) == {}
+    assert own(with_own(bench, 2, "process.walls", None)) == {2: {"seam": "rear"}}
+    assert own(reset_part(bench, {"part": 2})) == {}
 
 
 def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
@@ -69,7 +67,7 @@ def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
 
 
 def test_settings_follow_the_plane_of_their_part_and_go_with_it() -> None:
-    bench = obeyed(BENCH, do="set_part", part=3, key="process.walls", value="5")
+    bench = with_own(BENCH, 3, "process.walls", "5")
     assert own(with_cuts(bench, (LOW, HIGH, MIDDLE))) == {4: {"walls": 5}}
     assert own(with_cuts(bench, (MIDDLE,))) == {2: {"walls": 5}}
     assert own(with_cuts(bench, (LOW, HIGH))) == {3: {"walls": 5}}
@@ -77,39 +75,37 @@ def test_settings_follow_the_plane_of_their_part_and_go_with_it() -> None:
 
 
 def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_brings_it_back() -> None:
-    bench = obeyed(
-        obeyed(BENCH, do="set_part", part=3, key="ironing", value="true"), do="set_part", part=1, key="walls", value="5"
-    )
+    bench = with_own(with_own(BENCH, 3, "ironing", "true"), 1, "walls", "5")
     steps = History(Step("", replace(bench, stops=parse_stops(["3:15"], []))))
     after = steps.do("cut", with_cuts(steps.now.bench, (LOW,)))
     assert after.now.told == "cut: taken away with part 3: --pause 3:15, --part 3:ironing=true (Undo brings them back)"
     assert own(after.undo().now.bench) == {1: {"walls": 5}, 3: {"ironing": True}}
-    turned = obey(steps, {"do": "turn", "axis": "x", "deg": 90}).now
+    turned = changed(steps, turn, axis="x", deg=90).now
     assert own(turned.bench) == {1: {"walls": 5}}
     assert "--part 3:ironing=true" in turned.told
     assert bench.model is not None
     assert own(with_model_turned_as_read(bench, bench.model, about(UP, 1.0))) == {1: {"walls": 5}}
-    assert obey(steps, {"do": "reset_part", "part": 3}).now.told == ""
+    assert changed(steps, reset_part, part=3).now.told == ""
 
 
 @pytest.mark.parametrize(
     ("asked", "sentence"),
     [
-        ({"part": 4, "key": "process.walls", "value": "5"}, "part is 4: 1 to 3 are allowed"),
+        ({"part": 4, "key": "process.walls", "value": "5"}, "part is 4: 1 to 3 is allowed"),
         ({"part": 2, "key": "process.scale", "value": "2"}, "part 2: process.scale holds for the whole print"),
         ({"part": 2, "key": "process.walls", "value": "-1"}, r"part 2: process\.walls"),
     ],
 )
 def test_what_a_part_cannot_have_is_told(asked: dict[str, object], sentence: str) -> None:
     with pytest.raises((PlanError, ProfileError), match=sentence):
-        obeyed(BENCH, do="set_part", **asked)
+        set_part(BENCH, asked)
 
 
 def test_the_command_line_names_what_differs_from_the_usual() -> None:
     given = Given(machine="fractal5pro", settings=("process.walls=4",))
     start = "tiltprint export tee.stl --machine fractal5pro --set process.walls=4"
     assert export_command(replace(BENCH, given=given)) == f"{start} --plan tee-plan.toml -o tee.gcode"
-    uncut = obeyed(replace(BENCH, given=given, cuts=None), do="set_part", part=1, key="process.ironing", value="true")
+    uncut = with_own(replace(BENCH, given=given, cuts=None), 1, "process.ironing", "true")
     assert export_command(uncut) == f"{start} --parts 1 --part 1:ironing=true -o tee.gcode"
 
 
@@ -133,6 +129,6 @@ def test_the_command_line_sets_blocks_lists_and_names_as_they_are() -> None:
 @pytest.mark.parametrize("angles_deg", [(20.0, -50.0, 130.0), (0.0, 90.0, 30.0), (0.0, 0.0, 0.0)])
 def test_the_turns_of_the_command_line_stand_the_model_as_it_is(angles_deg: tuple[float, float, float]) -> None:
     profile = load(settings=["process.rotate_deg=[10, 0, 0]"])
-    turned = obeyed(Bench(profile, BENCH.model), do="stand", rotation=turned_by(angles_deg).tolist())
+    turned = stand(Bench(profile, BENCH.model), {"rotation": turned_by(angles_deg).tolist()})
     assert turned_by(turns_deg(turned)) == pytest.approx(turned_by(angles_deg) @ turned_by((10.0, 0.0, 0.0)), abs=1e-9)
     assert np.linalg.det(turned_by(turns_deg(turned))) == pytest.approx(1.0)

@@ -14,9 +14,9 @@ from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, plan_of_bench, with_front, with_plan
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import named
+from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.work.marks import mark_bench
-from machine.app.workbench.work.models import read_model
+from machine.app.workbench.work.models import mark_bench, read_model, unmark_bench
 from machine.app.workbench.work.standing import Standing
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
@@ -133,6 +133,8 @@ class Tried:
                 return read_model(lambda told: None, *given)
             case "mark_bench":
                 return mark_bench(lambda told: None, *given)
+            case "unmark_bench":
+                return unmark_bench(lambda told: None, *given)
             case "stand":
                 return Standing((40.0, 8.0, 40.0), 0.0, "")
             case "price_row":
@@ -156,9 +158,10 @@ class Tried:
                 case "open":
                     await session.open_plan(self.plan)
                 case "profile file":
-                    session.take_given("take it", lambda given: named(given, "machine", str(self.folder / "mine.toml")))
+                    path = str(self.folder / "mine.toml")
+                    session.start(session.take_given("take it", lambda given: named(given, "machine", path)))
                 case _:
-                    session.command(asked)
+                    obey(session, asked)
         except UserError:
             pass
         while self.session._tasks:

@@ -10,6 +10,7 @@ import numpy as np
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import with_profile
+from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.finding import Search
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.work.cutting import Searched
@@ -49,17 +50,17 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
 def test_of_edits_that_follow_each_other_quickly_none_is_lost() -> None:
     async def work(session: Session) -> None:
         for offset_mm in (5.0, 10.0):
-            session.command({"do": "add", "normal": list(UP), "offset_mm": offset_mm, "after": 1})
-        session.command({"do": "move", "part": 3, "normal": list(UP), "offset_mm": 6.0})
+            obey(session, {"do": "add", "normal": list(UP), "offset_mm": offset_mm, "after": 1})
+        obey(session, {"do": "move", "part": 3, "normal": list(UP), "offset_mm": 6.0})
 
     assert [part.offset_mm for part in when_done(work).bench.cuts or ()] == [10.0, 6.0]
 
 
 def test_an_edit_whose_bench_is_another_one_meanwhile_is_not_done_and_says_so() -> None:
     async def work(session: Session) -> None:
-        session.command({"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
+        obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
         await asyncio.sleep(0)
-        session.command({"do": "turn", "axis": "x", "deg": 90})
+        obey(session, {"do": "turn", "axis": "x", "deg": 90})
 
     session = when_done(work)
     assert session.bench.cuts is None
@@ -108,13 +109,13 @@ def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_tol
 
 def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> None:
     async def work(session: Session) -> None:
-        session.command({"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
+        obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
         await asyncio.sleep(0.05)
         for at in ("1:3", "2:8.4mm"):
-            session.command({"do": "add_stop", "kind": "pause", "at": at})
-        session.command({"do": "slice"})
+            obey(session, {"do": "add_stop", "kind": "pause", "at": at})
+        obey(session, {"do": "slice"})
         await asyncio.sleep(0)
-        session.command({"do": "turn", "axis": "x", "deg": 90})
+        obey(session, {"do": "turn", "axis": "x", "deg": 90})
 
     session = when_done(work)
     assert [stop.option for stop in session.bench.stops] == ["--pause 1:3"]
@@ -125,11 +126,11 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
 
 def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:
     async def work(session: Session) -> None:
-        session.command({"do": "slice"})
+        obey(session, {"do": "slice"})
         await asyncio.sleep(0)
-        session.command({"do": "turn", "axis": "x", "deg": 90})
+        obey(session, {"do": "turn", "axis": "x", "deg": 90})
         assert session.problem.startswith("slicing has ended")
-        session.command({"do": "slice"})
+        obey(session, {"do": "slice"})
         assert session.slicing.under_way is not None
         assert session.slicing.under_way.bench is session.bench
 

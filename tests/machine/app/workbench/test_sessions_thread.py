@@ -36,7 +36,7 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
     monkeypatch.setattr(RunningPrint, "stop_at_once", lambda one: given.set())
     workbench, prints = Workbench(lambda pools: Session(PROFILE, Given(), pools)), Prints()
     order = PrintOrder("a", Path("a.gcode"), PROFILE, PrintRequest("sim"))
-    prints.prints.append(RunningPrint(1, order, "", prints.tell))
+    prints.prints.append(RunningPrint(1, order, "", prints.notify))
 
     async def hang() -> bool:
         hangs.set()

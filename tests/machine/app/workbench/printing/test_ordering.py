@@ -46,16 +46,13 @@ def session(lines: list[str], profile: Profile = PROFILE) -> Any:
         Path("page.html"), file(lines), "key", 60.0, 1.0, known, Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
     )
     bench = SimpleNamespace(model=SimpleNamespace(name="box.stl"), profile=profile)
-    return SimpleNamespace(closed=False, bench=bench, slicing=SimpleNamespace(needed=lambda: sliced))
+    return SimpleNamespace(
+        closed=False, bench=bench, slicing=SimpleNamespace(needed=lambda: SimpleNamespace(bench=bench, sliced=sliced))
+    )
 
 
 class Silent:
-    """Hears nothing, says nothing."""
-
-    count = 0
-
-    def since(self, count: int) -> list[str]:
-        return []
+    """Says nothing."""
 
     def tell(self, **values: Any) -> None:
         """Nobody listens."""
@@ -70,7 +67,7 @@ def refusal(given: Any, port: str, **further: Any) -> UserError:
 def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_in_the_sentence_of_print() -> None:
     told = str(refusal(session(BAD), "/dev/no-such-port"))
     silent: Any = Silent()
-    by_print = carry_out(PrintOrder("box.stl", file(BAD), PROFILE, PrintRequest("sim")), AtPage(silent), Checks(silent, silent))
+    by_print = carry_out(PrintOrder("box.stl", file(BAD), PROFILE, PrintRequest("sim")), AtPage(silent), Checks(silent))
     assert (told, by_print["end"]) == (by_print["sentence"], "refused")
     assert told.startswith("the dry run found ")
     assert "X goes to 500 mm" in told

@@ -8,21 +8,26 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from machine.app.printer.compatibility import refuse
 from machine.app.requests import PrintRequest
+from machine.app.terminal.plain import said_to
+from machine.app.terminal.progress import say
 from machine.app.workbench.printing import running_print
-from machine.app.workbench.printing.at_page import AtPage
+from machine.app.workbench.printing.at_page import BEGIN, LEAVE, AtPage
+from machine.app.workbench.printing.commands import COMMANDS, PageOfPrints, obey
 from machine.app.workbench.printing.order import FollowOrder, Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
-from machine.app.workbench.printing.teller import Said
 from machine.app.workbench.work.worker import LENGTH
 from machine.link.pending_commands import Command, Control
 from machine.network import follow
@@ -62,9 +67,9 @@ def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable
                 await prints.changed(prints.version)
             return prints.prints[0]
 
-        prints.command("me", {"do": "check"}, lambda asked: order(port))
+        prints.begin("me", order(port))
         begun = await reach(lambda one: one.state["phase"] == "ready")
-        prints.command("me", {"do": "begin", "print": begun.number}, lambda asked: order(""))
+        begun.begin()
         await reach(lambda one: one.state["progress"] and runs(one))
         end(prints, begun)
         state = (await reach(lambda one: one.over)).state
@@ -93,7 +98,7 @@ def freeze(prints: Prints, one: RunningPrint) -> None:
     """Its process does nothing any more, also not what it is told; then a person presses the emergency stop."""
     assert one._process is not None
     os.kill(one._process.pid, signal.SIGSTOP)
-    prints.command("anybody", {"do": "emergency"}, lambda asked: order(""))
+    prints.stop_at_once(None)
 
 
 DIED = "the process that printed has ended before the print was done"
@@ -148,7 +153,7 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
 
     async def run(address: str) -> dict[str, Any]:
         prints = Prints()
-        one = RunningPrint(1, order(address), "me", prints.tell)
+        one = RunningPrint(1, order(address), "me", prints.notify)
         printing = asyncio.create_task(one.run())
 
         async def reach(phase: str) -> None:
@@ -174,6 +179,7 @@ LEAVES = """
 import pickle, struct, sys
 length = struct.Struct(sys.argv[1])
 told = {"phase": "printing", "server": True, "progress": {"state": "printing"}, "end": "left", "sentence": "it goes on"}
+told["stop_given"] = False
 for phase in ("printing", "over"):
     text = pickle.dumps(told | {"phase": phase})
     sys.stdout.buffer.write(length.pack(len(text)) + text)
@@ -202,7 +208,7 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
 
     async def run(address: str) -> dict[str, Any]:
         prints = Prints()
-        one = RunningPrint(1, order(address), "me", prints.tell)
+        one = RunningPrint(1, order(address), "me", prints.notify)
         one._begun = True
         printing = asyncio.create_task(one.run())
         while one.state["phase"] != waits_for:
@@ -252,7 +258,7 @@ class Heard:
 ])  # fmt: skip
 def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence: str, forcible: bool) -> None:
     heard = Heard()
-    end = carry_out(wanted, Agreeing(), Checks(heard, Said(heard)))  # type: ignore[arg-type]
+    end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
     assert end["sentence"].startswith(sentence)
     assert (end["end"], end["forcible"]) == ("refused", forcible)
 
@@ -264,13 +270,13 @@ def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_a
     monkeypatch.setenv(VARIABLE, KEY)
     heard = Heard()
     person = AtPage(heard)  # type: ignore[arg-type]
-    person.hear("begin")
+    person.hear(BEGIN)
     with stand_in(kind) as (job, address):
         job.files["vase.gcode"] = bytes(100)
         job.start("vase.gcode")
         job.steps = 10_000
         kept = replace(order(address), profile=profile, starts=False)
-        end = carry_out(kept, person, Checks(heard, Said(heard)))  # type: ignore[arg-type]
+        end = carry_out(kept, person, Checks(heard))  # type: ignore[arg-type]
         assert (job.state, job.files["hour.gcode"].decode()) == ("printing", HOUR)
         assert not any(asked.endswith("/start") for asked in job.asked)
         log = Path(heard.state["log"]).read_text()
@@ -285,10 +291,10 @@ class Attended:
     def __init__(self, wanted: PrintOrder) -> None:
         self.heard = Heard()
         self.person = AtPage(self.heard)  # type: ignore[arg-type]
-        checks = Checks(self.heard, Said(self.heard))  # type: ignore[arg-type]
+        checks = Checks(self.heard)  # type: ignore[arg-type]
         threading.Thread(target=lambda: self.heard.tell(**carry_out(wanted, self.person, checks)), daemon=True).start()
         self.until(lambda state: "phase" in state)
-        self.person.hear("begin")
+        self.person.hear(BEGIN)
         self.until(lambda state: state.get("progress", {}).get("state") == "printing")
 
     def until(self, condition: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
@@ -311,32 +317,87 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
         wanted = PrintOrder("hour", written(HOUR), load("gen5x"), PrintRequest(address), force=True)
         one = Attended(wanted)
         assert job.files["hour.gcode"].decode() == HOUR
-        one.person.hear("feed", 150.0)
-        one.person.hear("pause")
+        one.person.hear(Command.FEED, 150.0)
+        one.person.hear(Command.PAUSE)
         one.until(lambda state: (state["progress"]["state"], state["progress"]["feed_percent"]) == ("paused", 150.0))
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
-        one.person.hear("resume")
+        one.person.hear(Command.RESUME)
         one.until(lambda state: state["progress"]["state"] == "printing")
-        for word, sentence, state in (("cancel", "the print was stopped", "cancelled"), ("leave", left, "printing")):
+        for word, sentence, state in ((Command.CANCEL, "the print was stopped", "cancelled"), (LEAVE, left, "printing")):
             one.person.hear(word)
             assert one.until(lambda told: told.get("end"))["sentence"] == sentence.format(address)
             assert job.state == state
             job.state = "idle"
             one = Attended(wanted)
-        one.person.hear("emergency")
+        one.person.hear(Command.EMERGENCY_STOP)
         assert one.until(lambda told: told.get("end"))["sentence"].startswith(stopped.format(address))
         assert job.halted
+        assert one.person.has_stopped()
+
+
+def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
+    person = AtPage(Heard())  # type: ignore[arg-type]
+    assert not person.has_stopped()
+    person.hear(Command.EMERGENCY_STOP)
+    assert not person.has_stopped()
+
+
+def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> None:
+    heard = Heard()
+    checks = Checks(heard)  # type: ignore[arg-type]
+    with said_to(checks.hear):
+        with checks.that("the axes are there"):
+            refuse("an axis is missing", force=True)
+        with checks.that("the file is whole"):
+            say("one moment")
+        with pytest.raises(PrinterError, match="too hot") as refused, checks.that("it is cool"):
+            refuse("too hot", force=False)
+    assert refused.value.forcible
+    assert heard.state["checks"] == (
+        {"text": "an axis is missing", "forced": True},
+        {"text": "the file is whole", "forced": False},
+    )
+    assert heard.state["said"] == ("an axis is missing", "one moment")
+
+
+def page_of(prints: Prints, name: str = "me") -> PageOfPrints:
+    return PageOfPrints(name, SimpleNamespace(), prints)  # type: ignore[arg-type]
+
+
+def prints_with_one(port: str = "sim") -> Prints:
+    prints = Prints()
+    prints.prints.append(RunningPrint(1, order(port), "me", prints.notify))
+    return prints
 
 
 @pytest.mark.parametrize("percent", [float("inf"), float("nan"), "fast", True, 99.5, [1]])
 def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
-    async def run() -> None:
-        prints = Prints()
-        prints.prints.append(RunningPrint(1, order("sim"), "me", lambda: None))
-        prints.command("me", {"do": "feed", "print": 1, "percent": percent}, lambda asked: order(""))
-
     with pytest.raises(PrinterError, match=r"percent is .*: a whole number is expected"):
-        asyncio.run(run())
+        obey(page_of(prints_with_one()), {"do": "feed", "print": 1, "percent": percent})
+
+
+@pytest.mark.parametrize("name", sorted({*COMMANDS} - {"ports", "journals", "check", "go_on", "follow", "emergency", "take"}))
+def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_at_once(name: str) -> None:
+    prints = prints_with_one()
+    with pytest.raises(PrinterError, match="another page commands this print"):
+        obey(page_of(prints, "other"), {"do": name, "print": 1})
+    with pytest.raises(PrinterError, match="this print is not there any more"):
+        obey(page_of(prints), {"do": name, "print": 2})
+    obey(page_of(prints, "other"), {"do": "take", "print": 1})
+    assert prints.prints[0].holder == "other"
+
+
+@pytest.mark.parametrize(("name", "port", "phase", "allowed"), [
+    ("leave", "sim", "printing", False), ("leave", "duet:printer", "printing", True),
+    ("forget", "sim", "printing", False), ("forget", "sim", "over", True), ("dance", "sim", "printing", False),
+    (["take"], "sim", "printing", False),
+])  # fmt: skip
+def test_what_cannot_be_asked_of_a_print_is_refused(name: Any, port: str, phase: str, allowed: bool) -> None:
+    prints = prints_with_one(port)
+    prints.prints[0].state["phase"] = phase
+    with nullcontext() if allowed else pytest.raises(PrinterError, match="is no command of a print"):
+        obey(page_of(prints), {"do": name, "print": 1})
+    assert bool(prints.prints) == (name != "forget" or not allowed)
 
 
 def test_an_emergency_stop_goes_before_all_that_was_asked_earlier() -> None:
@@ -355,7 +416,7 @@ def test_a_print_that_is_begun_twice_is_begun_once(monkeypatch: pytest.MonkeyPat
     one.state["phase"] = "ready"
     one.begin()
     one.begin()
-    assert said == [("begin",)]
+    assert said == [(BEGIN,)]
 
 
 def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -367,11 +428,11 @@ def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.M
         prints.prints += [RunningPrint(number, order("sim"), "me", lambda: None) for number in (1, 2)]
         prints._last = 2
         prints.prints[0].state["phase"] = "over"  # by the first press
-        prints.command("anybody", {"do": "emergency", "print": 1}, lambda asked: order(""))
+        prints.stop_at_once(1)
         del prints.prints[0]  # another page has taken it off the list
-        prints.command("anybody", {"do": "emergency", "print": 1}, lambda asked: order(""))
+        prints.stop_at_once(1)
         assert 2 not in stopped
-        prints.command("anybody", {"do": "emergency", "print": None}, lambda asked: order(""))
+        prints.stop_at_once(None)
         assert 2 in stopped
 
     asyncio.run(run())
@@ -388,11 +449,11 @@ def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newes
         prints = Prints()
         monkeypatch.setattr(RunningPrint, "run", runs)
         for number in range(1, 16):
-            prints.command("me", {"do": "check"}, lambda asked: order(f"/dev/port{number}"))  # noqa: B023
+            prints.begin("me", order(f"/dev/port{number}"))
             if number > 8:
                 prints.prints[-1].state["phase"] = "over"
-        prints.command("me", {"do": "check"}, lambda asked: order("/dev/port16"))
-        prints.command("anybody", {"do": "emergency"}, lambda asked: order(""))
+        prints.begin("me", order("/dev/port16"))
+        prints.stop_at_once(None)
         assert stopped == [1, 2, 3, 4, 5, 6, 7, 8, 16]
         assert [each.number for each in prints.prints if each.over] == [11, 12, 13, 14, 15]
 

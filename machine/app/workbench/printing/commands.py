@@ -1,0 +1,133 @@
+"""Commands: all that a page may ask of the prints, by name: whose each is, and what does it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from machine.app.requests import PrintRequest
+from machine.app.workbench.bench.values import Asked, is_number
+from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
+from machine.app.workbench.printing.ordering import order_of
+from machine.app.workbench.printing.prints import Prints
+from machine.app.workbench.printing.running_print import RunningPrint
+from machine.app.workbench.session.session import Session
+from machine.link.pending_commands import Command as LinkCommand
+from machine.network.address import is_server_address, parse_server_address
+from profiles.errors import JournalError, PrinterError
+
+LONGEST_PORT = 300  # letters
+
+
+@dataclass(frozen=True)
+class PageOfPrints:
+    """A page that asks: its name, its bench, and the prints."""
+
+    name: str
+    session: Session
+    prints: Prints
+
+
+Command = Callable[[PageOfPrints, Asked], None]  # raises UserError for what cannot be done
+
+
+def _begin(order: Callable[[Session, Asked], Order]) -> Command:
+    return lambda page, asked: page.prints.begin(page.name, order(page.session, asked))
+
+
+def _of_print(act: Callable[[RunningPrint, Asked], None], on_server: bool = False, over: bool = False) -> Command:
+    """One of a print that only the page that commands it may ask for. on_server: only there; over: only when nothing goes on."""
+
+    def command(page: PageOfPrints, asked: Asked) -> None:
+        meant = page.prints.numbered(asked.get("print"))
+        if meant.holder != page.name:
+            raise PrinterError("another page commands this print: take the command over first")
+        if (on_server and not meant.state["server"]) or (over and not meant.over):
+            raise PrinterError("what the page has sent is no command of a print")
+        act(meant, asked)
+
+    return command
+
+
+def _passed_on(command: LinkCommand) -> Command:
+    return _of_print(lambda meant, asked: meant.say((command, float(_whole(asked, "percent", 100)))))
+
+
+def _take(page: PageOfPrints, asked: Asked) -> None:
+    page.prints.numbered(asked.get("print")).holder = page.name
+
+
+def _forget(page: PageOfPrints, asked: Asked) -> None:
+    _of_print(lambda meant, asked: page.prints.prints.remove(meant), over=True)(page, asked)
+
+
+def _slices(session: Session, asked: Asked) -> Order:
+    """What lies on the page's bench."""
+    sends_only = asked.get("send_only") is True
+    printing = _server(asked) if sends_only else _printing(asked)
+    return order_of(session, printing, asked.get("force") is True, not sends_only)
+
+
+def _rest(session: Session, asked: Asked) -> Order:
+    """The rest of a print that was cut off."""
+    journal, machine = (str(asked.get(key) or "").strip() for key in ("journal", "machine"))
+    if not journal:
+        raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")
+    for name in (journal, machine):
+        if "\0" in name:
+            raise JournalError(f"{name!r:.100} is no file's name: it has a character that no name has")
+    return ResumeOrder(Path(journal).absolute(), _printing(asked), machine)
+
+
+def _server(asked: Asked) -> PrintRequest:
+    printing = _printing(asked)
+    parse_server_address(printing.port)
+    return printing
+
+
+def _printing(asked: Asked) -> PrintRequest:
+    """Where to print, as the options --port, --baud and --sim-speed say. Raises PrinterError."""
+    port = str(asked.get("port") or "").strip()
+    if not port or len(port) > LONGEST_PORT:
+        raise PrinterError("no printer is chosen: choose a port, or sim for the simulated one")
+    if is_server_address(port):
+        parse_server_address(port)  # here, for all pages are told of a print's port: a password in it must not come so far
+    baud, speed = asked.get("baud", 115200), asked.get("sim_speed", 0.0)
+    if not is_number(baud) or not is_number(speed) or baud != int(baud):
+        raise PrinterError(f"baud {str(baud)[:40]}, sim_speed {str(speed)[:40]}: numbers are expected, a whole one for the rate")
+    return PrintRequest(port, int(baud), float(speed))
+
+
+def _whole(asked: Asked, key: str, otherwise: int) -> int:
+    value = asked.get(key, otherwise)
+    if not is_number(value) or value != int(value):
+        raise PrinterError(f"{key} is {str(value)[:40]!r}: a whole number is expected")
+    return int(value)
+
+
+COMMANDS: dict[str, Command] = {
+    "ports": lambda page, asked: page.prints.look_for_ports(_whole(asked, "baud", 115200)),
+    "journals": lambda page, asked: page.prints.look_for_journals(),
+    "check": _begin(_slices),
+    "go_on": _begin(_rest),
+    "follow": _begin(lambda session, asked: FollowOrder(_server(asked))),
+    "emergency": lambda page, asked: page.prints.stop_at_once(asked.get("print")),
+    "take": _take,
+    "begin": _of_print(lambda meant, asked: meant.begin()),
+    "cancel": _of_print(lambda meant, asked: meant.cancel()),
+    "leave": _of_print(lambda meant, asked: meant.leave(), on_server=True),
+    "pause": _passed_on(LinkCommand.PAUSE),
+    "resume": _passed_on(LinkCommand.RESUME),
+    "feed": _passed_on(LinkCommand.FEED),
+    "flow": _passed_on(LinkCommand.FLOW),
+    "forget": _forget,
+}
+
+
+def obey(page: PageOfPrints, asked: Asked) -> None:
+    """Do what a page asks for, `{"do": NAME, ...}`. Raises UserError for what cannot be done."""
+    name = asked.get("do")
+    command = COMMANDS.get(name) if isinstance(name, str) else None
+    if command is None:
+        raise PrinterError("what the page has sent is no command of a print")
+    command(page, asked)
+    page.prints.notify()

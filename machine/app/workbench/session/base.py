@@ -1,0 +1,132 @@
+"""Session base: what all work of a session stands on: the history, the processes, and the pages that wait for changes."""
+
+import asyncio
+import sys
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from machine.app.crash import bug_in_words
+from machine.app.workbench.bench.bench import Bench, History, Step
+from machine.app.workbench.work.observable import Observable
+from machine.app.workbench.work.received import Received
+from machine.app.workbench.work.worker_pool import TaskQueue, WorkerPools
+from profiles.errors import UserError
+
+WAITING = "waiting until the work of other benches is done"
+LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
+LONGEST_ASK = 80  # letters of the name of a command
+MOST_ANSWERS = 20  # the pages are told what became of so many commands with a name, the last ones
+
+
+class SessionBase(Observable):
+    """All from the event loop; the pages wait for `changed`.
+
+    problem: what could not be done last; answers: to the last commands that a page gave a name, by that: why they were refused,
+    "" for those that are done; busy: what the pages wait for; quick, long, hand: its tasks in the pools; received: the files of
+    its pages; followers: called after every change of the bench.
+    """
+
+    def __init__(self, bench: Bench, pools: WorkerPools) -> None:
+        super().__init__()
+        self.history = History(Step("", bench))
+        self.problem = ""
+        self.answers: dict[str, str] = {}
+        self.busy = ""
+        self.closed = False
+        self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
+        self.followers: list[Callable[[], None]] = []
+        self.received = Received()
+        self._files = count(1)
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def bench(self) -> Bench:
+        """What lies on the workbench now."""
+        return self.history.now.bench
+
+    def close(self) -> None:
+        """End all work; its files go, and its pages are told."""
+        self.closed = True
+        for task in self._tasks:
+            task.cancel()
+        for tasks in (self.quick, self.long, self.hand):
+            tasks.close()
+        self.received.remove()
+        self.notify()
+
+    def new_file(self) -> Path:
+        """A place for what a task makes, which goes with the session at the latest."""
+        return self.received.path / f"made-{next(self._files)}"
+
+    def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
+        """Have work done beside the pages; what it is refused becomes the sentence that they show. ask: name of its command."""
+
+        async def attempt() -> None:
+            refusal = ""
+            try:
+                await work
+            except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+                refusal = self.refuse(error)
+            finally:
+                self.answer(ask, refusal)
+
+        task = asyncio.create_task(attempt())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def refuse(self, error: Exception) -> str:
+        """Tell the pages what could not be done, a bug with the log that it got; the sentence."""
+        self.problem = str(error) if isinstance(error, UserError) else bug_in_words(error, sys.argv)
+        if len(self.problem) > LONGEST_SENTENCE:
+            self.problem = f"{self.problem[:LONGEST_SENTENCE]} ..."
+        self.notify()
+        return self.problem
+
+    def answer(self, ask: object, refusal: str = "") -> None:
+        """Tell the pages what became of a command, the one that gave it by the name that it gave it, if it did."""
+        if isinstance(ask, str) and len(ask) <= LONGEST_ASK:
+            self.answers = dict([*self.answers.items(), (ask, refusal)][-MOST_ANSWERS:])
+        self.notify()
+
+    def do(self, word: str, bench: Bench, told: str = "") -> None:
+        """Take a further step, which can be undone. told: what it has taken away, beside what its step says itself."""
+        self.advance(self.history.do(word, bench), told)
+
+    def advance(self, history: History, told: str = "") -> None:
+        """Go on with another history; a step forth tells what it has taken away."""
+        forth = history.before[-1:] == (self.history.now,)
+        self.problem = ""
+        for sentence in (told, history.now.told if forth else ""):
+            self.add_problem(sentence)
+        self.become(history)
+
+    def add_problem(self, sentence: str) -> None:
+        """Tell a sentence beside what is told already."""
+        self.problem = "; ".join(filter(None, (self.problem, sentence)))
+
+    def amend(self, bench: Bench, better: Bench) -> None:
+        """What lies on the bench, if it is still this, known better; no step of its own."""
+        if self.bench is bench:
+            self.history = self.history.amended(better)
+
+    def become(self, history: History) -> None:
+        """Go on with another history."""
+        self.history = history
+        for follow in self.followers:
+            follow()
+        self.notify()
+
+    @contextmanager
+    def waiting(self, words: str) -> Iterator[None]:
+        """While it is open, the pages show what they wait for."""
+        self.busy = words
+        self.notify()
+        try:
+            yield
+        finally:
+            self.busy = ""
+            self.notify()

@@ -1,0 +1,136 @@
+"""Commands: all that a page may ask of its bench, by name: what each needs to lie there, and what does it."""
+
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.changes import lay, lock, reset_part, set_part, stand, take, turn
+from machine.app.workbench.bench.planes import Cuts, add_plane, move_plane, remove_plane, reorder
+from machine.app.workbench.bench.settings import with_name, with_typed
+from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
+from machine.app.workbench.bench.values import Asked, text_or_none
+from machine.app.workbench.session.finding import search_way
+from machine.app.workbench.session.session import Session
+from profiles.errors import PlanError
+
+
+class Need(StrEnum):
+    """What must lie on a bench; parts: cuts, or at least marks; slices: of all that lies there now."""
+
+    NOTHING = "nothing"
+    MODEL = "model"
+    PARTS = "parts"
+    SLICES = "slices"
+
+
+def lacking(session: Session, need: Need) -> str:
+    """Why a bench has not what is needed, as a sentence; "" where it has."""
+    if need != Need.NOTHING and session.bench.model is None:
+        return "there is no model on the workbench yet: choose a file first"
+    if need == Need.PARTS and not session.bench.planned:
+        return "there are no parts yet: find them, or add a plane"
+    return session.slicing.lacking() if need == Need.SLICES else ""
+
+
+def check_need(session: Session, need: Need) -> None:
+    """Raises PlanError where a bench has not what is needed."""
+    if sentence := lacking(session, need):
+        raise PlanError(sentence)
+
+
+Work = Coroutine[Any, Any, None]
+
+
+@dataclass(frozen=True)
+class Command:
+    """act: given what is asked; it gives the work that is still to be done. Raises UserError for what cannot be done."""
+
+    need: Need
+    act: Callable[[Session, Asked], Work | None]
+
+
+def _change(word: str, change: Callable[[Bench, Asked], Bench]) -> Command:
+    return Command(Need.MODEL, lambda session, asked: session.do(word, change(session.bench, asked)))
+
+
+def _planes(word: str, edit: Callable[[Bench, Asked], Cuts], instead: Callable[[Asked], str] = lambda asked: "") -> Command:
+    """instead: how the reason begins why that cannot be done, where the planes alone do not say it."""
+    return Command(Need.MODEL, lambda session, asked: session.trials.take(word, lambda bench: edit(bench, asked), instead(asked)))
+
+
+def _marks(task: str) -> Command:
+    return Command(Need.MODEL, lambda session, asked: session.marking.take(task, asked))
+
+
+def _set(session: Session, asked: Asked) -> Work:
+    key, value = str(asked.get("key")), text_or_none(asked, "value")
+    return session.take_given(f"set {key}", lambda given: with_typed(given, key, value, session.bench.profile), key)
+
+
+def _take_profile(session: Session, asked: Asked) -> Work:
+    kind, name = str(asked.get("kind")), str(asked.get("name"))
+    return session.take_given(f"take {name}", lambda given: with_name(given, kind, name))
+
+
+def _reset(session: Session, asked: Asked) -> Work:
+    return session.take_given("take all changes back", lambda given: replace(given, settings=()))
+
+
+def _stop(session: Session, asked: Asked) -> None:
+    session.finding.stop()
+    session.slicing.stop()
+    session.comparing.stop()
+
+
+def _too_early(asked: Asked) -> str:
+    return f"part {asked.get('part')} cannot be printed as number {asked.get('to')}, for then "
+
+
+COMMANDS: dict[str, Command] = {
+    "demo": Command(Need.NOTHING, lambda session, asked: session.open_demo(str(asked.get("name")))),
+    "undo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.undo())),
+    "redo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.redo())),
+    "set": Command(Need.NOTHING, _set),
+    "reset": Command(Need.NOTHING, _reset),
+    "profile": Command(Need.NOTHING, _take_profile),
+    "set_part": _change("set a part", set_part),
+    "reset_part": _change("take a part's changes back", reset_part),
+    "turn": _change("turn the model", turn),
+    "stand": _change("lay the model down", stand),
+    "lay": _change("lay a face down", lay),
+    "search": Command(Need.MODEL, lambda session, asked: session.finding.begin(search_way(asked))),
+    "stop": Command(Need.NOTHING, _stop),
+    "take": _change("take another number of parts", take),
+    "try": Command(Need.MODEL, lambda session, asked: session.trials.move(move_plane(session.bench, asked))),
+    "add": _planes("add a plane", add_plane),
+    "move": _planes("move a plane", move_plane),
+    "remove": _planes("remove a plane", remove_plane),
+    "reorder": _planes("print a part at another time", reorder, _too_early),
+    "neck": Command(Need.MODEL, lambda session, asked: session.trials.take_neck(asked)),
+    "lock": _change("lock a plane", lock),
+    "mark": _marks("mark_bench"),
+    "unmark": _marks("unmark_bench"),
+    "add_stop": _change("add a pause", add_stop),
+    "remove_stop": _change("take a pause away", remove_stop),
+    "copies": _change("print another number of copies", set_copies),
+    "slice": Command(Need.MODEL, lambda session, asked: session.slicing.begin()),
+    "compare": Command(Need.SLICES, lambda session, asked: session.comparing.begin()),
+}
+
+
+def obey(session: Session, asked: Asked) -> None:
+    """Do what a page asks for, `{"do": NAME, ...}`, or begin with it. Raises UserError for what cannot be done."""
+    session.problem = ""
+    name, ask = asked.get("do"), asked.get("ask")
+    command = COMMANDS.get(name) if isinstance(name, str) else None
+    if command is None:
+        raise PlanError(f"{name!r} is no command of the workbench: docs/workbench.md lists them")
+    check_need(session, command.need)
+    work = command.act(session, asked)
+    if work is None:
+        session.answer(ask)
+    else:
+        session.start(work, ask)
+        session.notify()

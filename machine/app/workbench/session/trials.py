@@ -1,0 +1,98 @@
+"""PlaneTrials: planes in a person's hand, tried as they move, and taken when they can be cut."""
+
+import asyncio
+from collections.abc import Callable
+from math import hypot, inf
+
+from machine.app.workbench.bench.bench import Bench, with_cuts
+from machine.app.workbench.bench.planes import Cuts, check_unlocked, snap
+from machine.app.workbench.bench.values import Asked
+from machine.app.workbench.session.base import SessionBase
+from machine.app.workbench.session.readiness import Readiness
+from mdp.plane import Plane
+from mdp.search.neck import REACH_DEG, REACH_SHARE
+from mdp.search.obstacle import Obstacle
+from mdp.search.trial import Trial
+from profiles.errors import PlanError
+
+REST_S = 0.1  # of a hand, until what it holds is looked at more closely
+
+
+class PlaneTrials:
+    """trial: of the planes that were tried last, and the bench that they were tried on. refused: where those that were refused
+    last are in the way."""
+
+    def __init__(self, session: SessionBase, readiness: Readiness) -> None:
+        self.trial: tuple[Bench, Cuts, Trial] | None = None
+        self.refused: Obstacle | None = None
+        self._session, self._readiness = session, readiness
+        self._one, self._edits = asyncio.Lock(), asyncio.Lock()
+        self._wanted: Cuts | None = None  # tried next, whatever else was wanted meanwhile
+        session.followers.append(self._follow)
+
+    def move(self, cuts: Cuts) -> None:
+        """Have planes tried, the newest ones as soon as the ones before are done."""
+        waiting, self._wanted = self._wanted is not None, cuts
+        if not waiting:
+            self._session.start(self._try_newest())
+
+    async def take(self, word: str, edit: Callable[[Bench], Cuts], instead: str = "") -> None:
+        """Take planes that can be cut; each of several edits begins with what the one before has left. edit: gives the planes of
+        a bench after it; instead: how the reason begins. Raises PlanError for planes that cannot be cut."""
+        async with self._edits:
+            bench, self.refused = self._session.bench, None
+            cuts = edit(bench)
+            trial = await self.attempt(bench, cuts)
+            if trial.refused:
+                self.refused = trial.obstacle
+                raise PlanError(f"{instead}part {trial.refused_part} cannot be cut off: {trial.refused}")
+            now = self._session.bench
+            if now.shaped != bench.shaped:
+                raise PlanError(f"{word}: what lies on the workbench has changed meanwhile, so it was not done")
+            self.trial = now, cuts, trial
+            self._session.do(word, with_cuts(now, cuts))
+
+    async def take_neck(self, asked: Asked) -> None:
+        """Take the neck near the plane of a `part`. Raises PlanError where there is none, or it cannot be cut."""
+        bench = self._session.bench
+        number = check_unlocked(bench, asked)
+        assert bench.model is not None
+        reach_mm = REACH_SHARE * hypot(*bench.model.size_mm)
+        with self._session.waiting(f"looking for a neck near the plane of part {number}"):
+            async with self._one:
+                neck: Plane | None = await self._readiness.ask("near_neck", bench, bench.cuts, number, reach_mm)
+        if neck is None:
+            where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
+            raise PlanError(f"there is no neck near the plane of part {number}: {where}")
+        if self._session.bench.shaped == bench.shaped:
+            instead = f"the neck near the plane of part {number} is no place for a cut: "
+            await self.take("snap to the neck", lambda now: snap(now, asked, neck), instead)
+
+    async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
+        """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
+        async with self._one:
+            trial: Trial = await self._readiness.ask("try_cuts", bench, cuts, most_cuts)
+            return trial
+
+    async def _try_newest(self) -> None:
+        """Figures at once; where parts are not looked at yet, one after the other as soon as the hand rests."""
+        async with self._one:
+            cuts, self._wanted = self._wanted, None
+            bench = self._session.bench
+            if cuts is None or bench.model is None:
+                return
+            self.trial = tried = bench, cuts, await self._readiness.ask("try_cuts", bench, cuts, 0)
+        while tried[2].unchecked:
+            self._session.notify()
+            await asyncio.sleep(REST_S)
+            if self._wanted is not None or self.trial is not tried or self._session.bench.sought != bench.sought:
+                return
+            trial = await self.attempt(bench, cuts, 1)
+            if self.trial is not tried:
+                return
+            self.trial = tried = bench, cuts, trial
+
+    def _follow(self) -> None:
+        bench, tried = self._session.bench, self.trial
+        if bench.cuts is not None and (tried is None or tried[1] != bench.cuts or tried[0].sought != bench.sought):
+            self.move(bench.cuts)

@@ -1,0 +1,36 @@
+// Grip: what in the picture a hand, a finger or arrow keys take hold of, follow and let go.
+
+const ARROWS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 };
+
+/** An element that is dragged: take(event) gives what is held, null: not now; move(held, event) follows the hand; put(held) ends
+ * it, drop(held) leaves all as it was (Escape, a lost pointer). step(sign, event): an arrow key; stepped(): it is let go. */
+export function gripOf(element, { take, move, put, drop, step, stepped = () => {} }) {
+  let held = null, stepping = false;
+  const end = (act) => (event) => {
+    const last = held;
+    held = null;
+    if (last) act(last, event);
+  };
+  element.addEventListener("pointerdown", (event) => {
+    if (event.button || held) return;
+    held = take(event);
+    if (held) element.setPointerCapture(event.pointerId);
+  });
+  element.addEventListener("pointermove", (event) => { if (held) move(held, event); });
+  element.addEventListener("pointerup", end(put));
+  element.addEventListener("pointercancel", end(drop));
+  element.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && held) {
+      event.stopPropagation();
+      return end(drop)(event);
+    }
+    if (!(event.key in ARROWS) || held) return;
+    event.preventDefault();
+    event.stopPropagation();
+    stepping = true;
+    step(ARROWS[event.key], event);
+  });
+  const letGo = () => { if (stepping) [stepping] = [false, stepped()]; };
+  element.addEventListener("keyup", (event) => { if (event.key in ARROWS) letGo(); });
+  element.addEventListener("blur", letGo);
+}

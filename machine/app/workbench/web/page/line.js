@@ -1,0 +1,75 @@
+// Line: state in, commands out; when it is lost the page says so and tries again.
+
+import { made } from "../../../../view/template/page.js";
+
+export const AGAIN_MS = 1000;
+const CLOSED_CODE = 4404; // of a line whose bench is not open any more
+
+const NOT_SENT = "the line to tiltprint is lost, so this was not done";
+export const LINE_TOLD = {
+  open: "",
+  lost: "The line to tiltprint is lost; trying again.",
+  ended: "tiltprint has ended. Start it again and open the address that it tells; if it was killed, the files dropped here can be opened there.",
+  replaced: "This page is of a tiltprint that has ended. Another one is here now: open the address that its terminal has told.",
+  closed: "This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.",
+};
+
+/** A websocket below the page's address that comes back by itself: heard(what is told), and stands(a word of LINE_TOLD) whenever that changes. */
+export function lineAt(path, heard, stands) {
+  let socket = null;
+  const open = () => {
+    let opened = false;
+    socket = new WebSocket(new URL(path, location.href.replace(/^http/, "ws")));
+    socket.onopen = () => { opened = true; stands("open"); };
+    socket.onmessage = ({ data }) => heard(JSON.parse(data));
+    socket.onclose = async ({ code }) => {
+      const how = code === CLOSED_CODE ? "closed" : opened ? "lost" : await whyUnanswered();
+      stands(how);
+      if (how !== "closed" && how !== "replaced") setTimeout(open, AGAIN_MS);
+    };
+  };
+  open();
+  return { isOpen: () => socket.readyState === WebSocket.OPEN, send: (command) => socket.send(JSON.stringify(command)) };
+}
+
+/** Why no line can be opened: nobody is there, or one that does not know the page's address, which has another token at each start. */
+const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
+  ({ status }) => (status === 404 ? "replaced" : "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
+
+/** {send(command), ask(command, answered)}: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD;
+ * answered(refusal) after the state by which a command is done ("") or refused. */
+export function lineTo(follow, stands) {
+  const page = crypto.randomUUID(), asked = new Map(); // by a name that no other page has
+  const answer = ({ answers }) => {
+    for (const [name, refusal] of Object.entries(answers)) {
+      const answered = asked.get(name);
+      asked.delete(name);
+      answered?.(refusal);
+    }
+  };
+  const line = lineAt("line", (state) => { follow(state); answer(state); }, stands);
+  const send = (command) => { if (line.isOpen()) line.send(command); };
+  let count = 0;
+  return {
+    send,
+    ask: (command, answered) => {
+      if (!line.isOpen()) return answered(NOT_SENT);
+      const name = `${page} ${++count}`;
+      asked.set(name, answered);
+      send({ ...command, ask: name });
+    },
+  };
+}
+
+/** Sends a file of the person's to a bench; what is wrong with it comes back by the line, also where it is not taken to its end. */
+export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name })}`, { method: "POST", body: file }).catch(() => {});
+
+/** Has the browser save what the server makes at an address. */
+export async function save(address) {
+  const answer = await fetch(address);
+  if (!answer.ok) return;
+  const name = /filename="([^"]+)"/.exec(answer.headers.get("content-disposition"))[1];
+  const link = made("a", { href: URL.createObjectURL(await answer.blob()), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}

@@ -1,0 +1,219 @@
+// Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
+
+import { bodiesOf } from "../../../../view/template/bodies.js";
+import { HALF_HEIGHT } from "../../../../view/template/camera.js";
+import { frameOf } from "../../../../view/template/frames.js";
+import { outlive } from "../../../../view/template/gl.js";
+import { linesOf } from "../../../../view/template/lines.js";
+import { add, bounds, carried, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone, unit } from "../../../../view/template/math.js";
+import { beside, cutsOf, planesOf } from "../../../../view/template/model.js";
+import { MOST_CUTS, solidOf } from "../../../../view/template/solids.js";
+import { markedOver } from "./marks-panel.js";
+import { piecesOn } from "./pieces.js";
+import { paintedRed, planeBefore } from "./triangles.js";
+
+const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156];
+
+const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
+
+const PLANE_COLOUR = [30, 120, 190];
+
+const cornersOf = (box) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => box[(i >> axis) & 1][axis]));
+
+/** Corners of boxes about all that is drawn but the table: the model or its parts, or the walls of all copies, planes, marks and what is in the way. */
+export function placesDrawn({ box, pieces, shifts, walls, wallsAlone, plane, pedestal, extras }) {
+  const bands = (pieces ? null : walls) || [], whole = pieces ? pieces.parts.map((part, k) => part.box.map((place) => add(place, shifts[k]))) : bands.map(({ places }) => bounds(places));
+  if (!pieces && !(wallsAlone && bands.length)) whole.push(box, pedestal ? bounds(pedestal.vertices) : []);
+  const rim = plane ? beside(plane.normal).flatMap((way) => [1, -1].map((sign) => add(plane.centre_mm, scaled(way, sign * plane.radius_mm)))) : [];
+  const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((each) => each && each.places.length)
+    .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
+  return [...whole.filter((each) => each.length).flatMap(cornersOf), ...rim, ...around];
+}
+
+/** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws;
+ * drawn() is called after that. */
+export function pictureOf(canvas, camera, drawn) {
+  const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
+  if (!gl) return null;
+  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, pedestal: null, machine: null, dark: false, marks: null, extras: {} };
+  let card = null, asked = false, count = 0;
+  const stale = new Set(); // of what the card holds: made anew before it is drawn, once however often it has changed by then
+  const build = () => {
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    card = { frame: frameOf(gl, 4), table: null, solid: null, extras: {} };
+    [table, solid, plane, pedestal, pieces, walls, ...Object.keys(scene.extras)].forEach((each) => stale.add(each));
+  };
+  const anew = (...things) => {
+    things.forEach((each) => stale.add(each));
+    ask();
+  };
+  const renew = () => {
+    if (stale.has(solid)) stale.delete(painted); // it has the new colours
+    stale.forEach((each) => (typeof each === "string" ? extra(each) : each()));
+    stale.clear();
+  };
+  const release = (thing) => { if (thing) thing.free(); };
+  const table = () => {
+    if (!scene.machine) return;
+    const { table: body } = bodiesOf(scene.machine, scene.dark);
+    Object.values(card.table || {}).forEach(release);
+    card.table = { solid: solidOf(gl, body.solid), lines: linesOf(gl, body.lines) };
+  };
+  const solid = () => {
+    release(card.solid);
+    card.solid = null;
+    if (!scene.model) return;
+    const colours = new Uint8Array(12 * scene.model.count);
+    card.colours = markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours));
+    card.solid = solidOf(gl, { places: scene.model.corners, colours });
+  };
+  const draw = () => {
+    asked = false;
+    if (gl.isContextLost()) return;
+    renew();
+    const density = Math.min(devicePixelRatio || 1, 2);
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    const view = camera.toEye(), lens = camera.lens(width / height);
+    const seenAs = (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
+    const flat = seenAs(IDENTITY), below = camera.eye()[2] < 0;
+    card.frame.begin(width, height);
+    if (card.table && !below) paintPlate(flat);
+    if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
+    else if (card.solid) {
+      (card.walls || []).forEach((each) => each.draw(flat));
+      const ghost = card.walls ? FAINT : 0, alone = scene.wallsAlone && card.walls?.length;
+      if (!alone) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost });
+      if (!alone && card.pedestal) card.pedestal.draw(flat, { ghost });
+    }
+    if (card.table && below) paintPlate(flat, { strength: 0.18 });
+    if (card.plane) {
+      card.plane.rim.draw(flat.toClip, { lift: 1e-4 });
+      card.plane.disc.draw(flat, { strength: 0.3 });
+    }
+    for (const things of Object.values(card.extras)) for (const thing of things) paintExtra(thing, seenAs(thing.matrix));
+    card.frame.show();
+    scene.toClip = flat.toClip;
+    drawn();
+    document.documentElement.dataset.drawn = ++count;
+  };
+  const plane = () => {
+    Object.values(card.plane || {}).forEach(release);
+    card.plane = null;
+    if (!scene.plane) return;
+    const { discs, rims } = planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR);
+    card.plane = { disc: solidOf(gl, discs), rim: linesOf(gl, rims) };
+  };
+  const pedestal = () => {
+    release(card.pedestal);
+    const colours = scene.pedestal && new Uint8Array(12 * scene.pedestal.count);
+    card.pedestal = colours && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR, colours) });
+  };
+  const pieces = () => {
+    release(card.pieces);
+    card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen);
+  };
+  const chosenPiece = () => { if (card.pieces) card.pieces.paint(scene.chosen); };
+  const extra = (name) => {
+    (card.extras[name] || []).forEach(({ solid, lines }) => [solid, lines].forEach(release));
+    card.extras[name] = scene.extras[name].map(({ solid, lines, matrix = IDENTITY, strength = 1, over = false }) => ({
+      solid: solid && solidOf(gl, solid), lines: lines && linesOf(gl, lines), matrix, strength, over,
+    }));
+  };
+  const paintExtra = ({ solid, lines, strength, over }, seen) => {
+    if (over) gl.depthFunc(gl.ALWAYS);
+    if (solid) solid.draw(seen, { strength });
+    if (lines) lines.draw(seen.toClip, { lift: 1e-4 });
+    gl.depthFunc(gl.LEQUAL);
+  };
+  const painted = () => {
+    if (card.solid) card.solid.paint(markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, card.colours)));
+  };
+  const walls = () => {
+    const kept = new Map((card.walls || []).map((each) => [each.of, each]));
+    card.walls = scene.walls && scene.walls.map((of) => kept.get(of) || { of, ...solidOf(gl, of) });
+    kept.forEach((each, of) => { if (!(scene.walls || []).includes(of)) each.free(); });
+  };
+  const paintPlate = (seen, look = {}) => {
+    card.table.solid.draw(seen, look);
+    card.table.lines.draw(seen.toClip, { lift: 1e-5 });
+  };
+  const ask = () => {
+    if (!asked) requestAnimationFrame(draw);
+    asked = true;
+  };
+  outlive(gl, () => {}, () => { build(); draw(); });
+  new ResizeObserver(ask).observe(canvas);
+  build();
+  return {
+    ask,
+    machine: (machine, dark) => { Object.assign(scene, { machine, dark }); anew(table); },
+    show: (model) => { scene.model = model; scene.red = scene.marks = null; anew(solid); },
+    stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
+    red: (marks) => {
+      if (marks === scene.red) return;
+      scene.red = marks;
+      anew(painted);
+    },
+    /** A byte of each face: the kinds of zones it is marked for. */
+    marks: (bits) => { scene.marks = bits; anew(painted); },
+    /** More to draw under a name: [{solid, lines, matrix, strength, over: before all else}]. */
+    extra: (name, things) => { scene.extras[name] = things; anew(name); },
+    cut: (planes, colours) => {
+      const drawable = planes && planes.length <= MOST_CUTS;
+      scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
+      ask();
+    },
+    /** The parts as bodies of their own, each shifted, in place of the model; chosen: the number of the part that stands out, 0: all. */
+    pieces: (found, shifts, chosen) => {
+      const same = scene.pieces === found, repainted = scene.chosen !== chosen;
+      Object.assign(scene, { pieces: found, shifts, chosen });
+      if (same && !(found && repainted)) ask();
+      else anew(same && card.pieces ? chosenPiece : pieces);
+    },
+    /** The walls of what is sliced, triangles of each part, with the model as a ghost about them, or without it; null: none. */
+    walls: (found, alone) => {
+      scene.wallsAlone = alone;
+      const same = (scene.walls || []).length === (found || []).length && (found || []).every((each, k) => each === scene.walls[k]);
+      if (same && Boolean(found) === Boolean(scene.walls)) return;
+      scene.walls = found;
+      anew(walls);
+    },
+    /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
+    plane: (held) => { scene.plane = held; anew(plane); },
+    /** The triangles of what the model stands on, in the platform's frame, or none. */
+    pedestal: (body) => {
+      if (body === scene.pedestal) return;
+      scene.pedestal = body;
+      anew(pedestal);
+    },
+    /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
+    placeOf: (place) => {
+      const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
+      return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
+    },
+    eye: () => camera.eye(),
+    carried: (place) => carried(scene.matrix, place),
+    box: () => scene.box,
+    matrix: () => scene.matrix,
+    /** All that is drawn brought into view, and other places. */
+    fit: (others = []) => {
+      camera.fit([...placesDrawn(scene), ...others], canvas.clientWidth / Math.max(canvas.clientHeight, 1));
+      ask();
+    },
+    /** From where and along what an event on the canvas looks, in the frame of the platform. */
+    sight: (event) => {
+      const box = canvas.getBoundingClientRect(), eye = camera.eye();
+      const x = ((event.clientX - box.left) / box.width * 2 - 1) * (box.width / box.height) * HALF_HEIGHT;
+      const y = (1 - ((event.clientY - box.top) / box.height) * 2) * HALF_HEIGHT;
+      return [eye, add(unit(sub(camera.target, eye)), add(scaled(camera.right(), x), scaled(camera.up(), y)))];
+    },
+    /** The same in the frame of the model as it is read. */
+    ray(event) {
+      const back = undone(scene.matrix), [eye, along] = this.sight(event);
+      return [carried(back, eye), turned(back, along)];
+    },
+  };
+}

@@ -1,0 +1,163 @@
+// Pieces: the parts as bodies of their own, listed, and drawn apart along their printing directions, so that the faces of the cuts are seen.
+
+import { blockOf } from "../../../../view/template/block.js";
+import { rgb } from "../../../../view/template/colours.js";
+import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/math.js";
+import { arrowsOf, LEFT, RED, surfacesOf } from "../../../../view/template/model.js";
+import { $, made } from "../../../../view/template/page.js";
+import { solidOf } from "../../../../view/template/solids.js";
+import { mm2, swatch } from "./elements.js";
+import { anglesOf } from "./planes-panel.js";
+import { cornersAt, faceMet, wordOf } from "./triangles.js";
+
+const CUT_MM = 2e-3; // within which a corner lies in the plane of a cut: places come in thousandths of a mm
+const PALER = [190, 194, 199]; // what parts that are not chosen fade to
+const FADED = 0.6, CUT_WHITE = 0.5, ARROW_DARK = 0.35;
+const ARROW_OVER = 0.02, ARROW_SPAN = 0.5; // of the model's size: how far above a part its arrow begins, and for which size it is drawn
+
+/** {header, parts: [{part, range, foot: of its arrow, way, box, cut}], places, marks, span} of the server's block. */
+async function piecesIn(bytes) {
+  const block = await blockOf(bytes), surfaces = surfacesOf(block);
+  if (!surfaces) return null;
+  const { places, marks, parts, apart } = surfaces, bases = parts.slice(1).map(({ part }) => part.base);
+  const [low, high] = bounds(places), span = length(sub(high, low));
+  const described = parts.map(({ part, range }, k) => {
+    const [least, most] = bounds(places.subarray(3 * range[0], 3 * range[1])), planes = bases.slice(Math.max(k - 1, 0));
+    let top = 0;
+    for (let i = 3 * range[0]; i < 3 * range[1]; i += 3) top = Math.max(top, dot(part.base.normal, [places[i], places[i + 1], places[i + 2]]) - part.base.offset_mm);
+    const foot = add(part.base.centre_mm, scaled(part.direction, top + ARROW_OVER * span)), tip = add(foot, scaled(part.direction, 0.3 * ARROW_SPAN * span));
+    return { part, range, foot, way: apart.get(part), box: bounds([...least, ...most, ...tip]), cut: cutFaces(places, range, planes) };
+  });
+  return { header: block.header, parts: described, places, marks, span };
+}
+
+/** Which faces of a range lie in one of the planes. */
+function cutFaces(places, [first, end], planes) {
+  const cut = new Uint8Array((end - first) / 3), within = ({ normal: [x, y, z], offset_mm: offset }, at) => {
+    for (let k = at; k < at + 9; k += 3) if (Math.abs(places[k] * x + places[k + 1] * y + places[k + 2] * z - offset) > CUT_MM) return false;
+    return true;
+  };
+  for (let face = 0; face < cut.length; face++) cut[face] = planes.some((plane) => within(plane, 3 * first + 9 * face));
+  return cut;
+}
+
+/** How far each part is from its place when they are drawn apart by a share of the model's size. */
+const shiftsOf = ({ parts, span }, share) => parts.map(({ way }) => scaled(way, share * span));
+
+/** Colours of all corners: the parts', paler those not chosen (0: all are), light the cuts, red what needs support. */
+function pieceColours({ parts, marks, places }, chosen) {
+  const words = new Uint32Array(places.length / 3);
+  for (const { part, range, cut } of parts) {
+    const own = rgb(part.colour), plain = chosen && chosen !== part.index ? own.map((x, k) => mix(x, PALER[k], FADED)) : own;
+    const [red, light, colour] = [wordOf(RED, 255), wordOf(plain.map((x) => mix(x, 255, CUT_WHITE)), 254), wordOf(plain, 254)];
+    for (let corner = range[0]; corner < range[1]; corner++) {
+      const face = Math.floor(corner / 3);
+      words[corner] = marks[face] & LEFT.printed ? red : cut[face - range[0] / 3] ? light : colour;
+    }
+  }
+  return new Uint8Array(words.buffer);
+}
+
+/** Their drawing: {draw(seenAt, shifts), paint(chosen)}; seenAt(shift): how the eye sees what is shifted so. */
+export function piecesOn(gl, pieces, chosen) {
+  const solid = solidOf(gl, { places: pieces.places, colours: pieceColours(pieces, chosen) });
+  const tipped = pieces.parts.map(({ part, foot }) => ({ ...part, base: { ...part.base, radius_mm: 1, centre_mm: foot } }));
+  const arrows = solidOf(gl, arrowsOf(tipped, (part) => rgb(part.colour).map((x) => mix(x, 0, ARROW_DARK)), ARROW_SPAN * pieces.span));
+  const share = arrows.corners / pieces.parts.length;
+  return {
+    draw: (seenAt, shifts) => pieces.parts.forEach(({ range }, k) => {
+      const seen = seenAt(shifts[k]);
+      solid.draw(seen, { range });
+      arrows.draw(seen, { range: [k * share, (k + 1) * share] });
+    }),
+    paint: (number) => solid.paint(pieceColours(pieces, number)),
+    free: () => [solid, arrows].forEach((each) => each.free()),
+  };
+}
+
+/** The number of the part that a ray of the platform's frame meets first; 0: none. */
+function pieceMet({ places, parts }, shifts, [from, along]) {
+  let best = 0, least = Infinity;
+  parts.forEach(({ part, range }, k) => {
+    const corners = places.subarray(3 * range[0], 3 * range[1]), start = sub(from, shifts[k]);
+    const face = faceMet({ corners, count: (range[1] - range[0]) / 3 }, start, along);
+    if (face < 0) return;
+    const [a, b, c] = cornersAt(corners, face), normal = cross(sub(b, a), sub(c, a)), far = dot(normal, sub(a, start)) / dot(normal, along);
+    if (far < least) [best, least] = [part.index, far];
+  });
+  return best;
+}
+
+const PART_HEAD = ["part", "cm³", "support", "printed"];
+const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
+
+/** A printing direction as somebody in front of the machine sees it. */
+function directionInWords(direction) {
+  const [tilt, towards] = anglesOf(direction);
+  if (tilt < 0.05) return "straight up";
+  const side = SIDES[(Math.round(towards / 45) + 8) % 8];
+  return `${Number(tilt.toFixed(1))}° to the ${side}`;
+}
+
+export function apartPanel(bench) {
+  let pieces = null, asked = ""; // asked: of which state the pieces are, or come
+  const keyOf = ({ model, rotation, cuts, given, parts }) => (parts && model.drawn ? JSON.stringify([model.key, rotation, cuts, given]) : "");
+  const share = () => Number($("apart").value);
+  bench.apart = () => (pieces && bench.tab === "parts" && !bench.hand && !bench.state.search ? share() : 0);
+  /** A part chosen, here or by a click: its plane is taken in hand, too, where it has one. */
+  bench.chosen = 0;
+  const choose = (number) => {
+    bench.chosen = number;
+    bench.select(number);
+    show();
+    tellParts(pieces, bench.chosen, choose);
+  };
+  bench.pieceAt = (event) => choose(pieceMet(pieces, shiftsOf(pieces, share()), bench.picture.sight(event)));
+  const show = () => {
+    if (bench.picture) bench.picture.pieces(bench.apart() ? pieces : null, pieces ? shiftsOf(pieces, share()) : [], bench.chosen);
+  };
+  bench.showApart = show;
+  const fetchPieces = async () => {
+    const key = keyOf(bench.state);
+    if (key === asked || bench.tab !== "parts" || bench.state.search) return;
+    asked = key;
+    pieces = null;
+    show();
+    tellParts(null, 0, choose);
+    const answer = key ? await fetch("pieces").catch(() => null) : null;
+    const found = answer && answer.ok ? await piecesIn(new Uint8Array(await answer.arrayBuffer())) : null;
+    if (asked !== key) return;
+    if (!answer) asked = ""; // the line is lost: the next state asks again
+    pieces = found;
+    if (pieces && bench.chosen > pieces.parts.length) bench.chosen = 0;
+    $("parts-fit").textContent = pieces ? pieces.header.fit : "";
+    tellParts(pieces, bench.chosen, choose);
+    bench.look();
+    document.documentElement.dataset.pieces = pieces ? pieces.parts.length : "";
+  };
+  bench.fetchPieces = fetchPieces;
+  $("apart").disabled = !bench.picture;
+  $("apart").addEventListener("input", () => { bench.look(); bench.showPlane(); });
+  return {
+    told: (state) => {
+      if (bench.selected) bench.chosen = bench.selected;
+      $("parts-field").hidden = !state.parts || !state.model.drawn;
+      fetchPieces();
+    },
+  };
+}
+
+function tellParts(pieces, chosen, choose) {
+  const rows = (pieces ? pieces.parts : []).map(({ part }) => {
+    const mark = made("input", { type: "radio", name: "piece", value: part.index, checked: part.index === chosen });
+    mark.addEventListener("change", () => choose(part.index));
+    const row = made("tr", {}, made("td", {}, made("label", {}, mark, swatch(part.colour), `${part.index}`)),
+      made("td", { text: (part.volume_mm3 / 1000).toFixed(2) }), made("td", { text: mm2(part.risky_after_mm2) }), made("td", { className: "words", text: directionInWords(part.direction) }));
+    row.addEventListener("click", (event) => { if (!["INPUT", "LABEL"].includes(event.target.tagName)) choose(part.index); });
+    return row;
+  });
+  const kept = document.activeElement?.name === "piece";
+  const head = made("tr", {}, ...PART_HEAD.map((text, k) => made("th", { text, scope: "col", className: k === 3 ? "words" : "" })));
+  $("parts-list").replaceChildren(...(rows.length ? [made("thead", {}, head), made("tbody", {}, ...rows)] : []));
+  if (kept) $("parts-list").querySelector(":checked")?.focus();
+}

@@ -1,0 +1,165 @@
+// Rings: three about the model, by which it is turned about the platform's x, y and z; red follows as it does for the sliders.
+
+import { add, bounds, dot, length, RAD, scaled, sub, unit } from "../../../../view/template/math.js";
+import { $ } from "../../../../view/template/page.js";
+import { gripOf } from "./grip.js";
+import { turnedFurther } from "./triangles.js";
+
+const RING_AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
+const RING_STEPS = 96, RING_REACH = 1.05; // of the farthest vertex from the middle
+const RING_KEY_DEG = 1, RING_SNAP_DEG = 15; // the latter with Shift held
+const FLATTEST = 0.25; // cosine between look and axis below which a ring is seen from its edge: its tangent is followed, not its plane
+
+export function ringsOf(bench) {
+  const svg = $("rings"), groups = [...svg.querySelectorAll("[data-ring]")], on = () => $("show-rings").getAttribute("aria-pressed") === "true";
+  let turning = null; // {axis, ring, deg}: how far it is turned from where it stood
+  const ringNow = () => {
+    const [least, most] = bench.picture.box();
+    return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * reachOf(bench.triangles) };
+  };
+  const told = (axis, deg) => {
+    const group = groups.find((each) => each.dataset.ring === axis);
+    group.setAttribute("aria-valuenow", deg);
+    group.setAttribute("aria-valuetext", `${deg} degrees`);
+  };
+  const preview = (axis, ring, deg) => {
+    turning = { axis, ring, deg };
+    told(axis, deg);
+    bench.preview(turnedFurther(bench.state.rotation, scaled(RING_AXES[axis], deg)));
+  };
+  const done = (send) => {
+    const last = turning;
+    turning = null;
+    if (!last) return;
+    told(last.axis, 0);
+    if (send && last.deg) bench.send({ do: "turn", axis: last.axis, deg: last.deg });
+    else bench.preview(bench.state.rotation);
+  };
+  groups.forEach((group) => {
+    const axis = group.dataset.ring;
+    gripOf(group, {
+      take: (event) => ({ ring: ringNow(), ...graspOf(bench.picture, RING_AXES[axis], ringNow(), event) }),
+      move: (held, event) => {
+        const deg = held.turnedTo(event), step = event.shiftKey ? RING_SNAP_DEG : RING_KEY_DEG;
+        preview(axis, { ...held.ring, from: held.from }, Math.round(deg / step) * step);
+      },
+      put: () => done(true),
+      drop: () => done(false),
+      step: (sign, event) => {
+        const ring = turning ? turning.ring : { ...ringNow(), from: 0 }, step = event.shiftKey ? RING_SNAP_DEG : RING_KEY_DEG;
+        preview(axis, ring, (turning ? turning.deg : 0) + sign * step);
+      },
+      stepped: () => done(true),
+    });
+  });
+  const shown = () => Boolean(on() && bench.tab === "model" && bench.triangles && bench.state.model && !bench.laying);
+  /** Places of the rings, as far as they are shown. */
+  bench.ringPlaces = () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
+  /** Where the rings are seen now; called whenever the picture is drawn. */
+  bench.placeRings = () => {
+    svg.toggleAttribute("hidden", !shown());
+    if (!shown()) return;
+    const ring = turning ? turning.ring : ringNow(), eye = bench.picture.eye();
+    groups.forEach((group) => {
+      const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));
+      const sides = points.map((place) => ({ at: bench.picture.placeOf(place), near: length(sub(eye, place)) < middle }));
+      const seen = sides.flatMap((each, k) => (k && each.near !== sides[k - 1].near ? [{ ...each, near: !each.near }, each] : [each]));
+      group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
+      group.querySelector(".far").setAttribute("d", pathOf(seen, ({ near }) => !near));
+      group.querySelector(".near").setAttribute("d", pathOf(seen, ({ near }) => near));
+      group.querySelector(".reach").setAttribute("d", pathOf(seen, () => true));
+      const label = seen.reduce((best, each) => (each.at && each.near && (!best || each.at[1] < best[1]) ? each.at : best), null) || [-99, -99];
+      group.querySelector("text").setAttribute("x", label[0]);
+      group.querySelector("text").setAttribute("y", label[1]);
+    });
+    showSweep(bench.picture, turning);
+  };
+  $("show-rings").addEventListener("click", () => { $("show-rings").setAttribute("aria-pressed", !on()); bench.picture?.ask(); });
+  $("show-rings").disabled = !bench.picture;
+}
+
+const REACHES = new WeakMap(); // of triangles: they stay as they are
+
+/** How far the farthest vertex is from the middle of all, mm: the same however the model is turned. */
+function reachOf(triangles) {
+  if (!REACHES.has(triangles)) {
+    const { vertices } = triangles, [least, most] = bounds(vertices), middle = scaled(add(least, most), 0.5);
+    let far = 1;
+    for (let i = 0; i < vertices.length; i += 3) far = Math.max(far, Math.hypot(vertices[i] - middle[0], vertices[i + 1] - middle[1], vertices[i + 2] - middle[2]));
+    REACHES.set(triangles, far);
+  }
+  return REACHES.get(triangles);
+}
+
+/** Two unit vectors across an axis, so that turning the first by 90 degrees gives the second. */
+const acrossRing = (axis) => [[axis[1], axis[2], axis[0]], [axis[2], axis[0], axis[1]]];
+
+const onRing = (axis, { centre, radius }, angle) => {
+  const [a, b] = acrossRing(axis);
+  return add(centre, add(scaled(a, radius * Math.cos(angle)), scaled(b, radius * Math.sin(angle))));
+};
+
+const ringPoints = (axis, ring) => Array.from({ length: RING_STEPS + 1 }, (_, k) => onRing(axis, ring, (2 * Math.PI * k) / RING_STEPS));
+
+/** What a hand that takes a ring holds: the angle of the ring it has taken (from), and how many degrees an event has turned it since. */
+function graspOf(picture, axis, ring, event) {
+  const [a, b] = acrossRing(axis), [eye, along] = picture.sight(event), facing = Math.abs(dot(axis, unit(along)));
+  const angleAt = (later) => {
+    const [from, way] = picture.sight(later), far = dot(axis, sub(ring.centre, from)) / dot(axis, way);
+    const out = sub(add(from, scaled(way, far)), ring.centre);
+    return Math.atan2(dot(out, b), dot(out, a));
+  };
+  if (facing < FLATTEST) return graspEdge(picture, axis, ring, event);
+  const from = angleAt(event);
+  let last = from, total = 0;
+  return {
+    from,
+    turnedTo: (later) => {
+      const now = angleAt(later), step = now - last;
+      total += step - 2 * Math.PI * Math.round(step / (2 * Math.PI));
+      last = now;
+      return total / RAD;
+    },
+  };
+}
+
+/** The same for a ring that is seen from its edge: the hand goes along it, so many pixels a degree. */
+function graspEdge(picture, axis, ring, event) {
+  const canvas = $("canvas").getBoundingClientRect(), at = [event.clientX - canvas.left, event.clientY - canvas.top];
+  const eye = picture.eye(), middle = length(sub(eye, ring.centre));
+  let best = null;
+  for (let k = 0; k < RING_STEPS; k++) {
+    const angle = (2 * Math.PI * k) / RING_STEPS, place = onRing(axis, ring, angle), seen = picture.placeOf(place);
+    if (!seen || length(sub(eye, place)) > middle) continue;
+    const far = Math.hypot(seen[0] - at[0], seen[1] - at[1]);
+    if (!best || far < best.far) best = { far, angle, seen };
+  }
+  const from = best ? best.angle : 0, next = picture.placeOf(onRing(axis, ring, from + RAD)), here = best ? best.seen : at;
+  const way = next ? [next[0] - here[0], next[1] - here[1]] : [1, 0], pixels = Math.max(Math.hypot(...way), 0.2);
+  return { from, turnedTo: (later) => ((later.clientX - event.clientX) * way[0] + (later.clientY - event.clientY) * way[1]) / (pixels * pixels) };
+}
+
+/** An SVG path along the places that are seen and wanted. */
+function pathOf(seen, wanted) {
+  let text = "", open = false;
+  for (const each of seen) {
+    const drawn = each.at && wanted(each);
+    if (drawn) text += `${open ? "L" : "M"}${each.at[0].toFixed(1)} ${each.at[1].toFixed(1)}`;
+    open = drawn;
+  }
+  return text;
+}
+
+/** The sector by which the model is turned just now, and its angle. */
+function showSweep(picture, turning) {
+  $("ring-sweep").setAttribute("d", "");
+  $("ring-told").textContent = turning ? `${turning.deg}°`.replace("-", "−") : "";
+  if (!turning) return;
+  const { axis, ring, deg } = turning, steps = Math.max(Math.ceil(Math.abs(deg) / 4), 1);
+  const places = Array.from({ length: steps + 1 }, (_, k) => picture.placeOf(onRing(RING_AXES[axis], ring, ring.from + (k / steps) * deg * RAD)));
+  const middle = picture.placeOf(ring.centre), end = places[steps];
+  if (!middle || places.some((place) => !place)) return;
+  $("ring-sweep").setAttribute("d", `M${[middle, ...places].map((place) => place.map((x) => x.toFixed(1)).join(" ")).join("L")}Z`);
+  $("ring-told").setAttribute("x", end[0]);
+  $("ring-told").setAttribute("y", end[1] - 10);
+}

@@ -1,0 +1,115 @@
+// Main: the page put together: bytes to print, print to picture, hands to scene.
+
+import { cameraOf, CORNERS, handle, VIEWS } from "./camera.js";
+import { controlsOf, themeOf } from "./controls.js";
+import { courseOf } from "./course.js";
+import { findingsOf } from "./findings.js";
+import { frontOf } from "./front.js";
+import { keysOf } from "./keys.js";
+import { layerTimes } from "./layer-times.js";
+import { layerSliders } from "./layers.js";
+import { follow } from "./live.js";
+import { add, carried, multiply, RAD, scaled, sub, turned, undone } from "./math.js";
+import { outsideOf } from "./outside.js";
+import { $, bells, duration, notice } from "./page.js";
+import { cardOf, pictureOf } from "./picture.js";
+import { printOf } from "./print.js";
+import { readoutsOf } from "./readouts.js";
+import { showReport } from "./report.js";
+import { sceneOf } from "./scene.js";
+import { standing } from "./stage.js";
+import { textOf } from "./text.js";
+
+async function main() {
+  const gl = cardOf($("canvas")), text = $("tiltprint").textContent.trim();
+  $("tiltprint").textContent = "";
+  const print = await printOf(text), { header, rows } = print;
+  const ring = bells(), camera = cameraOf(), scene = sceneOf(print, ring);
+  $("title").textContent = header.title;
+  $("summary").textContent = summaryOf(header, rows);
+  showReport(header);
+  controlsOf(print, scene, ring);
+  frontOf(print, scene);
+  readoutsOf(print, scene, ring);
+  layerSliders(print, scene, ring);
+  layerTimes(scene, ring);
+  const chooseTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);
+  const findings = findingsOf(print, scene, ring, camera, player.stop), code = textOf(print, scene, ring, player.stop);
+  scene.go(rows.count - 1);
+  outsideOf({ scene, findings, code, chooseTheme });
+  if (!gl) return withoutPicture();
+  const picture = pictureOf(gl, print, scene, camera, ring, findings.showMarkers);
+  const fit = fitting(print, scene, camera, picture, ring);
+  keysOf({ scene, camera, player, look: picture.moved, fit, chooseTheme });
+  handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
+  if (header.live && location.protocol.startsWith("http")) follow(scene, player);
+  document.documentElement.dataset.openedMs = performance.now().toFixed(0);
+  document.documentElement.dataset.state = "ready";
+}
+
+function goTo(row, scene, player) {
+  if (row < 0) return;
+  player.stop();
+  scene.go(row);
+}
+
+function summaryOf({ time_s: seconds, filament_mm: filament, parts, thinned }, { count, layers }) {
+  const many = (number, thing) => `${number.toLocaleString("en")} ${thing}${number === 1 ? "" : "s"}`;
+  const told = parts.some((part) => part.index) ? [many(parts.length, "part")] : [];
+  if (count) told.push(many(layers.length, "layer"), duration(seconds), `${(filament / 1000).toFixed(2)} m of filament`);
+  if (thinned) told.push(`thinned: ${thinned.kept.toLocaleString("en")} of ${many(thinned.rows, "move")}`);
+  return told.join(" · ");
+}
+
+/** Puts the work into view, and keeps it there when the table moves and when the frame is changed. */
+function fitting(print, scene, camera, picture, ring) {
+  const [least, most] = print.box, middle = scaled(add(least, most), 0.5);
+  const work = () => standing(print.chain, scene.place, scene.riding).work;
+  const fit = () => {
+    const corners = Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => print.box[(i >> axis) & 1][axis]));
+    camera.fit(corners.map((corner) => carried(work(), corner)), picture.canvas.clientWidth / Math.max(picture.canvas.clientHeight, 1));
+    picture.ask();
+  };
+  let before = work();
+  ring.on("frame", () => {
+    camera.target = carried(multiply(work(), undone(before)), camera.target);
+    before = work();
+    picture.ask();
+  });
+  ring.on("row", () => {
+    const now = work();
+    camera.target = add(camera.target, sub(carried(now, middle), carried(before, middle)));
+    before = now;
+  });
+  const views = { ...VIEWS, corner: [bestCorner(print), 24] };
+  const look = (name) => {
+    [camera.yaw, camera.pitch] = views[name].map((angle) => angle * RAD);
+    picture.ask();
+  };
+  document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => look(button.dataset.view)));
+  $("fit").addEventListener("click", fit);
+  look("corner");
+  fit();
+  return fit;
+}
+
+/** The corner that sees most of the table's upper side while the parts are printed. */
+function bestCorner({ header, chain }) {
+  const seen = (yaw) => header.parts.reduce((sum, { rows = 1, tilt_deg: tilt = 0, turn_deg: turn = 0 }) => {
+    const up = turned(chain.table(tilt, turn), [0, 0, 1]);
+    return sum + rows * (up[0] * Math.cos(yaw * RAD) + up[1] * Math.sin(yaw * RAD));
+  }, 0);
+  return CORNERS.reduce((best, yaw) => (seen(yaw) > seen(best) + 1e-6 ? yaw : best));
+}
+
+function withoutPicture() {
+  document.body.classList.add("no-picture");
+  notice("This browser shows no WebGL2, so there is no picture of the print; the report and the findings are complete.", "page");
+  $("tab-report").click();
+  document.documentElement.dataset.state = "failed";
+}
+
+main().catch((error) => {
+  notice(`The page could not be shown: ${error.message}`, "page");
+  document.documentElement.dataset.state = "failed";
+});

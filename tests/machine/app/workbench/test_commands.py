@@ -1,0 +1,56 @@
+"""The table of commands: what each needs on the bench, and that the page's scripts know the very same names."""
+
+import re
+from importlib import resources
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.printing.commands import COMMANDS as OF_PRINTS
+from machine.app.workbench.session.commands import COMMANDS, obey
+from profiles.errors import PlanError
+from profiles.profile import load
+from tests.machine.app.workbench.models import model
+
+WITHOUT_A_MODEL = {"demo", "undo", "redo", "set", "reset", "profile", "stop"}
+UNSLICED = "what is on the workbench is not sliced yet: slice it first"
+DOCS = Path(__file__).parents[4] / "docs" / "workbench.md"
+PAGE = resources.files("machine.app.workbench.web").joinpath("page")
+
+
+def bare(bench: Bench) -> Any:
+    """A session on whose bench nothing is sliced, and which can do nothing."""
+    return SimpleNamespace(bench=bench, problem="", slicing=SimpleNamespace(lacking=lambda: UNSLICED))
+
+
+@pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))
+def test_all_that_is_done_to_a_model_is_refused_without_one(name: str) -> None:
+    with pytest.raises(PlanError, match="there is no model on the workbench yet: choose a file first"):
+        obey(bare(Bench(load())), {"do": name})
+
+
+def test_only_what_is_sliced_is_compared() -> None:
+    with pytest.raises(PlanError, match=UNSLICED):
+        obey(bare(Bench(load(), model())), {"do": "compare"})
+
+
+@pytest.mark.parametrize("name", ["dance", ["turn"], None, "refuse"])
+def test_what_is_no_command_is_told_to_be_none(name: Any) -> None:
+    with pytest.raises(PlanError, match=r"is no command of the workbench: docs/workbench.md lists them"):
+        obey(bare(Bench(load(), model())), {"do": name})
+
+
+def test_the_page_knows_the_very_same_names() -> None:
+    scripts = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith(".js"))
+    said = {*re.findall(r'\bdo: "(\w+)"', scripts), *re.findall(r'command\("(\w+)"', scripts)}
+    never_said_so = {"undo", "redo", "resume", "pause", "feed", "flow"}  # by variables
+    assert {*COMMANDS, *OF_PRINTS} - said <= never_said_so
+    assert said <= {*COMMANDS, *OF_PRINTS}
+
+
+def test_the_documentation_lists_every_command_and_no_other() -> None:
+    rows = re.findall(r"^\| (`[^|]*) \|", DOCS.read_text("utf-8").partition("Below `/TOKEN/N/`")[2], re.MULTILINE)
+    assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} == {*COMMANDS, *OF_PRINTS}
