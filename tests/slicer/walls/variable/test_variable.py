@@ -157,6 +157,16 @@ def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: 
     assert widths.max() < 2.0 * NOZZLE + 1e-9
 
 
+@pytest.mark.parametrize("corners", [16, 48, 96])
+@pytest.mark.parametrize("diameter", [0.7, 1.5, 2.5])
+def test_the_rings_of_a_circle_never_turn_back(corners: int, diameter: float) -> None:
+    """The two sides at each of its points are as near to its middle as each other, but for rounding."""
+    for wall in variable_walls(Polygons.circle(0.5 * diameter, corners), RULE):
+        around = np.diff(np.unwrap(np.arctan2(*wall.course.points.T[::-1])))
+        assert (around > -1e-6).all()
+        assert around.sum() == pytest.approx(2.0 * np.pi)
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.integers(3, 7), st.floats(0.3, 2.0), st.floats(0, 90))
 def test_a_star_of_thin_arms_is_filled(arms: int, thickness: float, turn: float) -> None:
