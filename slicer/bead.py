@@ -15,6 +15,7 @@ from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 ROUND_SIDES = 1.0 - pi / 4.0
+EVEN_MM = 0.03  # widths that differ by less are one
 PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSlicer's resolution of G-code
 
 
@@ -24,6 +25,17 @@ class Course:
 
     points: Floats
     widths: Floats
+
+    @property
+    def width_mm(self) -> float:
+        """Mean width."""
+        means = 0.5 * (self.widths[1:] + self.widths[:-1])
+        return float(np.average(means, weights=np.hypot(*np.diff(self.points, axis=0).T)))
+
+    @property
+    def varies(self) -> bool:
+        """Whether its widths differ by more than EVEN_MM."""
+        return float(np.ptp(self.widths)) > EVEN_MM
 
 
 @dataclass(frozen=True, eq=False)

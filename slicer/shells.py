@@ -24,7 +24,7 @@ class Shell:
     """One layer of the part itself.
 
     process: the settings, with the extra walls of interfaces and overhangs and the widths of part 1's first layer; ending: inner
-    walls that end on the face of a cut; ironed: tops that are smoothed.
+    walls that end on the face of a cut, and what fills between them; ironed: tops that are smoothed.
     """
 
     process: Process

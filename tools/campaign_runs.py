@@ -105,7 +105,6 @@ def options_of(run: Run, file: Path) -> list[str]:
         "process.first_layer_height_mm": max(height_mm, min(0.2, round(0.7 * nozzle_mm, 3))),
         "process.infill_density": dice.choice(DENSITIES),
         "process.walls": dice.randint(1, 6),
-        "process.wall_generator": dice.choice(get_args(Process.model_fields["wall_generator"].annotation)),
         "process.support": "none" if support == "none" else "auto",
         **({} if support == "none" else {"process.support_style": support}),
         "process.scale": round(_scale(dice, longest_side_mm(file), machine, height_mm, copies), 3),

@@ -19,11 +19,6 @@ class Shell(Frozen):
         description="inner-first: the outer wall leans on finished plastic, best over overhangs; outer-first: nothing pushes it "
         "outward, best for fits",
     )
-    wall_generator: Literal["variable", "classic"] = Field(
-        "variable",
-        description="variable: as many walls side by side as fit and as wide as the place, 0.6 to 2 times the nozzle; classic: "
-        "all of one width, what is too narrow for a pair gets a line of its own",
-    )
     outer_bulge: float = Field(
         0.04,
         ge=0,

@@ -9,8 +9,9 @@ from profiles.process import Process
 from slicer.bead import PATH_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
 from slicer.fill.region import sparse_area
 from slicer.geometry.polygons import Polygons, contours, edges, islands, offset, opening
-from slicer.walls.gap import LEAST_GAP, LEAST_LINE
+from slicer.walls.gap import LEAST_GAP
 
+LEAST_LINE = 0.35  # of the line width: a thinner place of the section hardly ever gets a bead
 LEAST_REST_MM2 = 0.3  # smaller places between the walls hardly ever get a bead
 
 
@@ -86,7 +87,7 @@ def _walls(
     """Centrelines of so many walls, what each leaves, and what they enclose.
 
     Walls by offsets alone: a wall turns round where there is core behind it, and what neither it nor the core covers is
-    narrow (slicer/walls/walls.py has the exact rule).
+    narrow (slicer/walls/layer_walls.py has the exact rule).
     """
     loops: list[tuple[Floats, ...]] = []
     narrow: list[Extent] = []

@@ -78,9 +78,8 @@ def shell_strokes(shell: Shell, process: Process, speeds: LayerSpeeds) -> list[S
         kind, own = (Kind.INNER_WALL, width) if level else (Kind.OUTER_WALL, outer_wall_width_mm(process))
         flow = 1.0 if level else bulge_flow(own, height, 1, process.outer_bulge * own)
         strokes += loop_strokes(kind, loops, bead_area_mm2(own, height) * flow, process.small_wall_mm, speeds)
-    between = Kind.INNER_WALL if process.wall_generator == "variable" else Kind.GAP
     for level, place in enumerate(shell.narrow):
-        strokes += _narrow_strokes(between if level else Kind.OUTER_WALL, place, speeds)
+        strokes += _narrow_strokes(Kind.INNER_WALL if level else Kind.OUTER_WALL, place, speeds)
     if shell.ending.area_mm2 > 0.0:
         total = shell.ending.area_mm2 / spacing_mm(width, height)
         count = max(1, shell.ending.pieces) * max(1, process.walls - process.interface_walls)

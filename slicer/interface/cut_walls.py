@@ -15,6 +15,7 @@ from slicer.geometry.polygons import Polygons, close_loop, edges, offset
 from slicer.interface.model import Model
 from slicer.paths import Kind
 from slicer.travel.split import cut_line
+from slicer.walls.gap import gaps
 from slicer.walls.layer_walls import layer_walls
 from slicer.walls.walls import Walls, wall_rank, walls
 
@@ -23,7 +24,7 @@ REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cu
 
 @dataclass(frozen=True, eq=False)
 class CutWalls:
-    """walls: those that run round; ending: inner walls along the surface that end on a cut face's; inside: of both.
+    """walls: those that run round; ending: inner walls along the surface that end on a cut face's, and what fills between them.
 
     model_inside: what the walls would enclose if the model were not cut.
     """
@@ -61,8 +62,8 @@ def cut_walls(
         *(bead.points for bead in ending),
         *(close_loop(loop) for level in loops[process.interface_walls :] for loop in level),
     ]
-    narrow = round_.narrow + uncovered_area(round_.inside - inside, lines, width)
-    return CutWalls(replace(round_, loops=tuple(loops), narrow=narrow, inside=inside), tuple(ending), fewer.inside)
+    ending += gaps(uncovered_area(round_.inside - inside, lines, width), width, height_mm)
+    return CutWalls(replace(round_, loops=tuple(loops), inside=inside), tuple(ending), fewer.inside)
 
 
 def _is_closed(run: Floats) -> bool:

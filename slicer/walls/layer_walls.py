@@ -1,6 +1,6 @@
 """Islands: which pieces of a section need walls of varying width, and what all its walls enclose.
 
-An island that is nowhere narrower than its walls want gets the classic walls, which the variable ones would be too.
+An island that is nowhere narrower than its walls want gets walls of one width, which the variable ones would be too.
 """
 
 from itertools import chain
@@ -8,7 +8,6 @@ from itertools import chain
 from profiles.process import Process
 from slicer.bead import PATH_RESOLUTION_MM, length_mm, outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, close_loop, contours, difference, islands, offset, offset_round, opening, strips
-from slicer.walls.gap import LEAST_LINE
 from slicer.walls.variable.pieces import split_course
 from slicer.walls.variable.rule import FEATURE, ROOM, Rule
 from slicer.walls.variable.variable import Wall, variable_walls
@@ -30,10 +29,7 @@ def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) 
 
 def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_mm: float) -> Polygons:
     """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
-    if process.wall_generator == "classic":
-        least_mm = LEAST_LINE * process.line_width_mm
-    else:
-        least_mm = FEATURE * _least_mm(nozzle_mm, height_mm)
+    least_mm = FEATURE * _least_mm(nozzle_mm, height_mm)
     pieces = [] if section.is_empty() else islands(section)
     kept = [piece for piece in pieces if not _is_hair(piece, least_mm + HAIR_MM)]
     return section if len(kept) == len(pieces) else Polygons.compose(kept) if kept else Polygons()
@@ -50,26 +46,23 @@ def _least_mm(nozzle_mm: float, height_mm: float) -> float:
 
 
 def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:
-    """Up to `count` walls of a section, of varying width where the process wants them and islands are narrow."""
-    width, outer = process.line_width_mm, process.outer_wall_line_width_mm
-    if process.wall_generator == "classic" or count == 0:
-        return walls(section, count, width, height_mm, outer)
+    """Up to `count` walls of a section, of varying width where islands are narrow; 0: one where no line of a fill has room."""
     rule = bead_rule(count, process, height_mm, nozzle_mm)
     thick: list[Polygons] = []
     narrow: list[Polygons] = []
     for island in islands(section):
         (thick if _is_thick(island, rule) else narrow).append(island)
-    classic = walls(Polygons.compose(thick), count, width, height_mm, outer)
+    even = walls(Polygons.compose(thick), count, process.line_width_mm, height_mm, process.outer_wall_line_width_mm)
     if not narrow:
-        return classic
+        return even
     varying = tuple(chain.from_iterable(variable_walls(island, rule) for island in narrow))
     inside = _enclosed(Polygons.compose(narrow), varying, rule)
-    return Walls(classic.loops, classic.free, classic.narrow, classic.inside + inside, varying)
+    return Walls(even.loops, even.inside + inside, varying)
 
 
 def _wall_mm(rule: Rule) -> float:
     """How deep all walls reach."""
-    return 0.5 * rule.round + rule.outer + (rule.walls - 1) * rule.inner
+    return 0.5 * rule.round + rule.outer + (rule.walls - 1) * rule.inner if rule.walls else 0.0
 
 
 def _is_thick(island: Polygons, rule: Rule) -> bool:

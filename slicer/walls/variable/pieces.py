@@ -9,12 +9,11 @@ import numpy as np
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
-from slicer.bead import Course
+from slicer.bead import EVEN_MM, Course
 from slicer.geometry.segments import Segment, nearest_share
 from slicer.paths import bead_area_mm2
 from slicer.travel.combing import NOWHERE
 from slicer.travel.order import Placed
-from slicer.walls.variable.variable import EVEN_MM
 
 MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
 SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,

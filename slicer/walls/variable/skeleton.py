@@ -19,6 +19,7 @@ from slicer.geometry.triangulation import Triangulation
 SLOPE = 0.2164  # sine of 12.5 deg: sides that meet at less than 25 deg enclose a place that narrows, others a corner
 OPPOSITE = -0.8  # cosine of the angle between the ways to opposite sides, at most
 ON_SIDE_MM2 = 1e-9  # rounding: a node on a side is in both triangles
+TIE_MM = 1e-9  # rounding: of two feet as near, on the sides of a point of a circle round the node, the first is taken every time
 MOST_STEPS = 1000  # triangles on the way from one to its centre; usually none
 
 
@@ -133,7 +134,7 @@ def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -
         share = nearest_share(side, x, y)
         fx, fy = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
         away = np.hypot(fx - x, fy - y)
-        if away < least:
+        if away < least - TIE_MM:
             least = away
             out.feet[h, 0], out.feet[h, 1] = fx, fy
 

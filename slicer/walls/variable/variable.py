@@ -23,7 +23,6 @@ SHORTEST = 1.0  # nominal spacings: a shorter loop is none
 TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
 SEEN_RESOLUTION_MM = 0.004  # of outer walls, whose points are close where ribs are
 WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
-EVEN_MM = 0.03  # widths that differ by less are one
 DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
 DASH = 0.25
 SLACK_MM = 0.01  # by which a place may be narrower than the least bead
@@ -50,14 +49,6 @@ class Wall:
         if self.closed:
             return Course(close_loop(self.points), np.append(self.widths, self.widths[0]))
         return Course(self.points, self.widths)
-
-    @property
-    def width_mm(self) -> float:
-        """Mean width."""
-        course = self.course
-        return float(
-            np.average(0.5 * (course.widths[1:] + course.widths[:-1]), weights=np.hypot(*np.diff(course.points, axis=0).T))
-        )
 
 
 def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:

@@ -362,7 +362,6 @@ M73 P100 R0
 ; process.walls = 3
 ; process.overhang_extra_walls = 0
 ; process.wall_order = inner-first
-; process.wall_generator = variable
 ; process.outer_bulge = 0.04
 ; process.top_layers = 4
 ; process.bottom_layers = 4

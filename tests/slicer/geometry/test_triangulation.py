@@ -1,4 +1,4 @@
-"""Triangulations and chordal axes of polygons, judged by shapely's constrained Delaunay triangulation and by hand."""
+"""Triangulations of polygons, judged by shapely's constrained Delaunay triangulation."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats
-from slicer.geometry.chordal_axis import chordal_axis
 from slicer.geometry.polygons import Polygons, contours, resample
 from slicer.geometry.triangulation import _flip, triangulate
 from tests.slicer.hand import as_shapely, ragged
@@ -45,25 +44,3 @@ def test_points_on_one_circle_are_flipped_only_as_long_as_that_betters_them(corn
 
 def test_a_polygon_without_area_has_no_triangulation() -> None:
     assert triangulate([]) is None
-
-
-def test_the_axis_of_a_strip_runs_in_its_middle_with_its_width() -> None:
-    x = np.arange(0.0, 10.0, 0.5)
-    strip = np.concatenate([np.column_stack([x, 0 * x]), np.column_stack([x[::-1], 0 * x + 1.0])])
-    triangulation = triangulate([strip])
-    assert triangulation is not None
-    axis = chordal_axis(triangulation)
-    assert len(axis.starts) == 1
-    assert axis.points[:, 1] == pytest.approx(0.5)
-    assert axis.widths == pytest.approx(1.0)
-    assert axis.ends.tolist() == [[-1, -1]]
-    assert axis.areas == pytest.approx([9.5])
-
-
-def test_three_arms_meet_in_a_fork() -> None:
-    arm = Polygons.square((6.0, 1.0)).translate((0.0, -0.5))
-    star = arm + arm.rotate(120.0) + arm.rotate(240.0)
-    triangulation = triangulate(contours(star))
-    assert triangulation is not None
-    forks = chordal_axis(triangulation).ends.ravel()
-    assert sorted(np.unique(forks[forks >= 0], return_counts=True)[1].tolist())[-1] == 3

@@ -15,7 +15,7 @@ from tests.shapes import tee
 QUICK = ("search.directions=40", "search.beam_width=2", "process.layer_height_mm=0.4", "process.line_width_mm=0.8")
 VARIANTS = [
     (),
-    ("process.support=none", "process.wall_generator=variable"),
+    ("process.support=none",),
     ("search.objective=risky",),
     ("search.clearance=false",),
 ]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from slicer.bead import ROUND_SIDES, length_mm
 from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, edges, resample
+from slicer.geometry.polygons import Polygons, close_loop, edges, resample
 from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
 from slicer.slice import slice_part
@@ -28,7 +28,7 @@ from tests.shapes import from_manifold
 from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, volume_mm3, whole
 
 WIDTH, HEIGHT, NOZZLE = 0.45, 0.2, 0.4
-PROCESS = profile("process.wall_generator=variable").process
+PROCESS = profile().process
 RULE = bead_rule(3, PROCESS, HEIGHT, NOZZLE)
 Points = list[tuple[float, float]]
 
@@ -72,7 +72,7 @@ def test_a_plate_is_filled_from_side_to_side(thickness: float) -> None:
     walls = variable_walls(plate(thickness), RULE)
     middle = shapely.box(3, 0, 9, thickness)
     assert plastic(walls).intersection(middle).area > 0.995 * middle.area
-    spacings = sum(wall.width_mm - HEIGHT * ROUND_SIDES for wall in walls for _ in range(across([wall], 6.0)))
+    spacings = sum(wall.course.width_mm - HEIGHT * ROUND_SIDES for wall in walls for _ in range(across([wall], 6.0)))
     assert spacings + HEIGHT * ROUND_SIDES == pytest.approx(thickness, abs=0.02)
 
 
@@ -101,16 +101,23 @@ def test_a_wall_of_one_bead_is_an_outer_wall_that_does_not_run_round() -> None:
     assert bead.width_mm == pytest.approx(0.5, abs=0.005)
 
 
-def test_a_thick_island_has_the_classic_walls() -> None:
+def test_a_thick_island_has_walls_of_one_width() -> None:
     block = Polygons.square((20, 20))
-    both = [
-        layer_walls(block, 3, profile(f"process.wall_generator={each}").process, HEIGHT, NOZZLE)
-        for each in ("variable", "classic")
-    ]
-    assert both[0].varying == ()
-    assert [loop.tolist() for level in both[0].loops for loop in level] == [
-        loop.tolist() for level in both[1].loops for loop in level
-    ]
+    walled = layer_walls(block, 3, PROCESS, HEIGHT, NOZZLE)
+    assert walled.varying == ()
+    spacing = WIDTH - HEIGHT * ROUND_SIDES
+    sides = [np.ptp(loop[:, 0]) for loops in walled.loops for loop in loops]
+    assert sides == pytest.approx([20.0 - WIDTH - 2.0 * k * spacing for k in range(3)], abs=1e-6)
+
+
+def test_without_walls_a_place_too_narrow_for_a_fill_gets_one_bead_and_the_rest_stays_open() -> None:
+    block = Polygons.square((10, 10)) + Polygons.square((8, 0.5)).translate((10, 5))
+    walled = layer_walls(block, 0, PROCESS, HEIGHT, NOZZLE)
+    (line,) = walled.varying
+    assert line.course.width_mm == pytest.approx(0.5, abs=0.01)
+    assert line.points[:, 1] == pytest.approx(5.25, abs=0.1)
+    assert line.points[:, 0].min() > 9.4
+    assert walled.inside.area() == pytest.approx(100.0, rel=0.005)
 
 
 def test_a_wall_that_is_now_thicker_and_now_thinner_than_the_least_bead_is_laid_from_end_to_end() -> None:
@@ -157,25 +164,65 @@ def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: 
     assert widths.max() < 2.0 * NOZZLE + 1e-9
 
 
+def rest(section: Polygons) -> shapely.Geometry:
+    """What of a section neither walls nor what they enclose cover, but for slits of 0.02 mm, by shapely."""
+    walled = layer_walls(section, 3, PROCESS, HEIGHT, NOZZLE)
+    loops = [shapely.LineString(close_loop(loop)).buffer(0.5 * WIDTH) for level in walled.loops for loop in level]
+    filled = shapely.union_all([*loops, plastic(walled.varying), as_shapely(walled.inside)])
+    return as_shapely(section).difference(filled).buffer(-0.01).buffer(0.01)
+
+
+def largest_rest_mm2(section: Polygons) -> float:
+    return max((part.area for part in shapely.get_parts(rest(section))), default=0.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.3, 4.0), st.floats(0.3, 4.0), st.floats(4.0, 20.0))
+def test_a_tapering_plate_is_filled(start: float, end: float, length: float) -> None:
+    assert (
+        largest_rest_mm2(Polygons([np.array([[0, -start / 2], [length, -end / 2], [length, end / 2], [0, start / 2]])]))
+        < WIDTH**2
+    )
+
+
+@pytest.mark.parametrize(("thin", "over", "wide"), [(0.16, 0.7, 0.6), (0.16, 1.5, 1.0), (0.2, 1.0, 0.6), (0.25, 0.7, 0.6)])
+def test_a_thin_plate_that_widens_into_a_block_is_filled_up_to_its_walls(thin: float, over: float, wide: float) -> None:
+    half = [(0, thin / 2), (4, thin / 2), (4 + over, wide / 2), (4.5 + over, 3), (12, 3)]
+    shape = Polygons([np.array([(x, -y) for x, y in half] + half[::-1])])
+    parts = shapely.get_parts(rest(shape))
+    assert max((2 * shapely.maximum_inscribed_circle(part).length for part in parts), default=0.0) < WIDTH / 2
+
+
+@pytest.mark.parametrize("tip_deg", [15, 25, 32, 38])
+def test_the_tip_of_a_sharp_corner_is_filled(tip_deg: float) -> None:
+    half = 5.0 * np.tan(np.radians(0.5 * tip_deg))
+    assert largest_rest_mm2(Polygons([np.array([[0.0, 0.0], [5.0, -half], [5.0, half]])])) < WIDTH**2
+
+
+@pytest.mark.parametrize("corners", [16, 48, 96])
+@pytest.mark.parametrize("diameter", [0.7, 1.5, 2.5])
+def test_the_rings_of_a_circle_never_turn_back(corners: int, diameter: float) -> None:
+    """The two sides at each of its points are as near to its middle as each other, but for rounding."""
+    for wall in variable_walls(Polygons.circle(0.5 * diameter, corners), RULE):
+        around = np.diff(np.unwrap(np.arctan2(*wall.course.points.T[::-1])))
+        assert (around > -1e-6).all()
+        assert around.sum() == pytest.approx(2.0 * np.pi)
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.integers(3, 7), st.floats(0.3, 2.0), st.floats(0, 90))
 def test_a_star_of_thin_arms_is_filled(arms: int, thickness: float, turn: float) -> None:
     star = Polygons()
     for k in range(arms):
         star += Polygons.square((6, thickness)).translate((0, -thickness / 2)).rotate(360 * k / arms + turn)
-    walled = layer_walls(star, 3, PROCESS, HEIGHT, NOZZLE)
-    filled = shapely.union_all(
-        [plastic(walled.varying), as_shapely(walled.inside) if not walled.inside.is_empty() else shapely.Point()]
-    )
-    rest = as_shapely(star).difference(filled).buffer(-0.01).buffer(0.01)
-    assert max((part.area for part in shapely.get_parts(rest)), default=0.0) < WIDTH**2
+    assert largest_rest_mm2(star) < WIDTH**2
 
 
 def test_a_comb_gets_its_volume_within_its_walls_the_same_every_time() -> None:
     comb = m3.Manifold.cube((25, 3, 2))
     for k in range(10):
         comb += m3.Manifold.cube((0.3 + 0.1 * k, 8, 2)).translate((1 + 2.3 * k, 2.5, 0))
-    part, chosen = whole(from_manifold(comb)), profile(*SOLID, "process.elephant_foot_mm=0", "process.wall_generator=variable")
+    part, chosen = whole(from_manifold(comb)), profile(*SOLID, "process.elephant_foot_mm=0")
     sliced = slice_part(part, chosen)
     assert volume_mm3(sliced, *Kind) == pytest.approx(comb.volume(), rel=0.02)
     assert volume_mm3(sliced, Kind.GAP) < 0.01 * comb.volume()
