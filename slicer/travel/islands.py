@@ -24,7 +24,7 @@ def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> I
     """
     ranks = np.array([bead.rank for bead in beads], dtype=np.int32)
     starts = np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
-    torn_off = np.array([bead.kind in SUPPORTS for bead in beads])
+    torn_off = np.array([bead.kind in SUPPORTS for bead in beads], dtype=np.bool_)
     islands = np.where(ranks <= OUTSIDE, FIRST, 0).astype(np.int32)
     own, after = ranks > OUTSIDE, 0
     for wanted, area in ((own, section), (~own & torn_off, support)):

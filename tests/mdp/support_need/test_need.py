@@ -3,10 +3,13 @@
 import manifold3d as m3
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from mdp.mesh import Mesh
 from mdp.overhang import facing_down, risky_upright
 from mdp.ranking.candidates import directions
+from mdp.support_need.descent import ANCHOR_MM
 from mdp.support_need.need import SupportNeed, needs_support
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE
 from profiles.profile import load
@@ -14,6 +17,7 @@ from tests.shapes import standing
 
 PROCESS = load().process
 UP_DEG = 45.0
+TURN = st.floats(0.0, 360.0)
 
 
 def needing_mm2(solid: m3.Manifold) -> float:
@@ -80,6 +84,41 @@ def test_a_ridge_that_hangs_in_the_air_is_no_bank() -> None:
     shallow, deep = block(1, 4, 0.6, (0, 0, -0.5)), block(1, 4, 2.1, (0, 0, -2.0))
     assert needing_mm2(hanging(shallow)) == pytest.approx(5.6 * 4)
     assert needing_mm2(hanging(deep)) == pytest.approx(1.0 * 4)
+
+
+@settings(max_examples=15)
+@given(st.floats(0.1, 3.0), TURN)
+def test_a_ridge_is_an_anchor_where_it_goes_down_a_millimetre(depth: float, turn: float) -> None:
+    assume(abs(depth - ANCHOR_MM) > 0.01)
+    ridge = hanging(block(1, 4, depth + 0.1, (0, 0, -depth)))
+    assert needing_mm2(ridge.rotate((0, 0, turn))) == pytest.approx(5.6 * 4 if depth < 1.0 else 1.0 * 4)
+
+
+def test_a_deck_as_low_as_a_few_layers_is_anchored_where_its_pillars_stand_on_the_platform() -> None:
+    low = m3.Manifold.cube((20, 8, 3), True).translate((0, 0, 1.5)) - m3.Manifold.cube((10, 9, 0.8), True).translate((0, 0, 0.4))
+    assert needing_mm2(low) == 0.0
+
+
+def test_two_undersides_that_only_rest_on_each_other_both_need_support() -> None:
+    arm = block(10, 8, 20, (0, 0, 0)) + block(12, 8, 3, (11, 0, 12)) + block(2, 8, 1, (16, 0, 11.5))
+    assert needing_mm2(arm) == pytest.approx(12.0 * 8)  # half a millimetre lower at the free end
+
+
+@pytest.mark.parametrize(("side", "lean_deg", "area"), [(0.9, 0.0, 0.0), (1.1, 0.0, 1.21), (0.9, 40.0, 0.0), (1.1, 40.0, 1.58)])
+def test_what_is_smaller_than_the_least_area_as_the_nozzle_sees_it_carries_itself(
+    side: float, lean_deg: float, area: float
+) -> None:
+    """A peg under a ceiling whose end is cut off at an angle."""
+    assert PROCESS.support_least_mm2 == 1.0
+    peg = block(side, side, 10, (0, 0, -8)) - block(9, 9, 9, (0, 0, -9)).rotate((lean_deg, 0, 0)).translate((0, 0, -4))
+    assert needing_mm2(hanging(peg)) == pytest.approx(area, abs=0.01)
+
+
+def test_a_sheet_with_nothing_at_its_rim_has_no_anchor() -> None:
+    sheet = Mesh(
+        np.array([(0, 0, 9), (0, 1.2, 9), (1.2, 1.2, 9), (1.2, 0, 9)], np.float64), np.array([(0, 1, 2), (0, 2, 3)], np.int32)
+    )
+    assert needs_support(sheet, PROCESS, True).tolist() == [True, True]
 
 
 def mushroom() -> Mesh:

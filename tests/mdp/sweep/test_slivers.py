@@ -1,15 +1,20 @@
 import manifold3d as m3
 import numpy as np
 import pytest
+import trimesh
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import Reason, bounds_of, check, platform_disc, score_candidates
-from mdp.sweep.sweep import Remainder
+from mdp.sweep.slivers import SLIVER_COSINE, least_distance_mm
+from mdp.sweep.sweep import Remainder, sweep
 from profiles.profile import load
 from tests import shapes
+from tests.mdp.solids import random_direction, random_solid
 
 UP, SIDE = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
@@ -49,6 +54,41 @@ def test_a_plate_is_thin_below_one_millimetre(thickness_mm: float, distance_mm: 
 def test_an_acute_edge_is_no_thin_wall() -> None:
     wedge = m3.Manifold.extrude(m3.CrossSection([[(0, 0), (20, 0), (0, 20)]]), 20).rotate((90, 0, 0))
     assert _thin(shapes.standing(wedge), UP, 5.0) == [np.inf]
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 50), st.tuples(st.integers(1, 999), st.integers(1, 999)))
+def test_a_plane_is_as_fragile_as_the_nearest_surface_that_it_would_cut_into_a_sliver(seed: int, place: tuple[int, int]) -> None:
+    mesh, direction, step_mm = random_solid(seed), random_direction(*place), 0.7
+    swept = sweep(_remainder(mesh), direction[None], step_mm)
+    normals = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).vertex_normals[mesh.faces]
+    leaning = np.einsum("fki,fi->fk", normals, mesh.normals)
+    least = np.full(len(mesh.vertices), 1.0)
+    np.minimum.at(least, mesh.faces, leaning)
+    assume(np.abs(least - SLIVER_COSINE).min() > 1e-4)
+    smooth = least[mesh.faces] > SLIVER_COSINE
+    cosines = np.where(smooth, normals @ direction, (mesh.normals @ direction)[:, None])
+    heights = (mesh.vertices @ direction)[mesh.faces]
+    for column in range(int(swept.columns[0])):
+        offset = (swept.first[0] + column) * step_mm
+        over, under = (cosines > SLIVER_COSINE) & (heights > offset), (cosines < -SLIVER_COSINE) & (heights <= offset)
+        nearest = np.abs(heights - offset)[over | under].min(initial=np.inf)
+        assert swept.fragile_mm[0, column] == pytest.approx(nearest, abs=1e-9)
+
+
+def test_a_plane_through_a_ball_is_as_far_from_a_sliver_as_from_the_circle_where_the_ball_leans_23_degrees() -> None:
+    swept = sweep(_remainder(shapes.ball(10.0, 192)), UP[None], 1.0)
+    expected = [abs(abs(z - 10.0) - 10.0 * SLIVER_COSINE) for z in range(1, 20)]
+    assert swept.fragile_mm[0, :19] == pytest.approx(expected, abs=0.15)
+
+
+@pytest.mark.parametrize(("offset_mm", "distance_mm"), [(1.0, 2.0), (3.5, 0.0), (4.0, 0.0), (9.0, 3.0)])
+def test_a_plane_is_as_far_from_triangles_as_from_their_nearest_corner_and_at_none_where_it_meets_one(
+    offset_mm: float, distance_mm: float
+) -> None:
+    triangles = np.array([[(0, 0, 3), (1, 0, 4), (0, 1, 5)], [(0, 0, 5), (1, 0, 6), (0, 1, 6)]], np.float64)
+    assert least_distance_mm(triangles, Plane(UP, offset_mm)) == pytest.approx(distance_mm)
+    assert least_distance_mm(triangles[:0], Plane(UP, offset_mm)) == np.inf
 
 
 def test_only_a_sliver_forbids_a_plane_and_m5_is_less_near_a_fin_than_far_from_it() -> None:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from mdp.mesh import Floats
 from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, contours, offset
 from slicer.paths import Kind
@@ -29,6 +30,51 @@ def test_a_detour_never_leaves_the_section_and_is_no_longer_than_allowed(seed: i
             line = shapely.LineString([a, *detour, b])
             assert line.length <= np.hypot(*(b - a)) + most_mm + 1e-9
             assert safe.buffer(1e-6).covers(line)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10**6))
+def test_travels_leave_the_inside_where_shapely_says_so(seed: int) -> None:
+    section = ragged(seed)
+    safe = as_shapely(offset(section, -SAFE * WIDTH))
+    since, to = np.random.default_rng(seed).uniform(-20, 20, (2, 100, 2))
+    ways = shapely.linestrings(np.stack([since, to], axis=1))
+    assert np.array_equal(Combing(section, WIDTH).leaves(since, to), ~shapely.covers(safe, ways))
+
+
+def _ways_mm(a: Floats, b: Floats, obstacle: shapely.Geometry) -> list[float]:
+    """Lengths of the shorter and of the longer way past a convex obstacle between two points: the sides of what encloses all."""
+    around = shapely.convex_hull(shapely.union(obstacle, shapely.MultiPoint([a, b]))).exterior
+    one = abs(around.project(shapely.Point(a)) - around.project(shapely.Point(b)))
+    return sorted([one, around.length - one])
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10**6), st.integers(6, 12))
+def test_a_detour_past_a_convex_hole_is_the_shorter_way_round_pulled_taut(seed: int, corners: int) -> None:
+    random = np.random.default_rng(seed)
+    hole = Polygons.circle(6.0, corners).rotate(random.uniform(0, 360))
+    plate, turn, spread = Polygons.square((60.0, 60.0), True) - hole, random.uniform(0, 2 * np.pi), random.uniform(-0.7, 0.7)
+    a = random.uniform(9, 20) * np.array([np.cos(turn), np.sin(turn)])
+    b = -random.uniform(9, 20) * np.array([np.cos(turn + spread), np.sin(turn + spread)])
+    near, behind = (as_shapely(offset(hole, times * WIDTH)) for times in (SAFE, BEHIND))
+    assume(shapely.LineString([a, b]).crosses(near))
+    (least, _), (most, other) = _ways_mm(a, b, near), _ways_mm(a, b, behind)
+    assume(other > most + 1.0)  # which of two nearly equal ways is taken depends on how they lie along the border
+    detour = Combing(plate, WIDTH).detour(a, b, 1000.0)
+    assert detour is not None
+    assert least - 1e-6 <= shapely.LineString([a, *detour, b]).length <= most + 1e-6
+
+
+def test_a_detour_leads_past_several_holes_one_after_the_other() -> None:
+    holes = [Polygons.square((4.0, 4.0), True).translate((x, 0.0)) for x in (-10.0, 0.0, 10.0)]
+    plate = Polygons.square((50.0, 30.0), True) - Polygons.compose(holes)
+    a, b = np.array([-18.0, 0.5]), np.array([18.0, 0.5])
+    detour = Combing(plate, WIDTH).detour(a, b, 10.0)
+    edge = 2.0 + BEHIND * WIDTH
+    assert detour is not None
+    taut = 2 * np.hypot(8.0 - edge, edge - 0.5) + 2 * (10.0 + edge)
+    assert shapely.LineString([a, *detour, b]).length == pytest.approx(taut, abs=1e-6)
 
 
 def test_the_detour_round_a_square_hole_is_the_shortest_there_is() -> None:

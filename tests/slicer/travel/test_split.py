@@ -1,0 +1,99 @@
+"""Beads parted where they enter and leave a place: what shapely says lies in it, and nothing of the line lost."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.mesh import Floats
+from slicer.bead import Bead
+from slicer.geometry.polygons import Polygons, edges
+from slicer.paths import Kind
+from slicer.travel.order import Placed
+from slicer.travel.split import cut_line, split
+from tests.slicer.hand import as_shapely, ragged
+
+seeds = st.integers(0, 10**6)
+INSIDE = Kind.INNER_WALL
+
+
+def walk(seed: int, steps: int = 30) -> Floats:
+    """A line that wanders over a ragged section and out of it."""
+    return np.cumsum(np.random.default_rng(seed).normal(0.0, 5.0, (steps, 2)), axis=0)
+
+
+def placed(points: Floats, kind: Kind = Kind.OUTER_WALL) -> Placed:
+    return Placed(Bead(kind, points, 0.45, 0), points, True, np.array([(7.0, 7.0)]))
+
+
+def parted(line: Placed, place: Polygons, shortest_mm: float) -> list[Placed]:
+    return split([line], place, [Kind.OUTER_WALL], shortest_mm, lambda bead: replace(bead, kind=INSIDE))
+
+
+def length_mm(points: Floats) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+@settings(max_examples=40)
+@given(seeds)
+def test_as_much_of_a_line_is_marked_as_lies_within(seed: int) -> None:
+    place, line = ragged(seed), walk(seed)
+    pieces = parted(placed(line), place, 0.0)
+    inside = sum(length_mm(piece.points) for piece in pieces if piece.bead.kind is INSIDE)
+    assert inside == pytest.approx(shapely.LineString(line).intersection(as_shapely(place)).length, abs=1e-6)
+    kinds = [piece.bead.kind for piece in pieces]
+    assert all(a is not b for a, b in pairwise(kinds))
+
+
+@settings(max_examples=30)
+@given(seeds, st.floats(0.0, 8.0))
+def test_the_pieces_of_a_line_are_the_line_and_none_is_shorter_than_allowed(seed: int, shortest_mm: float) -> None:
+    line = walk(seed)
+    pieces = parted(placed(line), ragged(seed), shortest_mm)
+    ends = [(piece.points[0].tolist(), piece.points[-1].tolist()) for piece in pieces]
+    assert [begin for begin, _ in ends[1:]] == [end for _, end in ends[:-1]]
+    assert (ends[0][0], ends[-1][1]) == (line[0].tolist(), line[-1].tolist())
+    assert sum(length_mm(piece.points) for piece in pieces) == pytest.approx(length_mm(line))
+    assert all(np.array_equal(piece.points, piece.bead.points) for piece in pieces if len(pieces) > 1)
+    assert len(pieces) == 1 or min(length_mm(piece.points) for piece in pieces) >= shortest_mm - 1e-9
+    assert [(piece.retract, len(piece.approach)) for piece in pieces] == [(True, 1)] + [(False, 0)] * (len(pieces) - 1)
+
+
+@settings(max_examples=40)
+@given(seeds)
+def test_every_step_of_a_cut_line_lies_within_or_without_as_its_middle_does(seed: int) -> None:
+    place, sides = as_shapely(ragged(seed)), edges(ragged(seed))
+    sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]))]
+    points, within = cut_line(walk(seed), sides)
+    middles = 0.5 * (points[1:] + points[:-1])
+    clear = shapely.distance(place.boundary, shapely.points(middles)) > 1e-6
+    assert np.array_equal(within[clear], shapely.contains_xy(place, middles)[clear])
+
+
+SQUARE = Polygons.square((10.0, 10.0))
+
+
+@pytest.mark.parametrize(
+    ("corners", "kinds"),
+    [
+        ([(-5, 5), (15, 5)], [Kind.OUTER_WALL, INSIDE, Kind.OUTER_WALL]),
+        ([(2, 5), (8, 5)], [INSIDE]),
+        ([(-9, 5), (-1, 5)], [Kind.OUTER_WALL]),
+        ([(-5, 5), (0, 5), (5, 5)], [Kind.OUTER_WALL, INSIDE]),  # a corner on the border
+        ([(-3, 9.5), (0.5, 13)], [Kind.OUTER_WALL]),  # past a corner of the place
+        ([(-0.5, 5), (9, 5)], [INSIDE]),  # a millimetre outside would be too short a piece
+        ([(-5, 5), (0.5, 5)], [Kind.OUTER_WALL]),
+    ],
+)
+def test_lines_over_a_square(corners: list[tuple[float, float]], kinds: list[Kind]) -> None:
+    pieces = parted(placed(np.array(corners, np.float64)), SQUARE, 1.0)
+    assert [piece.bead.kind for piece in pieces] == kinds
+
+
+def test_beads_of_other_kinds_are_left_alone() -> None:
+    skin = placed(np.array([(-5.0, 5.0), (15.0, 5.0)]), Kind.INFILL)
+    assert parted(skin, SQUARE, 0.0) == [skin]
