@@ -38,6 +38,7 @@ class Layers(Frozen):
     first_layer_line_width_mm: float | None = Field(
         None, ge=0.1, le=4, description="width of all beads of part 1's first layer: wide ones stick; absent: as elsewhere, mm"
     )
+    first_layer_flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on extruded volume of part 1's first layer")
     outer_wall_line_width_mm: float | None = Field(
         None, ge=0.1, le=4, description="width of outer walls: narrow ones show finer detail; absent: line_width_mm, mm"
     )

@@ -50,9 +50,6 @@ class Motion(Frozen):
     gap_speed_mm_s: float = Field(
         30.0, gt=0, le=1000, description="speed of the lines in gaps between walls, mm/s: their width changes all the time"
     )
-    top_skin_monotonic: bool = Field(
-        True, description="the lines of the uppermost skins all lie on the same side of their neighbour: an even sheen"
-    )
     top_skin_speed_mm_s: float = Field(40.0, gt=0, le=1000, description="speed of the uppermost skins, mm/s: they are seen")
     small_wall_mm: float = Field(
         40.0, ge=0, le=1000, description="closed walls no longer than this are small, mm; 40: a hole of 13 mm"

@@ -34,6 +34,9 @@ class Shell(Frozen):
         le=100,
         description="least thickness of the layers under a surface, however thin they are: more layers then, mm",
     )
+    top_skin_monotonic: bool = Field(
+        True, description="the lines of the uppermost skins all lie on the same side of their neighbour: an even sheen"
+    )
     bottom_thickness_mm: float = Field(
         0.5, ge=0, le=100, description="least thickness of the layers over a surface that faces away, mm"
     )

@@ -29,7 +29,6 @@ class Support(Frozen):
         description="arches whose flat crown is no wider than this print without support, for each layer reaches little further "
         "than the one below; the crown of a level hole is 0.7 of its diameter wide, mm",
     )
-    first_layer_flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on extruded volume of part 1's first layer")
     bridge_flow: float = Field(
         1.0, ge=0.3, le=2, description="factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
     )

@@ -339,6 +339,7 @@ M73 P100 R0
 ; process.most_layer_height_mm = 0.28
 ; process.line_width_mm = 0.45
 ; process.first_layer_line_width_mm = None
+; process.first_layer_flow = 1.0
 ; process.outer_wall_line_width_mm = None
 ; process.top_skin_line_width_mm = None
 ; process.infill_line_width_mm = None
@@ -351,6 +352,7 @@ M73 P100 R0
 ; process.top_layers = 4
 ; process.bottom_layers = 4
 ; process.top_thickness_mm = 0.7
+; process.top_skin_monotonic = True
 ; process.bottom_thickness_mm = 0.5
 ; process.solid_below_mm2 = 70.0
 ; process.seam = aligned
@@ -371,7 +373,6 @@ M73 P100 R0
 ; process.overhang_share = 0.5
 ; process.bridge_longest_mm = 30.0
 ; process.arch_longest_mm = 6.0
-; process.first_layer_flow = 1.0
 ; process.bridge_flow = 1.0
 ; process.infill_bridge_flow = 1.0
 ; process.support = auto
@@ -426,7 +427,6 @@ M73 P100 R0
 ; process.first_layer_speed_mm_s = 20.0
 ; process.first_layer_infill_speed_mm_s = None
 ; process.gap_speed_mm_s = 30.0
-; process.top_skin_monotonic = True
 ; process.top_skin_speed_mm_s = 40.0
 ; process.small_wall_mm = 40.0
 ; process.small_wall_speed_mm_s = 25.0
