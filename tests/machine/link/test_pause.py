@@ -85,18 +85,24 @@ def planned(program: list[str]) -> np.ndarray:
     return np.array([[float(m[1]), float(m[2]), float(m[3])] for m in found if m])
 
 
-def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_modes() -> None:
+@pytest.fixture(scope="module")
+def paused() -> Watcher:
+    """A print that was paused at line 150 and went on."""
     watcher = watched()
     watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
     assert not watcher.run(PROGRAM).cancelled
-    lines = watcher.lines()
+    return watcher
+
+
+def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_modes(paused: Watcher) -> None:
+    lines = paused.lines()
     back = lines[lines.index("M114") :]
     after = back[back.index("M109 S200") : back.index("M114", 5)]
     assert not [line for line in back if re.search(r"[AC]-?\d", line)]  # neither to 5 nor to 725: the table never moves
     assert [line for line in after if line.startswith("G92")] == [f"G92 E{filament_before_pause(lines):.5f}"]
     assert {"G90", "M83", "G21", "G1 F1500", "M106 S128", "M204 P800 T1200"} <= set(after)
-    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
-    assert watcher.printer.record.end[-1, 4] == 725.0
+    assert np.abs(strokes(paused.printer) - planned(PROGRAM)).max() < 1e-6
+    assert paused.printer.record.end[-1, 4] == 725.0
 
 
 def filament_before_pause(lines: list[str]) -> float:
@@ -104,27 +110,18 @@ def filament_before_pause(lines: list[str]) -> float:
     return sum(float(m[1]) for line in lines[: lines.index("M400")] if (m := re.search(r" E(\S+)$", line)))
 
 
-def test_the_states_of_a_pause_are_told_in_order() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
-    watcher.run(PROGRAM)
-    told = list(dict.fromkeys(progress.state for progress in watcher.shown))
+def test_the_states_of_a_pause_are_told_in_order(paused: Watcher) -> None:
+    told = list(dict.fromkeys(progress.state for progress in paused.shown))
     assert told == ["printing", "pausing", "paused", "resuming", "finishing"]
 
 
-def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
-    watcher.run(PROGRAM)
-    asked = next(place for place, progress in enumerate(watcher.shown) if progress.acknowledged >= 150)
-    assert [progress.state for progress in watcher.shown[asked : asked + 2]] == ["printing", "pausing"]
+def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way(paused: Watcher) -> None:
+    asked = next(place for place, progress in enumerate(paused.shown) if progress.acknowledged >= 150)
+    assert [progress.state for progress in paused.shown[asked : asked + 2]] == ["printing", "pausing"]
 
 
-def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
-    watcher.run(PROGRAM)
-    lines = watcher.lines()
+def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside(paused: Watcher) -> None:
+    lines = paused.lines()
     stop = lines.index("M400")
     assert " E" in lines[stop - 1]
     assert lines[stop + 3 : stop + 5] == ["G21", "M83"]
