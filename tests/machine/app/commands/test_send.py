@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -98,7 +99,7 @@ STEPPERS = ("stepper_a", "stepper_b")
 ])  # fmt: skip
 def test_what_does_not_fit_is_refused_before_a_byte_is_sent(
     kind: str,
-    more: dict[str, object],
+    more: dict[str, Any],
     words: tuple[object, ...],
     sentence: str,
     tmp_path: Path,
