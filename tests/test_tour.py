@@ -75,7 +75,7 @@ def test_the_check_tells_what_exists_from_what_does_not() -> None:
         "machine.planning.plan.plan(decomposition, sliced, profile, stops)",
         "machine.gcode.writer.write_gcode(program, profile)",
         "machine.reader.parse.parse_gcode(lines, machine)",
-        "machine.dryrun.dryrun.dry_run(lines, profile, found)",
+        "machine.dryrun.dryrun.dry_run(lines, profile, known)",
         "profiles.profile.load(machine, material, process, settings)",
     ],
 )
