@@ -52,6 +52,7 @@ POSES = ((0, 0), (30, 725), (-20, 360))
 LAYERS, STROKES = 16, 40
 SPEED = 500.0  # times real time, of every other printer: its planner is full when the host dies
 BAUD, RING = 115200, 128
+IN_DOUBT = "height in doubt, asked"  # one end of a power cut
 LIFT_MM, GROUP = 0.6, 10  # every tenth stroke is reached by a lifted travel
 
 
@@ -286,7 +287,7 @@ def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float,
             print_lines(text, PATH, BAUD, journal=written, profile=PROFILE, begin=begin, medium=medium)
     except JournalError as refused:
         return Result(f"refused: {str(refused).partition(': ')[2].partition(',')[0]}", done, done)
-    how = "hardly begun: anew" if not point.stroked else "height in doubt, asked" if doubts else "height known"
+    how = "hardly begun: anew" if not point.stroked else IN_DOUBT if doubts else "height known"
     return judged_cut(how, done, moves_of(printer), whole)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.gcode.modes import E_AXIS
-from machine.reader.state import ROW, Reader
+from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, LINE, ROW, Reader
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 
@@ -20,7 +20,7 @@ Bytes = NDArray[np.uint8]
 
 LONGEST = 200
 MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
-NONE, FEED = -1, 6  # what a letter stands for, besides the axes 0 to 5
+NONE, F = -1, 6  # what a letter stands for, besides the axes 0 to 5
 MOST_AT_ONCE = 4096  # lines
 
 
@@ -32,7 +32,7 @@ class Text(NamedTuple):
 
 
 class Meaning(NamedTuple):
-    """What words mean during a run. letters: (256,) axis, FEED or NONE of each byte.
+    """What words mean during a run. letters: (256,) axis, F or NONE of each byte.
 
     units, steps, offset: (6,) as those of Modes; row: (ROW,) a row with what the comments said. rapid: G0 is as fast as can be.
     """
@@ -57,7 +57,7 @@ def text_of(lines: Sequence[str]) -> Text:
 def letters_of(reader: Reader) -> NDArray[np.int8]:
     """(256,) what each letter stands for in a move."""
     letters = np.full(256, NONE, dtype=np.int8)
-    letters[ord("F")] = FEED
+    letters[ord("F")] = F
     for letter, axis in reader.letters.items():
         letters[ord(letter)] = axis
     return letters
@@ -71,8 +71,7 @@ def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], firs
     modes = reader.modes
     if reader.flow != 1.0 or reader.filament_mm2 or modes.inverse_time or reader.turning or reader.ended:
         return first
-    remarks = (0.0, reader.part, reader.layer, reader.type, reader.width, reader.height, reader.printing, reader.followed)
-    row = np.array([0.0, *reader.at, *reader.at, *remarks])
+    row = np.array([0.0, *reader.at, *reader.at, 0.0, *reader.remarks(reader.printing)])
     meaning = Meaning(
         letters, np.array(modes.units), np.array(modes.steps), np.array(modes.offset), row,
         reader.feed_share, bool(reader.dialect.rapid), reader.travelling,
@@ -101,24 +100,24 @@ def _read_run(text: Text, meaning: Meaning, first: int, place: Floats, rows: Flo
         for k in range(ROW):
             rows[count, k] = meaning.row[k]
         for k in range(6):
-            rows[count, 1 + k] = place[k]
+            rows[count, BEFORE + k] = place[k]
         moved = False
         for k in range(word_count):
             axis, value = int(words[k, 0]), words[k, 1]
-            if axis == FEED:
-                place[FEED] = value * meaning.units[0]
+            if axis == F:
+                place[F] = value * meaning.units[0]
                 continue
             moved = True
             value *= meaning.units[axis]
             place[axis] = place[axis] + value if meaning.steps[axis] else value - meaning.offset[axis]
         if moved:
-            rows[count, 0] = line + 1
+            rows[count, LINE] = line + 1
             for k in range(6):
-                rows[count, 7 + k] = place[k]
+                rows[count, AFTER + k] = place[k]
             quick = meaning.rapid and text.text[begin + 1] == 48
-            rows[count, 13] = inf if quick else place[FEED] * meaning.feed_share
-            if rows[count, 1 + E_AXIS] == rows[count, 7 + E_AXIS]:
-                rows[count, 19] = meaning.travelling
+            rows[count, FEED] = inf if quick else place[F] * meaning.feed_share
+            if rows[count, BEFORE + E_AXIS] == rows[count, AFTER + E_AXIS]:
+                rows[count, ACCELERATION] = meaning.travelling
             count += 1
         line += 1
     return line, count
@@ -159,7 +158,7 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
         for _ in range(behind):
             divisor *= 10.0
         value = whole / divisor
-        if axis == FEED and (negative or value <= 0.0):
+        if axis == F and (negative or value <= 0.0):
             return -1
         words[count, 0], words[count, 1] = axis, -value if negative else value
         count += 1

@@ -6,14 +6,15 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.firmware import Dialect, dialect_of
-from machine.gcode.modes import Modes, axes_of
+from machine.gcode.modes import E_AXIS, Modes, axes_of
 from machine.gcode.part_totals import PartTotals
 from machine.gcode.words import Word
 from machine.reader.parsed import OWN, Event, Unheld
 from profiles.machine import Machine
 
 DEFAULT_FEED = 1500.0
-ROW = 21  # line, 6 places before, 6 after, feed, part, layer, type, width, height, acceleration, followed
+# Columns of a row; BEFORE and AFTER are the first of six places, ROW is how many columns there are.
+LINE, BEFORE, AFTER, FEED, PART, LAYER, TYPE, WIDTH, HEIGHT, ACCELERATION, FOLLOWED, ROW = 0, 1, 7, *range(13, 22)
 Words = list[Word]
 
 
@@ -63,10 +64,12 @@ class Reader:
 
     def row(self, before: list[float], feed: float) -> None:
         """A move from a place to where the machine is now."""
-        at = self.at
-        acceleration = self.printing if at[5] != before[5] else self.travelling
-        remarks = (feed, self.part, self.layer, self.type, self.width, self.height, acceleration, self.followed)
-        self.rows.extend((self.number, *before, *at, *remarks))
+        acceleration = self.printing if self.at[E_AXIS] != before[E_AXIS] else self.travelling
+        self.rows.extend((self.number, *before, *self.at, feed, *self.remarks(acceleration)))
+
+    def remarks(self, acceleration: float) -> tuple[float, ...]:
+        """The columns of a row from PART on."""
+        return (self.part, self.layer, self.type, self.width, self.height, acceleration, self.followed)
 
     def note(self, code: str, value: float, letters: str) -> None:
         """Put an event on record, before the next row."""

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.gcode.modes import E_AXIS
 from machine.kinematics.coordinates import axis_positions
 from machine.planning.timing import axis_speeds, lengths
 from machine.reader.parsed import Event, MoveKind, ParsedProgram
-from machine.reader.state import ROW, Reader
+from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, FOLLOWED, HEIGHT, LAYER, LINE, PART, ROW, TYPE, WIDTH, Reader
 from mdp.mesh import Floats
 
 STILL = 1e-9
@@ -28,7 +29,7 @@ class _Rows:
     @property
     def e_mm(self) -> Floats:
         """(n,) filament pushed."""
-        pushed: Floats = self.read[:, 12] - self.read[:, 6]
+        pushed: Floats = self.read[:, AFTER + E_AXIS] - self.read[:, BEFORE + E_AXIS]
         return pushed
 
     def change(self) -> Floats:
@@ -39,9 +40,10 @@ class _Rows:
 def parsed_program(reader: Reader) -> ParsedProgram:
     """All that was read."""
     read = np.array(reader.rows, dtype=np.float64).reshape(-1, ROW)
-    rows = _Rows(read, read[:, 1:6], read[:, 7:12], read[:, 13], tuple(reader.events))
+    start, end = (read[:, first : first + E_AXIS] for first in (BEFORE, AFTER))
+    rows = _Rows(read, start, end, read[:, FEED], tuple(reader.events))
     asked = _feed_length(rows.change(), reader.dialect.largest_delta)
-    followed = np.flatnonzero(read[:, 20] > 0)
+    followed = np.flatnonzero(read[:, FOLLOWED] > 0)
     if len(followed):
         rows = replace(rows, start=rows.start.copy(), end=rows.end.copy())
         for side in (rows.start, rows.end):
@@ -52,11 +54,11 @@ def parsed_program(reader: Reader) -> ParsedProgram:
     if len(followed):
         rows = _merge_turns(keep, rows, change)
         change = rows.change()
-    whole = rows.read[:, [0, 14, 15, 16]].astype(np.int64)
+    whole = rows.read[:, [LINE, PART, LAYER, TYPE]].astype(np.int64)
     return ParsedProgram(
         line=whole[:, 0], start=rows.start, end=rows.end, e_mm=rows.e_mm, filament_mm=np.cumsum(rows.e_mm), feed=rows.feed,
         kind=_kinds(change), part=whole[:, 1], layer=whole[:, 2], type=whole[:, 3], types=tuple(reader.types),
-        width_mm=rows.read[:, 17], height_mm=rows.read[:, 18], acceleration=rows.read[:, 19],
+        width_mm=rows.read[:, WIDTH], height_mm=rows.read[:, HEIGHT], acceleration=rows.read[:, ACCELERATION],
         events=rows.events, ignored=reader.ignored,
         layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
         announced=reader.announced, part_totals=tuple(reader.part_totals),

@@ -13,17 +13,13 @@ COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
 
 def move(board: Board, words: WordValues, text: str) -> Work:
     """G0, G1; the caller has made sure of a free block."""
-    motion, pushes = board.motion, True
+    motion = board.motion
     if board.must_home and (unhomed := motion.unhomed(words)) is not None:
         board.say(board.rules.unhomed.format(_coordinates(unhomed)))
         return None
-    if "E" in words and not board.cold_allowed and board.nozzle.at(board.now_s) < COLD_C:
-        pushes = not motion.pushes(words)
-        if not pushes:
-            for line in board.rules.cold:
-                board.say(line)
-            if not board.rules.cold_moves:
-                return None
+    pushes = _pushes(board, words)
+    if not (pushes or board.rules.cold_moves):
+        return None
     if board.rules.out_of_range and (beyond := motion.beyond(words)) is not None:
         board.say(board.rules.out_of_range.format(_coordinates(beyond)))
         return None
@@ -32,6 +28,15 @@ def move(board: Board, words: WordValues, text: str) -> Work:
         return _run(board, pieces)
     motion.reach(pieces[0], board.now_s)
     return None
+
+
+def _pushes(board: Board, words: WordValues) -> bool:
+    """Whether its filament is pushed too; when the nozzle is too cold for it, that is said."""
+    if "E" not in words or board.cold_allowed or board.nozzle.at(board.now_s) >= COLD_C or not board.motion.pushes(words):
+        return True
+    for line in board.rules.cold:
+        board.say(line)
+    return False
 
 
 def _coordinates(place: Sequence[float]) -> str:
@@ -52,11 +57,7 @@ def _run(board: Board, pieces: Sequence[Sequence[float]]) -> Iterator[float]:
 
 
 def _arc(board: Board, words: WordValues, text: str) -> Work:
-    pushes = "E" not in words or board.cold_allowed or board.nozzle.at(board.now_s) >= COLD_C or not board.motion.pushes(words)
-    if not pushes:
-        for line in board.rules.cold:
-            board.say(line)
-    pieces = board.motion.arc(words, text.startswith("G2"), pushes)
+    pieces = board.motion.arc(words, text.startswith("G2"), _pushes(board, words))
     if not pieces:
         board.say("echo: Bad arc parameters")
     return _run(board, pieces)

@@ -29,7 +29,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class _Told:
+class _Moves:
     """What the rows tell of m lines: moved (m,), whether any is of the line; axes (3, m), step and total of filament (m,)."""
 
     moved: Mask
@@ -37,8 +37,8 @@ class _Told:
     step: Wholes
     total: Wholes
 
-    def between(self, first: int, end: int) -> "_Told":
-        return _Told(self.moved[first:end], self.axes[:, first:end], self.step[first:end], self.total[first:end])
+    def between(self, first: int, end: int) -> "_Moves":
+        return _Moves(self.moved[first:end], self.axes[:, first:end], self.step[first:end], self.total[first:end])
 
 
 def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dict[str, Any] | None, dict[str, Column]]:
@@ -49,7 +49,7 @@ def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dic
     pushed = np.concatenate([[0], whole(rows["filament"])])
     zeros, zero = _zeros(lines, pushed[last])
     axes = np.concatenate([np.zeros((1, 3), dtype=np.int64), whole(rows["end"])[:, :3]])[last].T
-    moves = _Told(last > first, axes, pushed[last] - pushed[first], pushed[last] - zero)
+    moves = _Moves(last > first, axes, pushed[last] - pushed[first], pushed[last] - zero)
     places: dict[str, int] = {}
     numbers: list[int] = []
     for begin in range(0, len(lines), LINES_AT_ONCE):
@@ -85,7 +85,7 @@ def _zero(line: str, pushed: int, before: int) -> int:
     return before
 
 
-def _with_holes(text: str, moves: _Told) -> str:
+def _with_holes(text: str, moves: _Moves) -> str:
     """The lines with a hole instead of every number that the rows tell."""
     letters = np.frombuffer(text.encode(), dtype=np.uint8)
     breaks = np.flatnonzero((letters == SPACE) | (letters == BREAK))

@@ -2,7 +2,6 @@
 
 import base64
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,16 +18,10 @@ from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.test_browser import opened, program, put, row, text
 from tests.machine.test_workbench_page import open_model, saved
 from tests.machine.view.test_text import FOREIGN
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.workbench import Running
 from tests.shapes import box, tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
 
 
 @pytest.fixture

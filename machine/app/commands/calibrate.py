@@ -45,12 +45,9 @@ def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
     sheet = read_sheet(measured, request.mark_height_mm)
     if sheet.machine not in (None, name):
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
-    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
-    show(_comparison(machine, calibration, sheet.mark_angle_deg is not None))
-    if calibration.rms_mm > MOST_OFF_MM and not request.force:
-        raise ProfileError(
-            f"{_off(calibration)}, at most {MOST_OFF_MM:g} mm is taken without --force: look at touch {calibration.worst} first"
-        )
+    calibration, off = _calibrated(request, machine, sheet)
+    if off:
+        raise ProfileError(f"{off}: look at touch {calibration.worst} first")
     _save(request, machine, calibration, sheet)
     return 0
 
@@ -63,12 +60,11 @@ def ask_for_touches(request: CalibrationRequest) -> int:
 
     def judge(sheet: Sheet) -> str | int | None:
         try:
-            calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
+            calibration, off = _calibrated(request, machine, sheet)
         except ProfileError as error:  # the person is asked again
             return str(error)
-        show(_comparison(machine, calibration, sheet.mark_angle_deg is not None))
-        if calibration.rms_mm > MOST_OFF_MM and not request.force:
-            show(f"{_off(calibration)}, at most {MOST_OFF_MM:g} mm is taken without --force\n")
+        if off:
+            show(f"{off}\n")
             return calibration.worst
         accepted.append(calibration)
         return None
@@ -91,8 +87,14 @@ def _tilting(request: CalibrationRequest) -> Machine:
     return machine
 
 
-def _off(calibration: Calibration) -> str:
-    return f"the touches are {calibration.rms_mm:.2f} mm off on average"
+def _calibrated(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple[Calibration, str]:
+    """What follows from the touches, which is shown, and why it is not taken; "" when it is."""
+    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
+    show(_comparison(machine, calibration, sheet.mark_angle_deg is not None))
+    if calibration.rms_mm <= MOST_OFF_MM or request.force:
+        return calibration, ""
+    off = f"the touches are {calibration.rms_mm:.2f} mm off on average"
+    return calibration, f"{off}, at most {MOST_OFF_MM:g} mm is taken without --force"
 
 
 def _save(request: CalibrationRequest, machine: Machine, calibration: Calibration, sheet: Sheet) -> None:

@@ -62,12 +62,10 @@ def ask_touches(name: str, machine: Machine, height_mm: float, radius_mm: float 
         verdict = judge(sheet)
         if verdict is None:
             return sheet
-        if isinstance(verdict, int):
-            sys.stdout.write(f"look at touch {numbers[verdict - 1] + 1} again\n")
-        else:
-            sys.stdout.write(f"{verdict}\n")
-        place = 2 + 3 * (numbers[verdict - 1] if isinstance(verdict, int) else len(questions) // 3 - 1)
-        enough = place + 3 if isinstance(verdict, int) else -1
+        doubtful = numbers[verdict - 1] if isinstance(verdict, int) else None
+        sys.stdout.write(f"{verdict}\n" if doubtful is None else f"look at touch {doubtful + 1} again\n")
+        place = 2 + 3 * (len(questions) // 3 - 1 if doubtful is None else doubtful)
+        enough = -1 if doubtful is None else place + 3
 
 
 def _ask(questions: Sequence[Question], place: int, answers: list[Answer], known: int) -> int:

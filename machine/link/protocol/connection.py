@@ -18,7 +18,8 @@ from machine.link.protocol.timeout import Timeouts, Timing
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, GREETING_LINES, Window
 from profiles.errors import LocalProtocolError, PrinterError
 
-GREETING_STATES = (State.DRAIN, State.SYNC, State.HELLO)
+BEFORE_NUMBERS = (State.DRAIN, State.SYNC)  # an error is of what came before: no line of ours has a number yet
+GREETING_STATES = (*BEFORE_NUMBERS, State.HELLO)
 
 
 class Connection:
@@ -126,10 +127,7 @@ class Connection:
                 self._handle_ok(event, now_s)
             case events.Resend() if self.state is not State.SYNC:
                 self._handle_resend(event, now_s)
-            case events.LineError() if self.state in (
-                State.DRAIN,
-                State.SYNC,
-            ):  # of what came before the first number
+            case events.LineError() if self.state in BEFORE_NUMBERS:
                 self.greeting.heard = event.text
             case events.LineError():
                 self._oks.expect_resend_ok(self._timeouts.hear_line_error(now_s))
@@ -156,7 +154,7 @@ class Connection:
         self.window.rx_bytes = self.greeting.rx_bytes
 
     def _handle_ok(self, ok: events.Ok, now_s: float) -> None:
-        """What an `ok` answers depends on the state: M110, a events.Resend, or a line in flight."""
+        """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
         unknown = self._oks.take_unknown()
         if ok.line is not None:
             self._flow.learn(ok.rx_free)
@@ -168,7 +166,7 @@ class Connection:
                 self._follow(Signal.SYNCED, now_s)
         elif self.state is State.QUIET:
             if self.resends.alone and ok.line is None and ok.temperature is None:
-                self._follow(Signal.HUSH, now_s)  # the ok that belongs to the events.Resend, and nothing else is on its way
+                self._follow(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way
         elif self.state is State.RENUMBER:
             if self._oks.answers_m110(ok, self.advanced, unknown, now_s):
                 self.window.restart_numbers()

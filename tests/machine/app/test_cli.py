@@ -275,18 +275,8 @@ def _program(folder: Path) -> Path:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path, number: int) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "machine.app.cli",
-        "print",
-        str(_program(folder)),
-        "--port",
-        "sim",
-        "--sim-speed",
-        "20",
-        "--force",
-    ]
+    options = ["--port", "sim", "--sim-speed", "20", "--force"]
+    command = [sys.executable, "-m", "machine.app.cli", "print", str(_program(folder)), *options]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3])
     assert process.stderr is not None
     _wait_for(process, "printing:")

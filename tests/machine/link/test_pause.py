@@ -1,8 +1,9 @@
 """Pause, overrides, user lines, cancel, emergency stop, a lost port: on a simulated printer whose time is its own."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from threading import Event as Flag
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,21 +30,25 @@ BODY = [
 PROGRAM = [*START, *POSED, *BODY, "M104 S0", "M140 S0"]
 
 
+Act = Command | tuple[Any, ...] | Callable[[], object]  # what a person asks for: command, value, text
+
+
 class Watcher:
     """Asks for things when the print has come to a line or a state, and remembers what was shown and sent."""
 
-    def __init__(self, printer: VirtualPrinter, profile: Profile = PROFILE) -> None:
+    def __init__(self, printer: VirtualPrinter, profile: Profile = PROFILE, when: Mapping[str | int, Act] | None = None) -> None:
         self.printer, self.control, self.profile = printer, Control(), profile
         self.shown: list[Progress] = []
         self.sent = b""
-        self.when: dict[str | int, Callable[[], None]] = {}
+        self.when = dict(when or {})
 
     def see(self, progress: Progress) -> None:
         self.shown.append(progress)
         line = next((at for at in self.when if isinstance(at, int) and progress.file_line >= at), None)
         for key in (line, progress.state):
             if key is not None and key in self.when:
-                self.when.pop(key)()
+                act = self.when.pop(key)
+                act() if callable(act) else self.control.ask(*act) if isinstance(act, tuple) else self.control.ask(act)
 
     def traffic(self, direction: str, data: bytes) -> None:
         self.sent += data if direction == ">" else b""
@@ -67,9 +72,9 @@ class Watcher:
         return lambda: self.control.ask(wish, value, text)
 
 
-def watched(faults: tuple[Fault, ...] = (), seed: int = 1, profile: Profile = PROFILE) -> Watcher:
-    script = FaultScript(faults, seed) if faults else None
-    return Watcher(VirtualPrinter(profile.machine, faults=script, most_s=20000.0), profile)
+def watched(when: Mapping[str | int, Act] | None = None, *faults: Fault, profile: Profile = PROFILE) -> Watcher:
+    script = FaultScript(faults, 1) if faults else None
+    return Watcher(VirtualPrinter(profile.machine, faults=script, most_s=20000.0), profile, when)
 
 
 def strokes(printer: VirtualPrinter) -> np.ndarray:
@@ -85,18 +90,28 @@ def planned(program: list[str]) -> np.ndarray:
     return np.array([[float(m[1]), float(m[2]), float(m[3])] for m in found if m])
 
 
-def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_modes() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
+def is_exact(watcher: Watcher) -> bool:
+    """Whether every stroke lies where the program wants it, in the real places of the axes."""
+    return bool(np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6)
+
+
+@pytest.fixture(scope="module")
+def paused() -> Watcher:
+    """A print that was paused at line 150 and went on."""
+    watcher = watched({150: Command.PAUSE, "paused": Command.RESUME})
     assert not watcher.run(PROGRAM).cancelled
-    lines = watcher.lines()
+    return watcher
+
+
+def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_modes(paused: Watcher) -> None:
+    lines = paused.lines()
     back = lines[lines.index("M114") :]
     after = back[back.index("M109 S200") : back.index("M114", 5)]
     assert not [line for line in back if re.search(r"[AC]-?\d", line)]  # neither to 5 nor to 725: the table never moves
     assert [line for line in after if line.startswith("G92")] == [f"G92 E{filament_before_pause(lines):.5f}"]
     assert {"G90", "M83", "G21", "G1 F1500", "M106 S128", "M204 P800 T1200"} <= set(after)
-    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
-    assert watcher.printer.record.end[-1, 4] == 725.0
+    assert is_exact(paused)
+    assert paused.printer.record.end[-1, 4] == 725.0
 
 
 def filament_before_pause(lines: list[str]) -> float:
@@ -104,27 +119,18 @@ def filament_before_pause(lines: list[str]) -> float:
     return sum(float(m[1]) for line in lines[: lines.index("M400")] if (m := re.search(r" E(\S+)$", line)))
 
 
-def test_the_states_of_a_pause_are_told_in_order() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
-    watcher.run(PROGRAM)
-    told = list(dict.fromkeys(progress.state for progress in watcher.shown))
+def test_the_states_of_a_pause_are_told_in_order(paused: Watcher) -> None:
+    told = list(dict.fromkeys(progress.state for progress in paused.shown))
     assert told == ["printing", "pausing", "paused", "resuming", "finishing"]
 
 
-def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
-    watcher.run(PROGRAM)
-    asked = next(place for place, progress in enumerate(watcher.shown) if progress.acknowledged >= 150)
-    assert [progress.state for progress in watcher.shown[asked : asked + 2]] == ["printing", "pausing"]
+def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way(paused: Watcher) -> None:
+    asked = next(place for place, progress in enumerate(paused.shown) if progress.acknowledged >= 150)
+    assert [progress.state for progress in paused.shown[asked : asked + 2]] == ["printing", "pausing"]
 
 
-def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
-    watcher.run(PROGRAM)
-    lines = watcher.lines()
+def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside(paused: Watcher) -> None:
+    lines = paused.lines()
     stop = lines.index("M400")
     assert " E" in lines[stop - 1]
     assert lines[stop + 3 : stop + 5] == ["G21", "M83"]
@@ -136,9 +142,8 @@ def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_asid
 
 @pytest.mark.parametrize("written", [str.lower, lambda line: line.replace("G1 ", "G01 ").replace(" E", "E")])
 def test_a_pause_begins_at_a_travel_however_the_strokes_are_written(written: Callable[[str], str]) -> None:
-    watcher = watched()
+    watcher = watched({150: Command.PAUSE, "paused": Command.RESUME})
     body = [written(line) if "E" in line else line for line in BODY]
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
     watcher.run([*START, *POSED, *body])
     lines = watcher.lines()
     following = next(line for line in lines[lines.index("M400") :] if line in body)
@@ -147,17 +152,15 @@ def test_a_pause_begins_at_a_travel_however_the_strokes_are_written(written: Cal
 
 @pytest.mark.parametrize("action", ["pause", "cancel"])
 def test_the_printer_may_ask_for_a_pause_or_the_end(action: str) -> None:
-    watcher = watched()
-    speak = [watcher.printer.firmware]
-    watcher.when = {150: lambda: speak[0]._said.append(f"//action:{action}"), "paused": watcher.ask(Command.RESUME)}
+    watcher = watched({"paused": Command.RESUME})
+    watcher.when[150] = lambda: watcher.printer.firmware._said.append(f"//action:{action}")
     outcome = watcher.run(PROGRAM)
     assert outcome.cancelled == (action == "cancel")
     assert any(progress.state == "pausing" for progress in watcher.shown) == (action == "pause")
 
 
 def test_cancelling_lifts_the_tip_and_neither_homes_nor_turns() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.CANCEL)}
+    watcher = watched({150: Command.CANCEL})
     outcome = watcher.run(PROGRAM)
     record = watcher.printer.record
     assert (outcome.cancelled, outcome.heaters_off) == (True, True)
@@ -176,23 +179,21 @@ def test_an_error_that_leaves_the_printer_alive_lifts_the_tip_too() -> None:
 
 
 def test_a_printer_that_has_stopped_by_itself_is_not_moved() -> None:
-    watcher = watched((Fault("error", at=150, unit="line", text="Error:Thermal Runaway, system stopped! Heater_ID: 0"),))
+    watcher = watched({}, Fault("error", at=150, unit="line", text="Error:Thermal Runaway, system stopped! Heater_ID: 0"))
     with pytest.raises(FirmwareError, match="Thermal Runaway, system stopped"):
         watcher.run(PROGRAM)
     assert "G91" not in watcher.lines()
 
 
 def test_a_cancel_while_the_tip_is_parked_leaves_it_there() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.CANCEL)}
+    watcher = watched({150: Command.PAUSE, "paused": Command.CANCEL})
     outcome = watcher.run(PROGRAM)
     assert outcome.heaters_off
     assert "G91" not in watcher.lines()
 
 
 def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() -> None:
-    watcher = watched()
-    watcher.when = {150: watcher.ask(Command.EMERGENCY_STOP)}
+    watcher = watched({150: Command.EMERGENCY_STOP})
     written: list[bytes] = []
     known = "nozzle 200 deg C, bed 60 deg C as last known, [0-5] s before"
     with pytest.raises(FirmwareError, match=f"emergency stop: the printer has halted; .*; {known}$"):
@@ -204,9 +205,8 @@ def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() 
 
 
 def test_an_emergency_stop_without_answer_is_given_twice_and_says_to_cut_the_power() -> None:
-    watcher = watched()
+    watcher = watched({150: Command.EMERGENCY_STOP})
     written: list[bytes] = []
-    watcher.when = {150: watcher.ask(Command.EMERGENCY_STOP)}
     with pytest.raises(FirmwareError, match=r"did not confirm M112: cut the power; nozzle 200 .* as last known, \d s before"):
         watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written, deaf=b"M112"))
     assert written[-2:] == [b"\nM112\n", b"\nM112\nM107\n"]
@@ -233,8 +233,7 @@ def _written(medium: Medium, written: list[bytes], deaf: bytes = b"") -> Medium:
     (Command.FEED, 150.0, "M220 S150", "M220 S100"), (Command.FLOW, 95.0, "M221 S95", "M221 S100"),
 ])  # fmt: skip
 def test_overrides_are_sent_told_and_taken_back_at_the_end(wish: Command, value: float, sent: str, undone: str) -> None:
-    watcher = watched()
-    watcher.when = {100: watcher.ask(wish, value)}
+    watcher = watched({100: (wish, value)})
     watcher.run(PROGRAM)
     lines, last = watcher.lines(), watcher.shown[-1]
     assert lines.index(sent) < lines.index(undone)
@@ -245,8 +244,7 @@ def test_overrides_are_sent_told_and_taken_back_at_the_end(wish: Command, value:
     ("wish", "value"), [(Command.FEED, 5.0), (Command.FEED, 1000.0), (Command.FLOW, 0.0), (Command.FLOW, 250.0)]
 )
 def test_an_override_outside_its_limits_is_refused_with_what_is_allowed(wish: Command, value: float) -> None:
-    watcher = watched()
-    watcher.when = {100: watcher.ask(wish, value)}
+    watcher = watched({100: (wish, value)})
     watcher.run(PROGRAM)
     assert any(re.search(r"is not possible: 10 to [23]00 % are allowed", progress.message) for progress in watcher.shown)
     assert not [line for line in watcher.lines() if line.startswith("M22")]
@@ -257,23 +255,17 @@ def test_an_override_outside_its_limits_is_refused_with_what_is_allowed(wish: Co
     "MANUAL_STEPPER STEPPER=stepper_a MOVE=3", "HOME_AB", "G1 X1*5", "M117 schön", "", "; nothing", "M600",
 ])  # fmt: skip
 def test_a_line_that_would_spoil_the_print_is_not_sent(text: str) -> None:
-    watcher = watched()
-    watcher.when = {
-        100: watcher.ask(Command.LINE, text=text),
-        120: watcher.ask(Command.PAUSE),
-        "paused": watcher.ask(Command.RESUME),
-    }
+    watcher = watched({100: (Command.LINE, 100.0, text), 120: Command.PAUSE, "paused": Command.RESUME})
     watcher.run(PROGRAM)
     assert any(progress.message.startswith("not sent") for progress in watcher.shown)
-    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert is_exact(watcher)
 
 
 def test_a_harmless_line_goes_out_between_those_of_the_program() -> None:
-    watcher = watched()
-    watcher.when = {100: watcher.ask(Command.LINE, text="M117 half way ; a note")}
+    watcher = watched({100: (Command.LINE, 100.0, "M117 half way ; a note")})
     watcher.run(PROGRAM)
     assert "M117 half way" in watcher.lines()
-    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert is_exact(watcher)
 
 
 def test_filament_may_be_changed_in_a_pause_and_the_count_is_restored() -> None:
@@ -284,29 +276,24 @@ def test_filament_may_be_changed_in_a_pause_and_the_count_is_restored() -> None:
             watcher.control.ask(Command.LINE, text=text)
         watcher.control.ask(Command.RESUME)
 
-    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": change}
+    watcher.when = {150: Command.PAUSE, "paused": change}
     watcher.run(PROGRAM)
     lines = watcher.lines()
     assert f"G92 E{filament_before_pause(lines):.5f}" in lines[lines.index("G1 E60 F300") :]
-    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert is_exact(watcher)
 
 
 def test_a_temperature_of_ones_own_holds_beyond_a_pause() -> None:
-    watcher = watched()
-    watcher.when = {
-        100: watcher.ask(Command.LINE, text="M104 S215"),
-        150: watcher.ask(Command.PAUSE),
-        "paused": watcher.ask(Command.RESUME),
-    }
+    watcher = watched({100: (Command.LINE, 100.0, "M104 S215"), 150: Command.PAUSE, "paused": Command.RESUME})
     watcher.run(PROGRAM)
     assert "M109 S215" in watcher.lines()
 
 
 @pytest.mark.parametrize("length_s", [0.5, 30.0])
 def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_nothing(length_s: float) -> None:
-    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=length_s),))
+    watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=length_s))
     assert not watcher.run(PROGRAM).cancelled
-    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert is_exact(watcher)
     lost = [progress for progress in watcher.shown if progress.state == "reconnecting"]
     assert all(progress.heat_is_old for progress in lost)
     assert lost[-1].heat_age_s - lost[0].heat_age_s == pytest.approx(lost[-1].elapsed_s - lost[0].elapsed_s)
@@ -316,15 +303,15 @@ def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_noth
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
 @pytest.mark.parametrize("line", [14, 30, 61])
 def test_a_firmware_that_never_asks_for_a_line_again_goes_on_by_its_place(dialect: str, line: int) -> None:
-    watcher = watched((Fault("disconnect", at=line, unit="line", seconds=2.0),), profile=UNASKING[dialect])
+    watcher = watched({}, Fault("disconnect", at=line, unit="line", seconds=2.0), profile=UNASKING[dialect])
     assert not watcher.run(PROGRAM).cancelled
-    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert is_exact(watcher)
 
 
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
 @pytest.mark.parametrize("byte", range(2000, 2040, 9))
 def test_a_line_that_was_torn_with_the_port_is_never_done_twice_or_left_out(dialect: str, byte: int) -> None:
-    watcher, error = watched((Fault("disconnect", at=byte, seconds=2.0),), profile=UNASKING[dialect]), ""
+    watcher, error = watched({}, Fault("disconnect", at=byte, seconds=2.0), profile=UNASKING[dialect]), ""
     try:
         watcher.run(PROGRAM)
     except RemoteProtocolError as stopped:
@@ -336,7 +323,7 @@ def test_a_line_that_was_torn_with_the_port_is_never_done_twice_or_left_out(dial
 
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
 def test_a_firmware_that_restarted_behind_the_lost_port_is_seen_by_its_place(dialect: str) -> None:
-    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=2.0),), profile=UNASKING[dialect])
+    watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=2.0), profile=UNASKING[dialect])
     reset = watcher.printer.firmware.reset
     watcher.when = {"reconnecting": lambda: reset(False)}
     with pytest.raises(RemoteProtocolError, match=r"was not answered|can no longer be trusted"):
@@ -345,7 +332,7 @@ def test_a_firmware_that_restarted_behind_the_lost_port_is_seen_by_its_place(dia
 
 
 def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:
-    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=2.0),))
+    watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=2.0))
     reset = watcher.printer.firmware.reset
     watcher.when = {"reconnecting": lambda: reset(False)}
     with pytest.raises(FirmwareError, match="restarted"):
@@ -354,7 +341,7 @@ def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:
 
 
 def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
-    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),))
+    watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=1e6))
     known = "nozzle 200 deg C, bed 60 deg C as last known, 12[0-9] s before"
     with pytest.raises(PortError, match=f"did not come back within 120 s; its heaters may still be on, .*; {known}"):
         watcher.run(PROGRAM)
@@ -379,7 +366,7 @@ class _Loose:
 
 
 def test_a_plug_that_stays_loose_is_waited_for_no_longer_than_is_said() -> None:
-    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=100.0),), profile=UNASKING["klipper"])
+    watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=100.0), profile=UNASKING["klipper"])
     usual = watcher.printer.medium
     wires: list[Wire] = []
 
@@ -397,16 +384,15 @@ def test_a_plug_that_stays_loose_is_waited_for_no_longer_than_is_said() -> None:
 
 
 def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:
-    watcher, stop = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),)), Flag()
+    watcher, stop = watched({}, Fault("disconnect", at=120, unit="line", seconds=1e6)), Flag()
     watcher.when = {"reconnecting": stop.set}
     outcome = watcher.run(PROGRAM, stop=stop)
     assert (outcome.cancelled, outcome.heaters_off) == (True, False)
 
 
 def test_a_program_that_waits_for_a_person_is_paused_by_the_sender_itself() -> None:
-    plain, paused = watched(), watched()
+    plain, paused = watched(), watched({"paused": Command.RESUME})
     plain.run(PROGRAM)
-    paused.when["paused"] = paused.ask(Command.RESUME)
     middle = len(START) + len(POSED) + 200
     program = [*PROGRAM[:middle], "M600 ;PAUSE:filament change before layer 2 of part 1", *PROGRAM[middle:]]
     assert not paused.run(program).cancelled

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -92,13 +92,17 @@ def killed(text: GcodeFile, printer: VirtualPrinter, writings: int) -> JournalCo
     return read_journal(journal.path)
 
 
+def cut_off(program: Iterable[str], last: Checkpoint) -> InterruptedPrint:
+    return read_interrupted_print(program, last, PROFILE, LIMIT)
+
+
 def resumed(text: GcodeFile, printer: VirtualPrinter, story: JournalContents) -> tuple[ResumePlan, list[str]]:
     """Resume; the decision, and the commands sent."""
     found: list[ResumePlan] = []
     sent: list[bytes] = []
 
     def begin(seen: PrinterStatus) -> ResumePoint:
-        found.append(plan_resume(read_interrupted_print(text, story.last, PROFILE, LIMIT), seen, PROFILE))
+        found.append(plan_resume(cut_off(text, story.last), seen, PROFILE))
         return found[0].start
 
     with journal_of(text, "rest") as journal:
@@ -205,7 +209,7 @@ def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whol
     with journal_of(text, "second") as journal, pytest.raises(KilledError):
         print_lines(
             text, PATH, medium=medium, profile=PROFILE, journal=journal,
-            begin=lambda seen: plan_resume(read_interrupted_print(text, story.last, PROFILE, LIMIT), seen, PROFILE).start,
+            begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE).start,
         )  # fmt: skip
     again = read_journal(journal.path)
     assert again.last.executed > story.last.executed
@@ -226,34 +230,21 @@ def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: Gc
         assert last.executed <= last.acknowledged <= last.sent
 
 
+@pytest.mark.parametrize("advanced", [True, False])
 @pytest.mark.parametrize("line", range(60, len(PROGRAM), 23))
-def test_after_a_power_cut_of_a_stock_marlin_few_moves_are_done_twice_and_the_height_is_known(text: GcodeFile, line: int) -> None:
-    """BLOCK_BUFFER_SIZE 16 and BUFSIZE 4 (Configuration_adv.h) bound what waits, and four lines what no record knows."""
-    printer = VirtualPrinter(
-        PROFILE.machine, BuildOptions(advanced_ok=False), FaultScript((Fault("reset", at=line, unit="line"),))
-    )
-    with journal_of(text, "first") as journal, pytest.raises(FirmwareError):
-        print_lines(text, PATH, medium=printer.medium, profile=PROFILE, journal=journal)
-    cut_off = read_interrupted_print(text, read_journal(journal.path).last, PROFILE, LIMIT)
-    done, record = len(moved(printer)), printer.record
-    assert done - sum(is_move(each) for each in PROGRAM[: cut_off.line - 1]) <= 24
-    stroked = record.end[-1, 5] - record.start[-1, 5] > 0.0
-    at = heights_mm(cut_off)
-    assert any(abs(z - record.end[-1, 2]) < 0.01 for z in at)
-    assert len(at) == 1 or not stroked
-
-
-@pytest.mark.parametrize("line", range(60, len(PROGRAM), 23))
-def test_after_a_power_cut_of_a_marlin_that_tells_what_waits_the_height_is_known_while_it_prints(
-    text: GcodeFile, line: int
+def test_after_a_power_cut_few_moves_are_done_twice_and_the_height_is_known_while_it_prints(
+    text: GcodeFile, line: int, advanced: bool
 ) -> None:
-    printer = VirtualPrinter(PROFILE.machine, faults=FaultScript((Fault("reset", at=line, unit="line"),)))
+    """BLOCK_BUFFER_SIZE 16 and BUFSIZE 4 (Configuration_adv.h) bound what waits, and four lines what no record knows."""
+    fault = FaultScript((Fault("reset", at=line, unit="line"),))
+    printer = VirtualPrinter(PROFILE.machine, BuildOptions(advanced_ok=advanced), fault)
     with journal_of(text, "first") as journal, pytest.raises(FirmwareError):
         print_lines(text, PATH, medium=printer.medium, profile=PROFILE, journal=journal)
-    at, record = heights_mm(read_interrupted_print(text, read_journal(journal.path).last, PROFILE, LIMIT)), printer.record
-    stroked = record.end[-1, 5] > record.start[-1, 5]
+    point, record = cut_off(text, read_journal(journal.path).last), printer.record
+    assert len(record.end) - sum(is_move(command) for command in PROGRAM[: point.line - 1]) <= 24
+    at = heights_mm(point)
     assert any(abs(z - record.end[-1, 2]) < 0.01 for z in at)
-    assert len(at) == 1 or not stroked
+    assert len(at) == 1 or record.end[-1, 5] <= record.start[-1, 5]
 
 
 def doubtful(text: GcodeFile, journal: Path, printer: SimulatedPrinter) -> None:
@@ -297,7 +288,7 @@ class Person(StringIO):
 
 def point(executed: int, acknowledged: int | None = None, number: int = 100) -> InterruptedPrint:
     moment = Checkpoint(acknowledged or executed, acknowledged or executed, executed, number)
-    return read_interrupted_print(PROGRAM, moment, PROFILE, LIMIT)
+    return cut_off(PROGRAM, moment)
 
 
 def found(position: dict[str, float] | None = None, last: int | None = 0) -> PrinterStatus:
@@ -322,29 +313,16 @@ def test_the_point_knows_part_layer_pose_and_modes() -> None:
 
 def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> None:
     still = [*START, "G0 X10 Y20 Z30", "G1 X11 E1 F600", "M106 S10", "M106 S20", "M106 S30", "G1 X12 E1"]
-    at = read_interrupted_print(still, Checkpoint(13, 13, 13, 5), PROFILE, LIMIT)
+    at = cut_off(still, Checkpoint(13, 13, 13, 5))
     way = plan_resume(at, found({"X": 11.0, "Y": 20.0, "Z": 30.0, "E": 1.0}), PROFILE)
     assert way.start.line == still.index("M106 S10") + 1
-
-
-def test_a_table_that_was_turning_when_the_power_went_is_refused() -> None:
-    line = PROGRAM.index("G0 A30 C725 F6000")
-    with pytest.raises(JournalError, match=r"the table was turning about A.*machine\.gcode\.resume"):
-        plan_resume(point(line, line + 5), found(), PROFILE)
 
 
 @pytest.mark.parametrize("state", ["paused", "left"])
 def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> None:
     moment = Checkpoint(LINE + 3, LINE, LINE, 100, (159.0, -159.0, 120.0, 30.0, 725.0, 5.0), state)
-    before = plan_resume(read_interrupted_print(PROGRAM, moment, PROFILE, LIMIT), found(), PROFILE).start.before
+    before = plan_resume(cut_off(PROGRAM, moment), found(), PROFILE).start.before
     assert "G92 X159 Y-159 Z120 A30 C725" in before
-
-
-@pytest.mark.parametrize("state", ["pausing", "resuming"])
-def test_a_tip_that_was_on_its_way_when_the_power_went_is_refused(state: str) -> None:
-    moment = Checkpoint(LINE + 3, LINE, LINE, 100, (10.0, 10.0, 62.0, 30.0, 725.0, 5.0), state)
-    with pytest.raises(JournalError, match=r"was on its way between print and parking place"):
-        plan_resume(read_interrupted_print(PROGRAM, moment, PROFILE, LIMIT), found(), PROFILE)
 
 
 def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text: GcodeFile) -> None:
@@ -385,18 +363,31 @@ def test_a_marlin_that_has_restarted_believes_itself_at_its_home_positions_and_i
     assert "G92 X" in " ".join(way.start.before)
 
 
-def test_a_printer_that_was_moved_since_it_restarted_is_refused() -> None:
-    with pytest.raises(JournalError, match="stands at X50 Y50 Z50: it was homed or moved since; switch it off and on"):
-        plan_resume(point(LINE), found({"X": 50.0, "Y": 50.0, "Z": 50.0}), PROFILE)
+TURN = PROGRAM.index("G0 A30 C725 F6000")
+ON_THE_WAY = Checkpoint(LINE + 3, LINE, LINE, 100, (10.0, 10.0, 62.0, 30.0, 725.0, 5.0), "pausing")
+NOWHERE = [*START, "G1 X1 E1", "G28", *(f"M106 S{k}" for k in range(60)), "G1 X5 E1"]
+FOLLOWING = PROFILE.model_copy(update={"machine": PROFILE.machine.model_copy(update={"coordinates": "workpiece"})})
+MOVED = {"X": 50.0, "Y": 50.0, "Z": 50.0}
 
 
-def test_a_printer_at_its_home_positions_that_took_lines_since_may_have_been_homed() -> None:
-    with pytest.raises(JournalError, match="another program has sent it 7 lines since: it may have been homed"):
-        plan_resume(point(LINE), found(AT_HOME, last=7), PROFILE)
+@pytest.mark.parametrize(("at", "said", "profile", "sentence"), [
+    (point(TURN, TURN + 5), found(), PROFILE, r"the table was turning about A.*machine\.gcode\.resume"),
+    (cut_off(PROGRAM, ON_THE_WAY), found(), PROFILE, "was on its way between print and parking place"),
+    (cut_off(PROGRAM, replace(ON_THE_WAY, state="resuming")), found(), PROFILE, "was on its way between print and parking place"),
+    (point(LINE), found(MOVED), PROFILE, "stands at X50 Y50 Z50: it was homed or moved since; switch it off and on"),
+    (point(LINE), found(AT_HOME, last=7), PROFILE, "another program has sent it 7 lines since: it may have been homed"),
+    (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), found(), PROFILE, "does not tell where X Y Z stand"),
+    (point(LINE), found(), FOLLOWING, "follows the table by itself"),
+])  # fmt: skip
+def test_where_going_on_would_be_a_guess_it_is_refused(
+    at: InterruptedPrint, said: PrinterStatus, profile: Profile, sentence: str
+) -> None:
+    with pytest.raises(JournalError, match=sentence):
+        plan_resume(at, said, profile)
 
 
 def test_a_printer_whose_greeting_was_heard_has_restarted_wherever_it_believes_to_stand() -> None:
-    greeted = replace(found({"X": 50.0, "Y": 50.0, "Z": 50.0}), greeted=True)
+    greeted = replace(found(MOVED), greeted=True)
     assert plan_resume(point(LINE), greeted, PROFILE).homes
 
 
@@ -435,18 +426,6 @@ def test_the_command_resumes_after_a_power_cut(
     assert record.clamped == 0
     assert [event for _, event in record.events if event.startswith("homed")] == ["homed XYZ", "homed XY"]
     assert record.end[-1, :5].tolist() == pytest.approx(whole[-1, :5])
-
-
-def test_a_program_that_does_not_tell_where_it_stands_is_refused() -> None:
-    lines = [*START, "G1 X1 E1", "G28", *(f"M106 S{k}" for k in range(60)), "G1 X5 E1"]
-    with pytest.raises(JournalError, match="does not tell where X Y Z stand"):
-        plan_resume(read_interrupted_print(lines, Checkpoint(14, 14, 13, 5), PROFILE, LIMIT), found(), PROFILE)
-
-
-def test_a_firmware_that_follows_the_table_goes_on_only_where_it_stands() -> None:
-    machine = PROFILE.machine.model_copy(update={"coordinates": "workpiece"})
-    with pytest.raises(JournalError, match="follows the table by itself"):
-        plan_resume(point(LINE), found(), PROFILE.model_copy(update={"machine": machine}))
 
 
 def test_when_the_table_must_turn_back_it_turns_above_everything() -> None:
@@ -569,9 +548,8 @@ def test_the_command_refuses_a_journal_of_another_program(
 def test_a_cut_while_the_table_turned_is_resumed_by_a_profile_that_tells_how_it_is_homed(
     text: GcodeFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    line = PROGRAM.index("G0 A30 C725 F6000")
     with journal_of(text, "j") as journal:
-        journal.write(Checkpoint(line + 5, line, line, 100))
+        journal.write(Checkpoint(TURN + 5, TURN, TURN, 100))
     mine = tmp_path / "mine.toml"
     block = "G28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
     mine.write_text(f'inherits = "generic_ac"\n\n[machine.gcode]\nresume = {json.dumps(block)}\n')
@@ -633,7 +611,7 @@ def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
 
     def begin(asked: PrinterStatus) -> ResumePoint:
         seen.append(asked)
-        return plan_resume(read_interrupted_print(text, story.last, PROFILE, LIMIT), asked, PROFILE).start
+        return plan_resume(cut_off(text, story.last), asked, PROFILE).start
 
     with pytest.raises(SilenceError, match=r"did not answer when it was asked where it stands"):
         print_lines(text, PATH, medium=deaf, profile=PROFILE, begin=begin)

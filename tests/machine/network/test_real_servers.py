@@ -197,13 +197,7 @@ def test_octoprint_prints_pauses_cancels_and_halts(octoprint: str, monkeypatch: 
     assert (end, phases[-1]) == (End.DONE, Phase.DONE)
     with open_server(octoprint) as server:
         assert server.has("passes.gcode")
-    end, phases = print_on(octoprint, pause_resume_cancel())
-    assert end is End.CANCELLED
-    assert [phase for phase in phases if phase in (Phase.PRINTING, Phase.PAUSED)][:3] == [
-        Phase.PRINTING,
-        Phase.PAUSED,
-        Phase.PRINTING,
-    ]
+    check_pause_and_cancel(octoprint)
     check_broken_off(octoprint)
     assert print_on(octoprint, stop_at_once)[0] is End.STOPPED
     check_refusals(octoprint, monkeypatch)
@@ -224,19 +218,20 @@ def test_moonraker_prints_pauses_cancels_and_halts(moonraker: tuple[str, KlippyS
         assert server.has("passes.gcode")
         server.command("M220 S120")
     assert klippy.scripts[-1] == "M220 S120"
-    end, phases = print_on(address, pause_resume_cancel())
-    assert end is End.CANCELLED
-    assert [phase for phase in phases if phase in (Phase.PRINTING, Phase.PAUSED)][:3] == [
-        Phase.PRINTING,
-        Phase.PAUSED,
-        Phase.PRINTING,
-    ]
+    check_pause_and_cancel(address)
     check_while_printing(address)
     check_broken_off(address)
     assert print_on(address, stop_at_once)[0] is End.STOPPED
     with open_server(address) as server:
         assert server.status().phase is Phase.OFFLINE
     check_refusals(address, monkeypatch)
+
+
+def check_pause_and_cancel(address: str) -> None:
+    end, phases = print_on(address, pause_resume_cancel())
+    assert end is End.CANCELLED
+    begin = [phase for phase in phases if phase in (Phase.PRINTING, Phase.PAUSED)][:3]
+    assert begin == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
 
 
 def check_while_printing(address: str) -> None:

@@ -7,8 +7,9 @@ import shutil
 import socket
 import subprocess
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,10 +22,11 @@ from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import JobStatus, Phase, PrintServer
 from machine.network.servers import KINDS, open_server
 from profiles.errors import NoAnswerError, ServerError
-from tests.machine.network.stand_ins import KEY, STAND_INS, stand_in
+from tests.machine.network.stand_ins import KEY, STAND_INS, Job, stand_in
 
 LINES = tuple(f"G1 X{k}" for k in range(20_000))
 UPLOAD = GcodeUpload("box.gcode", LINES)
+STATUS = ("/api/job", "/server/info", "/rr_model")  # where the kinds tell what they do
 every_kind = pytest.mark.parametrize("kind", KINDS)
 
 
@@ -48,6 +50,15 @@ def ignore(status: JobStatus, message: str) -> None:
 def hand_over(server: PrintServer) -> str:
     server.greet()
     return server.upload(UPLOAD, unheard)
+
+
+@contextlib.contextmanager
+def printing(kind: str, **more: Any) -> Iterator[tuple[Job, PrintServer]]:
+    """A server that has the file, and takes long to print it."""
+    with stand_in(kind, **more) as (job, address), open_server(address) as server:
+        hand_over(server)
+        job.steps = 10_000
+        yield job, server
 
 
 def run(server: PrintServer, control: Control, on_status: Callable[[JobStatus, str], None] = ignore) -> End:
@@ -97,9 +108,7 @@ def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> Non
         if status.phase in asks:
             control.ask(Command.CANCEL if done else asks[status.phase])
 
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
+    with printing(kind) as (job, server):
         end = run(server, control, ask)
     assert end is End.CANCELLED
     assert job.state == "cancelled"
@@ -108,9 +117,7 @@ def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> Non
 
 def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
     control = Control()
-    with stand_in("octoprint") as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
+    with printing("octoprint") as (job, server):
 
         def left() -> bool:
             if job.state == "printing":
@@ -132,9 +139,7 @@ def test_a_stop_for_which_the_key_cannot_be_read_is_told_as_not_confirmed() -> N
 @every_kind
 def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
     control = Control()
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
+    with printing(kind) as (job, server):
         control.ask(Command.FEED, 120.0)
         control.ask(Command.FLOW, 900.0)  # not possible: told, not sent
 
@@ -150,9 +155,7 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
 
 @every_kind
 def test_a_person_leaves_a_print_that_goes_on(kind: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
+    with printing(kind) as (job, server):
         left = lambda: job.state == "printing"  # noqa: E731
         assert follow_print(server, UPLOAD.name, 1, on_status=ignore, control=Control(), left=left) is End.LEFT
         assert job.state == "printing"
@@ -256,54 +259,55 @@ def test_a_session_of_a_duet_that_has_ended_is_begun_again() -> None:
 @every_kind
 def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     messages: list[str] = []
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
-        paths = ("/api/job", "/server/info", "/rr_model")
+    with printing(kind) as (job, server):
 
         def away(status: JobStatus, message: str) -> None:
             messages.append(message)
             if message:
                 monkeypatch.setattr(follow, "LOST_S", 0.0)  # two minutes later
             if status.phase is Phase.PRINTING:
-                job.refuse = dict.fromkeys(paths, (502, "Bad Gateway"))
+                job.refuse = dict.fromkeys(STATUS, (502, "Bad Gateway"))
 
         with pytest.raises(ServerError, match="the print may go on, look at the printer"):
             run(server, Control(), away)
     assert re.fullmatch("no answer for [0-9]+ s: whether the print goes on there is not known", messages[-1])
 
 
-@every_kind
-def test_a_print_on_a_server_that_died_and_came_back_is_neither_done_nor_cancelled(kind: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
-
-        def die(status: JobStatus, message: str) -> None:
-            if message.startswith("no answer"):
-                job.restart()
-                job.refuse = {}
-            elif status.phase is Phase.PRINTING:
-                job.refuse = dict.fromkeys(("/api/job", "/server/info", "/rr_model"), (502, "Bad Gateway"))
-
-        with pytest.raises(
-            ServerError, match=r"no longer prints box\.gcode \(ready\); last known: .*nozzle 210 deg C, bed 60 deg C"
-        ):
-            run(server, Control(), die)
+def cancelled_there(job: Job, message: str) -> None:
+    job.state = "cancelled"
 
 
-@pytest.mark.parametrize("kind", ["octoprint", "moonraker"])
-def test_a_print_that_somebody_else_has_cancelled_is_not_said_to_be_cancelled_here(kind: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
+def another_is_printed(job: Job, message: str) -> None:
+    job.files["other.gcode"] = UPLOAD.content
+    job.file = "other.gcode"
 
-        def cancel_there(status: JobStatus, message: str) -> None:
-            if status.phase is Phase.PRINTING:
-                job.state = "cancelled"
 
-        with pytest.raises(ServerError, match=r"no longer prints box\.gcode"):
-            run(server, Control(), cancel_there)
+def dies_and_comes_back(job: Job, message: str) -> None:
+    job.refuse = dict.fromkeys(STATUS, (502, "Bad Gateway"))
+    if message.startswith("no answer"):
+        job.restart()
+        job.refuse = {}
+
+
+HAPPENINGS = [
+    (KINDS, dies_and_comes_back, r"no longer prints box\.gcode \(ready\); last known: .*nozzle 210 deg C, bed 60 deg C"),
+    (("octoprint", "moonraker"), cancelled_there, r"no longer prints box\.gcode"),
+    (("octoprint", "moonraker"), another_is_printed, r"prints other\.gcode now: what became of box\.gcode is not known"),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "happens", "sentence"), [(kind, happens, words) for kinds, happens, words in HAPPENINGS for kind in kinds]
+)
+def test_what_became_of_a_print_is_told_as_far_as_it_is_known(
+    kind: str, happens: Callable[[Job, str], None], sentence: str
+) -> None:
+    with printing(kind) as (job, server), pytest.raises(ServerError, match=sentence):
+        run(
+            server,
+            Control(),
+            lambda status, message: happens(job, message) if status.phase is Phase.PRINTING or message else None,
+        )
 
 
 def test_a_cancel_that_was_refused_has_cancelled_nothing() -> None:
@@ -313,9 +317,7 @@ def test_a_cancel_that_was_refused_has_cancelled_nothing() -> None:
             return (409, {"error": "it is busy"}) if busy else super().answer(method, path, query, body)
 
     control = Control()
-    with stand_in("octoprint", handler=Busy) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
+    with printing("octoprint", handler=Busy) as (job, server):
 
         def cancel(status: JobStatus, message: str) -> None:
             if "refuses to cancel" in message:
@@ -494,26 +496,9 @@ def test_a_duet_that_does_not_start_says_why() -> None:
 
 
 @pytest.mark.parametrize("kind", ["octoprint", "moonraker"])
-def test_another_print_that_somebody_has_started_is_not_taken_for_ours(kind: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
-        job.steps = 10_000
-        job.files["other.gcode"] = UPLOAD.content
-
-        def start_another(status: JobStatus, message: str) -> None:
-            if status.phase is Phase.PRINTING:
-                job.file = "other.gcode"
-
-        with pytest.raises(ServerError, match=r"prints other\.gcode now: what became of box\.gcode is not known"):
-            run(server, Control(), start_another)
-
-
-@pytest.mark.parametrize("kind", ["octoprint", "moonraker"])
 def test_a_start_that_is_refused_ends_with_the_server_s_words(kind: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
-        hand_over(server)
+    with printing(kind) as (job, server):
         job.files["other.gcode"] = UPLOAD.content
-        job.steps = 10_000
         job.start("other.gcode")
         with pytest.raises(ServerError, match=r"cannot start it now: (SD busy|Printer is already printing)"):
             run(server, Control())

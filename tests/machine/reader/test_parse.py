@@ -21,22 +21,6 @@ def _ends(text: str) -> list[list[float]]:
     return np.column_stack([parsed.end, parsed.filament_mm]).round(6).tolist()
 
 
-def test_relative_filament_is_summed_up() -> None:
-    assert _ends("M83\nG1 X1 E2\nG1 Y1 E3") == [[1, 0, 0, 0, 0, 2], [1, 1, 0, 0, 0, 5]]
-
-
-def test_absolute_filament_survives_its_resets() -> None:
-    assert [row[5] for row in _ends("M82\nG1 X1 E2\nG92 E0\nG1 X2 E1.5\nG1 E0.5")] == [2, 3.5, 2.5]
-
-
-def test_relative_coordinates_add_to_the_position() -> None:
-    assert [row[:3] for row in _ends("G91\nG0 X1 Y2\nG0 X1 Z3\nG90\nG0 X5")] == [[1, 2, 0], [2, 2, 3], [5, 2, 3]]
-
-
-def test_g90_makes_filament_absolute_as_in_marlin_and_m83_relative_again() -> None:
-    assert [row[5] for row in _ends("M83\nG90\nG1 X1 E2\nG1 X2 E2\nM83\nG1 X3 E2")] == [2, 2, 4]
-
-
 def test_inches_become_millimetres_but_angles_stay_degrees() -> None:
     parsed = _read("G20\nG1 X1 A30 E0.1 F60")
     assert parsed.end[0].tolist() == [25.4, 0, 0, 30, 0]
@@ -62,10 +46,6 @@ def test_kinds_of_moves_are_told_apart() -> None:
 
 def test_words_need_no_blanks_and_may_be_small() -> None:
     assert _ends("g1x1y-.5f300(to the left)z+2 ; done") == [[1, -0.5, 2, 0, 0, 0]]
-
-
-def test_a_coordinate_before_e_is_not_read_as_an_exponent() -> None:
-    assert _ends("M83\nG1 X1E5") == [[1, 0, 0, 0, 0, 5]]
 
 
 def test_a_bare_coordinate_repeats_the_last_motion() -> None:
@@ -150,11 +130,3 @@ def test_any_line_is_read_or_refused_with_a_sentence(line: str) -> None:
         numbers, message = np.zeros(0), str(error)
     assert np.isfinite(numbers).all()
     assert message.startswith("line 1")
-
-
-@given(st.lists(st.tuples(COORDINATE, COORDINATE, COORDINATE), min_size=1, max_size=30))
-def test_absolute_and_relative_texts_of_the_same_way_agree(points: list[tuple[float, float, float]]) -> None:
-    steps = np.diff(np.array([(0, 0, 0), *points]), axis=0)
-    absolute = parse_gcode(["G90", *(f"G0 X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in points)], MACHINE)
-    relative = parse_gcode(["G91", *(f"G0 X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in steps)], MACHINE)
-    assert absolute.end == pytest.approx(relative.end, abs=1e-6)

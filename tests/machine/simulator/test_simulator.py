@@ -77,22 +77,6 @@ def test_m114_and_g92_tell_all_axes() -> None:
     assert said[0].startswith("X:1.00 Y:0.00 Z:0.00 A:-30.00 C:725.00 E:2.00 Count X:0 ")
 
 
-def test_g92_renames_the_place_and_moves_nothing() -> None:
-    record = ran("G1 X10\nG92 X0\nG1 X5\n").record()
-    assert record.end[:, 0].tolist() == [10.0, 15.0]
-
-
-def test_relative_and_absolute_modes_and_inches() -> None:
-    record = ran("G91\nG1 X5\nG1 X5\nG90\nG20\nG1 X1\nG1 A30\nG21\nG1 X1\n").record()
-    assert record.end[:, 0].tolist() == [5.0, 10.0, 25.4, 25.4, 1.0]
-    assert record.end[3, 3] == 30.0
-
-
-def test_g90_makes_filament_absolute_again_as_in_marlin() -> None:
-    record = ran(HOT + "M83\nG1 X1 E1\nG1 X2 E1\nG90\nG92 E0\nG1 X3 E0.5\n").record()
-    assert record.end[:, 5].tolist() == [1.0, 2.0, 2.5]
-
-
 def test_homing_is_on_record_as_an_event() -> None:
     firmware = ran("G28 X Y\n")
     assert firmware.record().events[-1][1] == "homed XY"

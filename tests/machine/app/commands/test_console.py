@@ -4,6 +4,7 @@ import io
 import os
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from threading import Timer
 from time import sleep
@@ -29,24 +30,35 @@ MACHINE = load().machine
 PROMPT = ">"  # the space after it is a move of the cursor
 NAMED = {"M115": "FIRMWARE_NAME:Marlin 2.1.2\nok", "M114": "X:0.00 Y:0.00 Z:0.00 A:0.00 C:0.00 E:0.00\nok", "M110": "ok"}
 COLD = "ok T:20.00 /0.00 B:20.00 /0.00"
+Capsys = pytest.CaptureFixture[str]
+Piped = Callable[..., int]
+Done = Callable[..., tuple[int, Record]]
 
 
-def piped(text: str, path: str, *options: str, monkeypatch: pytest.MonkeyPatch) -> int:
+@pytest.fixture
+def piped(monkeypatch: pytest.MonkeyPatch) -> Piped:
     """Exit code of a console that reads a pipe."""
-    monkeypatch.setattr(sys, "stdin", io.StringIO(text))
-    return main(["console", "--port", path, *options])
+
+    def run(text: str, path: str, *options: str) -> int:
+        monkeypatch.setattr(sys, "stdin", io.StringIO(text))
+        return main(["console", "--port", path, *options])
+
+    return run
 
 
-def done(text: str, *options: str, monkeypatch: pytest.MonkeyPatch) -> tuple[int, Record]:
+@pytest.fixture
+def done(piped: Piped) -> Done:
     """The same on a simulated printer, with what that has done."""
-    with SimulatedPrinter(MACHINE) as printer:
-        return piped(text, printer.path, *options, monkeypatch=monkeypatch), printer.record
+
+    def run(text: str, *options: str) -> tuple[int, Record]:
+        with SimulatedPrinter(MACHINE) as printer:
+            return piped(text, printer.path, *options), printer.record
+
+    return run
 
 
-def test_lines_of_a_pipe_are_sent_and_answers_are_shown(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, record = done("G28\n; a remark\n\nG1 X12 F6000\nM400\nM114\n", monkeypatch=monkeypatch)
+def test_lines_of_a_pipe_are_sent_and_answers_are_shown(done: Done, capsys: Capsys) -> None:
+    code, record = done("G28\n; a remark\n\nG1 X12 F6000\nM400\nM114\n")
     out, err = capsys.readouterr()
     assert (code, record.end[-1, 0]) == (0, 12.0)
     assert "X:12.00 " in out.splitlines()[-2]
@@ -54,15 +66,13 @@ def test_lines_of_a_pipe_are_sent_and_answers_are_shown(
     assert err.splitlines()[0].endswith("axes X Y Z A C, at 115200 baud")
 
 
-def test_an_empty_pipe_is_no_error(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert done("", monkeypatch=monkeypatch)[0] == 0
+def test_an_empty_pipe_is_no_error(done: Done, capsys: Capsys) -> None:
+    assert done("")[0] == 0
     assert capsys.readouterr().out == ""
 
 
-def test_a_command_that_the_printer_does_not_know_is_exit_1_at_the_end(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, record = done("G28\nM9999 S1\nG1 X5 F6000\n", monkeypatch=monkeypatch)
+def test_a_command_that_the_printer_does_not_know_is_exit_1_at_the_end(done: Done, capsys: Capsys) -> None:
+    code, record = done("G28\nM9999 S1\nG1 X5 F6000\n")
     assert (code, record.end[-1, 0]) == (1, 5.0)
     assert capsys.readouterr().err.splitlines()[-1] == "tiltprint: the printer did not know 'M9999 S1'"
 
@@ -72,64 +82,54 @@ def test_a_command_that_the_printer_does_not_know_is_exit_1_at_the_end(
     ("G1 X1*33", "the line ('G1 X1*33') holds a '*'"),
     ("M110 N5", "the line holds M110"),
 ])  # fmt: skip
-def test_a_line_that_cannot_be_sent_is_a_sentence(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str, words: str
-) -> None:
-    code, record = done(f"M104 S200\n{line}\nG28\n", monkeypatch=monkeypatch)
+def test_a_line_that_cannot_be_sent_is_a_sentence(done: Done, capsys: Capsys, line: str, words: str) -> None:
+    code, record = done(f"M104 S200\n{line}\nG28\n")
     assert (code, record.nozzle_target_c, record.happened("homed XYZAC")) == (1, 0.0, False)
     assert words in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_heaters_are_switched_off_on_leaving_and_that_is_said(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, record = done("M104 S200\nM140 S60\n", monkeypatch=monkeypatch)
+def test_heaters_are_switched_off_on_leaving_and_that_is_said(done: Done, capsys: Capsys) -> None:
+    code, record = done("M104 S200\nM140 S60\n")
     assert (code, record.nozzle_target_c, record.bed_target_c) == (0, 0.0, 0.0)
     assert record.happened("nozzle 200")
     assert "switched off: nozzle set to 200 deg C and bed set to 60 deg C" in capsys.readouterr().err
 
 
-def test_heaters_stay_on_when_that_is_asked_for(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    code, record = done("M104 S200\n", "--leave-heaters", monkeypatch=monkeypatch)
+def test_heaters_stay_on_when_that_is_asked_for(done: Done, capsys: Capsys) -> None:
+    code, record = done("M104 S200\n", "--leave-heaters")
     assert (code, record.nozzle_target_c) == (0, 200.0)
     assert "left on: nozzle set to 200 deg C" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("line", ["/stop", "M112", "M112 ; now"])
-def test_the_emergency_stop_halts_the_printer(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str
-) -> None:
-    code, record = done(f"M104 S200\n{line}\nG28\n", monkeypatch=monkeypatch)
+def test_the_emergency_stop_halts_the_printer(done: Done, capsys: Capsys, line: str) -> None:
+    code, record = done(f"M104 S200\n{line}\nG28\n")
     assert (code, record.nozzle_target_c, record.happened("M112")) == (1, 0.0, True)
     assert "emergency stop: the printer has halted" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("options", "shown"), [((), True), (("--no-reports",), False)])
-def test_temperature_reports_can_be_hidden(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], shown: bool
-) -> None:
+def test_temperature_reports_can_be_hidden(piped: Piped, capsys: Capsys, options: tuple[str, ...], shown: bool) -> None:
     words = NAMED | {"M105": COLD, "M400": " T:20.00 /0.00 B:20.00 /0.00\nok"}
     with on_terminal(scripted(words)) as path:
-        assert piped("M400\nM105\n", path, *options, monkeypatch=monkeypatch) == 0
+        assert piped("M400\nM105\n", path, *options) == 0
     out = capsys.readouterr().out.splitlines()
     assert (" T:20.00 /0.00 B:20.00 /0.00" in out) is shown
     assert COLD in out
 
 
-def test_the_error_of_a_printer_is_told_in_its_own_words(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_error_of_a_printer_is_told_in_its_own_words(piped: Piped, capsys: Capsys) -> None:
     with on_terminal(scripted(NAMED | {"M105": COLD, "G28": "Error:Homing failed, printer halted"})) as path:
-        assert piped("G28\nG1 X1\n", path, monkeypatch=monkeypatch) == 1
+        assert piped("G28\nG1 X1\n", path) == 1
     assert "Homing failed, printer halted" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_port_where_no_printer_is_gets_the_sentence_of_print(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    piped: Piped, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     hear_out(monkeypatch, compatibility)
     with on_terminal(lambda data, baud: data) as path:
-        assert piped("G28\n", path, monkeypatch=monkeypatch) == 1
+        assert piped("G28\n", path) == 1
     assert f"what answers at {path} is no printer: it sends back what it is told" in capsys.readouterr().err
 
 
@@ -138,10 +138,8 @@ def test_a_port_where_no_printer_is_gets_the_sentence_of_print(
     (("--log", "/nowhere/a.log"), "the folder /nowhere does not exist"),
     (("--baud", "7"), "baud rate 7 is not possible"),
 ])  # fmt: skip
-def test_an_option_that_makes_no_sense_is_one_sentence(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], words: str
-) -> None:
-    assert piped("", "sim", *options, monkeypatch=monkeypatch) == 1
+def test_a_senseless_option_is_one_sentence(piped: Piped, capsys: Capsys, options: tuple[str, ...], words: str) -> None:
+    assert piped("", "sim", *options) == 1
     message = capsys.readouterr().err
     assert words in message
     assert message.count("\n") == 1
@@ -255,7 +253,7 @@ def test_a_closed_terminal_leaves_with_the_heaters_off(after_s: float) -> None:
         assert (printer.record.happened("nozzle 200"), printer.record.nozzle_target_c) == (True, 0.0)
 
 
-def test_busy_lines_in_a_row_are_folded(capsys: pytest.CaptureFixture[str]) -> None:
+def test_busy_lines_in_a_row_are_folded(capsys: Capsys) -> None:
     shown = Shown(reports=False)
     shown.quiet = False
     shown.hear(b"echo:busy: processing\n" * 15 + b"ok\necho:busy: processing\nok\n")

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -79,63 +80,39 @@ def test_a_print_that_a_server_is_at_already_is_followed_to_its_end(kind: str, c
     assert not any(asked.endswith(("upload", "/start")) for asked in job.asked)
 
 
-@pytest.mark.parametrize(
-    ("kind", "file", "sentence"),
-    [
-        ("moonraker", MARLIN, "generic A/C table writes for marlin, but Moonraker prints klipper or klipper_steppers: "),
-        (
-            "duet",
-            KLIPPER,
-            "Fractal 5 Pro writes for klipper, but a Duet prints reprapfirmware: --machine must be one of those, as gen5x",
-        ),
-    ],
-)
-def test_a_program_for_another_firmware_is_refused_before_a_byte_is_sent(
-    kind: str, file: Path, sentence: str, capsys: pytest.CaptureFixture[str]
+NO_MACRO = "which this Klipper does not know"
+STEPPERS = ("stepper_a", "stepper_b")
+
+
+@pytest.mark.parametrize(("kind", "more", "words", "sentence"), [
+    ("moonraker", {}, (MARLIN, "--force"),
+     "generic A/C table writes for marlin, but Moonraker prints klipper or klipper_steppers: "),
+    ("duet", {}, (KLIPPER, "--force"),
+     "Fractal 5 Pro writes for klipper, but a Duet prints reprapfirmware: --machine must be one of those, as gen5x"),
+    ("moonraker", {"steppers": ("stepper_b",)}, (KLIPPER,), "which this Klipper lacks; it has stepper_b"),
+    ("moonraker", {"steppers": STEPPERS, "macros": ()}, (KLIPPER,),
+     f"Pro calls HOME_AB, {NO_MACRO} and would pass over: it needs [gcode_macro HOME_AB]"),
+    ("moonraker", {"steppers": STEPPERS}, ("own.gcode",), f"own.gcode calls CHAMBER_HEAT, {NO_MACRO}"),
+    ("octoprint", {}, (MARLIN,), "the dry run found 1 errors, the first: the part begins in air"),
+    ("octoprint", {}, (MARLIN, "--set", "machine.tilt.point_mm=[0, 0, -33]"),
+     "was made when machine.tilt.point_mm of generic A/C table was"),
+])  # fmt: skip
+def test_what_does_not_fit_is_refused_before_a_byte_is_sent(
+    kind: str,
+    more: dict[str, Any],
+    words: tuple[object, ...],
+    sentence: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    with stand_in(kind) as (job, address):
-        assert sent(file, "--to", address, "--force") == 1
-    assert sentence in capsys.readouterr().err
+    own = KLIPPER.read_text().replace("\nM190", "\nchamber_heat S=40 ; of the file's own\nM190", 1)
+    (tmp_path / "own.gcode").write_text(own)
+    monkeypatch.chdir(tmp_path)
+    with stand_in(kind, **more) as (job, address):
+        assert sent(*words, "--to", address) == 1
+    assert sentence in " ".join(capsys.readouterr().err.split())
     assert not any(asked.startswith("POST") and "query" not in asked for asked in job.asked)
-
-
-def test_a_klipper_without_the_table_s_steppers_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with stand_in("moonraker", steppers=("stepper_b",)) as (job, address):
-        assert sent(KLIPPER, "--to", address) == 1
-    said = capsys.readouterr().err
-    assert "[manual_stepper" in said
-    assert "which this Klipper lacks; it has stepper_b" in said
-    assert job.files == {}
-
-
-def test_a_klipper_without_a_macro_that_the_machine_calls_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with stand_in("moonraker", steppers=("stepper_a", "stepper_b"), macros=()) as (job, address):
-        assert sent(KLIPPER, "--to", address) == 1
-    said = " ".join(capsys.readouterr().err.split())
-    assert "Pro calls HOME_AB, which this Klipper does not know and would pass over: it needs [gcode_macro HOME_AB]" in said
-    assert job.files == {}
-
-
-def test_a_klipper_without_a_macro_that_the_file_calls_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "own.gcode"
-    file.write_text(KLIPPER.read_text().replace("\nM190", "\nchamber_heat S=40 ; of the file's own\nM190", 1))
-    with stand_in("moonraker", steppers=("stepper_a", "stepper_b")) as (job, address):
-        assert sent(file, "--to", address) == 1
-    assert "own.gcode calls CHAMBER_HEAT, which this Klipper does not know" in " ".join(capsys.readouterr().err.split())
-    assert job.files == {}
-
-
-def test_a_file_in_which_the_dry_run_finds_errors_is_not_sent(capsys: pytest.CaptureFixture[str]) -> None:
-    with stand_in("octoprint") as (job, address):
-        assert sent(MARLIN, "--to", address) == 1
-    assert "the dry run found 1 errors, the first: the part begins in air" in capsys.readouterr().err
-    assert job.files == {}
-
-
-def test_a_file_made_for_another_machine_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with stand_in("octoprint") as (job, address):
-        assert sent(MARLIN, "--to", address, "--set", "machine.tilt.point_mm=[0, 0, -33]") == 1
-    assert "was made when machine.tilt.point_mm of generic A/C table was" in capsys.readouterr().err
     assert job.files == {}
 
 

@@ -11,19 +11,10 @@ from rich.console import Console
 from machine.app.terminal.keys import MORE
 from machine.app.terminal.print_display import status
 from machine.app.terminal.screen import KEYS, ScreenState, render
-from machine.dryrun.dryrun import dry_run
-from machine.dryrun.timeline import Timeline
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
-from profiles.profile import load
+from tests.machine.dryrun.test_timeline import TIMELINE
 
-PROFILE = load(settings=["process.layer_height_mm=0.2"])
-PROGRAM = [
-    "G21", "G90", "M83", "G28", "G92 A0 C0", "M104 S210", "M109 S210",
-    ";PART:1 of 2", ";POSE:A0 C0", ";LAYER_CHANGE", "G1 X10 E1 F600", ";LAYER_CHANGE", "G1 X20 E1",
-    ";PART:2 of 2", "G0 Z50", "G0 A30 C120", ";LAYER_CHANGE", "G1 X30 E1", "M104 S0",
-]  # fmt: skip
-TIMELINE = Timeline(dry_run(PROGRAM, PROFILE))
 NOON = datetime(2026, 11, 21, 12, 0, 0)
 MOMENT = Progress(
     sent=14, acknowledged=12, total=14, elapsed_s=754.0, left_s=4335.0, share=0.62,

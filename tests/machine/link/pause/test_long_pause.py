@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from machine.link.journal import Journal, JournalHeading, read_journal
@@ -16,7 +15,7 @@ from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import FirmwareError
 from profiles.profile import Profile, load
-from tests.machine.link.test_pause import BODY, PROGRAM, Watcher, planned, strokes
+from tests.machine.link.test_pause import BODY, PROGRAM, Watcher, is_exact
 
 COOLS_S = 120.0
 COLD_S = COOLS_S + 120.0  # twice the time constant of the simulated nozzle later
@@ -56,11 +55,6 @@ class Patience(Watcher):
     def shown_at(self, seconds: float) -> Progress:
         """What stood on the screen so long after the tip had come to rest."""
         return self.heard[max(at for at in self.heard if at <= seconds)]
-
-
-def is_exact(watcher: Watcher) -> bool:
-    """Whether every stroke lies where the program wants it, in the real places of the axes."""
-    return bool(np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6)
 
 
 @pytest.mark.parametrize("dialect", ["marlin", "klipper", "reprapfirmware"])
