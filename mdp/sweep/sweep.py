@@ -2,8 +2,25 @@
 
 For a unit direction d let h = vertex . d. A face adds a piecewise quadratic in the offset c to "area above c", weighted
 with 1 (risky areas) or with n . d: by the divergence theorem the n . d-weighted area above c is the cross-section at c and
-its first moment about c the volume above c. Faces wholly above an offset go into suffix sums, faces that cross sampled
-offsets are added where they cross. Cost: vertices + faces + crossings.
+its first moment about c the volume above c.
+
+    share of a face above c, whose corners lie at the heights low, mid and high:
+
+      1 |*********                        c <= low          1
+        |         **                      low < c < mid     1 - (c - low)^2 / ((mid - low) (high - low))
+        |           ***                   mid <= c < high   (high - c)^2 / ((high - mid) (high - low))
+        |              **                 high <= c         0
+        |                ***
+      0 |---+---+---+---+---***-+---> c
+        0   1   2   3   4   5   6         columns: sampled offsets, a step apart
+              low   mid       high
+    whole           W                     the face's weight at the first column that it crosses, for all columns before
+    share           s   s   s   s         its weighted shares in those that it crosses
+
+    area above[column] = shares[column] + wholes[column + 1] + wholes[column + 2] + ...
+
+So one way down through the columns adds up all faces: vertices + faces + crossings is what a direction costs. Heights are counted
+in steps above its first offset, which makes column c lie at the height c (sweep.integrals).
 
 There are two passes: `gains` touches only the faces that are risky one way or the other and says what a cut would make safe;
 `sweep` says whether it can be made, and runs only for the directions of candidates that come up.

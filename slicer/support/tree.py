@@ -1,4 +1,24 @@
-"""Tree: support as branches; what begins near each other grows down as one branch."""
+r"""Tree: support as branches; what begins near each other grows down as one branch.
+
+A branch is kept as the places of its middle; printed are discs about all of them. First, from the ground up, it is found where
+such places may be (`reachable`): beside the part, and within the lean of a reachable place in the layer below, or on something.
+Then, from the top down, each layer's branches are made from those above, never out of what is reachable, so none ends in the air.
+
+    _____________________________________
+    | hangs               |             |   add_contact: what hangs is cut along squares of CELL_MM, each begins a branch
+    `------+------+-------+-----.  part |
+     \    / \    / \    /       |       |   lower: a wide branch shrinks to its middle, in every layer by the lean,
+      \  /   \  /   \  /        |       |
+       \ \   / /     ||         |       |   then it is a trunk, round: nearest ones go to meet each other, half way each,
+        \ \_/ /      ||    .----'       |   where the height that is left is enough,
+         \   /        \\   |            |   and get thicker downward;
+          | |         ||   |            |   what comes in its way a branch passes as it is or thinner, moves aside from
+         /   \        ||   |            |   within the lean, or ends on where the part may be stood on (`placeable`)
+    ____/_____\______/__\__|____________|____
+
+The rule for every step: each place of a branch has a place of one below it within the lean, or it stands. What of the tree is as
+wide as a bead and does stand is sifted afterwards (support.stand); what hangs and is not held is counted (missed).
+"""
 
 from dataclasses import dataclass
 from itertools import product

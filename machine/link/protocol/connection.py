@@ -1,6 +1,26 @@
 """The sender's side of the serial protocol without I/O: received bytes go in, events and bytes to send come out.
 
 The caller owns port and clock: it writes what take() gives, hands what it reads to receive() and calls tick() now and then.
+
+Every line has a number and a checksum. The printer takes them in order only: `ok` for each that it took, `Resend: n` where n was
+damaged or is missing, and it takes nothing until n has come. Some lines are on their way at once (the window), so an answer is to
+be told apart from those to lines sent before and after it; only what is known to be missing is sent again, for a line that ran
+twice is a flaw in the print.
+
+    sender                            printer
+    N8 G1 X1*105  ----------------->  ok                  OPEN
+    N9 G1 X2*107  -------##--------   Resend: 9           damaged on the way; N10 is on its way, too:
+    N10 G1 X3*82  ----------------->  Resend: 9           not taken, for 9 is missing
+                                                          QUIET: nothing is sent until no answer comes any more
+    N9 G1 X2*107  ----------------->  ok                  REPEAT: from the history, one by one
+    N10 G1 X3*82  ----------------->  ok                  then OPEN again, at first with one line at a time
+    N11 G1 X4*84  ----------------->  (ok gets lost)      PROBING: silence for too long, so a question with a number
+    N12 M105*20   ----------------->  ok T:205            answered: N11 has come, too; `Resend: 11`: it has not
+
+Bytes become events (decoder), an event or the passing of time amounts to a signal, and the table of states says where that leads:
+
+    bytes -> LineDecoder -> Event -> _handle -> Signal -> TABLE[state] -> what entering the state has to say -> take()
+                       tick -> Timeouts -------^
 """
 
 from machine.firmware import Firmware

@@ -1,4 +1,22 @@
-"""Variable walls: the beads of polygons, as many side by side as fit and as wide as the place (Kuipers et al. 2020)."""
+"""Variable walls: the beads of polygons, as many side by side as fit and as wide as the place (Kuipers et al. 2020).
+
+How thick a place is, is known on its skeleton, the middle line that is as far from the boundary on one side as on the other: half
+the thickness. That says how many beads lie across the place. The outer ones have their nominal width, the innermost one or two
+take what is left, so widths change with the thickness, and where they would get too wide or too narrow, the count does.
+
+    thickness in spacings:    0       1.5        2.7      3.5        4.7     5.5     (while there are walls left to lay)
+    beads across:             |   1   |     2     |    3   |     4     |   5   |
+
+         |( m )|                  1   a line m along the skeleton, as wide as the place
+        |( 0 )( 0 )|              2   both sides of loop 0, each half as wide as the place
+       |( 0 )( m )( 0 )|          3   loop 0 and a line between its sides
+      |( 0 )( 1 )( 1 )( 0 )|      4   loops 0 and 1
+
+The boundary is sampled and triangulated, the circumcentres of the triangles are the skeleton (skeleton). Every node of it gets
+a count that does not flicker to and fro (counts, rule). Loops run round the places that have room for their level (loops), lines
+along the skeleton where the count is odd (lines). Here widths are smoothed where counts change, and lines that lie alone are kept
+inside the place. What is printed are pieces of one width each (pieces).
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -2,9 +2,12 @@
 
 import manifold3d as m3
 import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from slicer.estimate.choice import choose_layers
 from slicer.heights import layer_heights
+from tests.mdp.solids import random_solid
 from tests.shapes import box, standing
 from tests.slicer.hand import profile
 
@@ -31,3 +34,21 @@ def test_a_level_surface_half_way_up_is_looked_at_more_closely() -> None:
     choice = choose_layers(mesh, layer_heights(mesh, PROFILE, True), PROFILE.process, 1)
     ledge = choice.counts[(choice.layers > 144) & (choice.layers < 150)]
     assert ledge.max() < choice.counts.max()
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 50), st.integers(1, 12), st.integers(2, 40))
+def test_every_layer_is_stood_for_by_one_of_its_own_run_and_the_lowest_by_their_own(
+    seed: int, special: int, samples: int
+) -> None:
+    mesh = random_solid(seed)
+    heights = layer_heights(mesh, PROFILE, True)
+    choice = choose_layers(mesh, heights, PROFILE.process, special, samples)
+    ends = np.cumsum(choice.counts)
+    begins = ends - choice.counts
+    assert ends[-1] == len(heights.tip_mm)
+    assert (choice.counts > 0).all()
+    assert ((begins <= choice.layers) & (choice.layers < ends)).all()
+    assert np.abs(choice.layers - 0.5 * (begins + ends - 1)).max() <= 0.5
+    assert {1, min(special, len(heights.tip_mm))} <= set(ends.tolist())
+    assert len(choice.layers) <= samples + 2

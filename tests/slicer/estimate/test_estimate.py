@@ -12,8 +12,10 @@ from mdp.search.search import decompose
 from profiles.process import Process
 from slicer.estimate.estimate import Estimate, estimate
 from slicer.parts import slice_parts
+from slicer.paths import Kind
+from slicer.slice import slice_part
 from tests.shapes import box, standing, tee
-from tests.slicer.hand import BARE, SOLID, cut, profile, whole
+from tests.slicer.hand import BARE, SOLID, cut, profile, volume_mm3, whole
 
 FILAMENT_MM2 = pi * 1.75**2 / 4.0
 STROKE_SPEEDS = [
@@ -73,7 +75,25 @@ def test_support_is_told_apart_and_there_only_where_something_hangs() -> None:
     bare = ("process.skirt_loops=0", "process.small_base_brim_mm=0")
     supported, alone = of(tee(), *bare), of(tee(), *bare, "process.support=none")
     assert supported.support_mm3 == pytest.approx((supported.filament_mm - alone.filament_mm) * FILAMENT_MM2, rel=0.05)
-    assert 300.0 < supported.support_mm3 < 3000.0
+    sliced = slice_part(whole(tee()), profile(*bare))
+    assert supported.support_mm3 == pytest.approx(volume_mm3(sliced, Kind.SUPPORT, Kind.SUPPORT_INTERFACE), rel=0.12)
+    assert supported.filament_mm * FILAMENT_MM2 == pytest.approx(sliced.volume_mm3, rel=0.04)
+
+
+def test_a_small_layer_lasts_as_long_as_it_has_to_cool() -> None:
+    lasting = of(box(8, 8, 10), *SOLID, "process.least_layer_time_s=30", "process.least_speed_mm_s=0.1")
+    assert lasting.time_s == pytest.approx(50 * 30.0, rel=0.05)
+
+
+@pytest.mark.parametrize(("where", "setting"), [("platform", "first_layer_flow"), ("base", "interface_flow")])
+def test_the_first_layer_has_the_flow_of_what_it_lies_on(where: str, setting: str) -> None:
+    below, above = cut(box(20, 20, 20), ((0.0, 0.0, 1.0), 10.0))
+    part = below if where == "platform" else above
+    plain, more = (
+        estimate(part, profile(*SOLID, "process.first_layer_flow=1", "process.interface_flow=1", f"process.{setting}={flow}"))
+        for flow in (1.0, 1.2)
+    )
+    assert (more.filament_mm - plain.filament_mm) * FILAMENT_MM2 == pytest.approx(0.2 * 400.0 * 0.2, rel=0.05)
 
 
 def test_parts_add_up_and_each_later_one_costs_a_turn_of_the_table() -> None:

@@ -1,11 +1,15 @@
 """Shells of sections by hand: a square of 20 mm and beads 0.45 mm wide, 0.2 mm high, 0.407 mm apart."""
 
+import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from slicer.bead import spacing_mm
-from slicer.estimate.shell import shell_of
-from slicer.geometry.polygons import Polygons, area_mm2
-from tests.slicer.hand import profile
+from slicer.bead import length_mm, spacing_mm
+from slicer.estimate.shell import Extent, extent_of, shell_of
+from slicer.geometry.polygons import Polygons, area_mm2, close_loop
+from tests.slicer.hand import as_shapely, profile, ragged
 
 PROCESS = profile().process
 SQUARE = Polygons.square((20.0, 20.0))
@@ -50,3 +54,32 @@ def test_under_a_later_part_is_a_floor() -> None:
     assert shell_of(SQUARE, PROCESS, 0.2, covered=SQUARE, ceiling=half).sparse.area_mm2 == pytest.approx(
         (20.0 - 0.225 - 2.5 * SPACING - 10.0) * (20.0 - 0.45 - 5.0 * SPACING), rel=0.01
     )
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10**6))
+def test_an_extent_is_what_shapely_measures(seed: int) -> None:
+    section = ragged(seed)
+    area = as_shapely(section)
+    pieces = len(shapely.get_parts(area))
+    assert extent_of(section) == Extent(pytest.approx(area.area), pytest.approx(area.length), pieces)
+    assert extent_of(Polygons()) == Extent(0.0, 0.0, 0)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10**6), st.booleans())
+def test_walls_what_they_leave_and_the_inside_share_out_a_section(seed: int, bare: bool) -> None:
+    section = ragged(seed)
+    shell = shell_of(section, PROCESS, 0.2, covered=None if bare else section)
+    widths = [0.225 + 0.5 * SPACING, *[SPACING] * (len(shell.walls) - 1)]
+    walls = [sum(length_mm(close_loop(loop)) for loop in loops) for loops in shell.walls]
+    rest = sum(place.area_mm2 for place in shell.narrow) + shell.skin.area_mm2 + shell.sparse.area_mm2
+    assert np.dot(widths, walls) + rest == pytest.approx(section.area(), rel=0.03)
+    assert not bare or shell.sparse.area_mm2 == 0.0
+
+
+@pytest.mark.parametrize("section", [Polygons(), Polygons.square((0.2, 0.2))])
+def test_of_nothing_and_of_a_speck_no_wall_is_printed(section: Polygons) -> None:
+    shell = shell_of(section, PROCESS, 0.2, covered=None)
+    assert [loop for loops in shell.walls for loop in loops] == []
+    assert (shell.skin.area_mm2, shell.sparse.area_mm2) == (0.0, 0.0)

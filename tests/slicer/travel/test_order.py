@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from slicer.bead import Bead
 from slicer.cooling import _slow_down
@@ -9,7 +11,7 @@ from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.travel.islands import OUTSIDE
-from slicer.travel.order import order_beads
+from slicer.travel.order import _nearest, order_beads
 from tests.shapes import box, tee
 from tests.slicer.hand import profile, whole
 
@@ -40,6 +42,15 @@ def test_an_island_in_a_hole_is_an_island_of_its_own() -> None:
     beads = [line(-1, 0, 1, 0, 0), line(-13, -13, -13, 13, 0), line(-1, 1, 1, 1, 2), line(-12, -13, -12, 13, 2)]
     placed = order_beads(beads, section, STANDARD, np.array([-13.0, -13.0]))
     assert [p.points[0][0] < -10 for p in placed] == [True, True, False, False]
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10**6), st.integers(1, 60))
+def test_the_nearest_point_is_the_nearest_of_all(seed: int, count: int) -> None:
+    random = np.random.default_rng(seed)
+    points, places = random.uniform(0, 40, (count, 2)) ** (1, 0.5), random.uniform(-20, 60, (50, 2))
+    apart = np.hypot(*(places[:, None] - points).transpose(2, 0, 1))
+    assert apart[np.arange(50), _nearest(points, places)] == pytest.approx(apart.min(axis=1))
 
 
 def test_a_travel_inside_the_section_does_not_retract_and_one_across_a_hole_does() -> None:

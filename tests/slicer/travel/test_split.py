@@ -94,6 +94,13 @@ def test_lines_over_a_square(corners: list[tuple[float, float]], kinds: list[Kin
     assert [piece.bead.kind for piece in pieces] == kinds
 
 
+def test_bars_close_together_that_are_each_too_short_are_one_piece_with_the_gap_between_them() -> None:
+    bars = Polygons.square((0.8, 4.0)) + Polygons.square((0.8, 4.0)).translate((1.6, 0.0))
+    pieces = parted(placed(np.array([(-5.0, 2.0), (9.0, 2.0)])), bars, 1.0)
+    assert [piece.bead.kind for piece in pieces] == [Kind.OUTER_WALL, INSIDE, Kind.OUTER_WALL]
+    assert [length_mm(piece.points) for piece in pieces] == pytest.approx([5.0, 2.4, 6.6])
+
+
 def test_beads_of_other_kinds_are_left_alone() -> None:
     skin = placed(np.array([(-5.0, 5.0), (15.0, 5.0)]), Kind.INFILL)
     assert parted(skin, SQUARE, 0.0) == [skin]

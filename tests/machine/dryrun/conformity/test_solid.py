@@ -1,0 +1,130 @@
+"""Inside, distances and beads, against solid angles, trimesh's nearest points and every bar looked at by itself."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from trimesh.triangles import closest_point
+
+from machine.dryrun.conformity.deposit import inside, nearest_faces, outside_mm, signed
+from machine.dryrun.conformity.filling import ROUND_MM, in_beads, lattice
+from machine.dryrun.conformity.registration import _fit
+from mdp.mesh import Floats, Mesh
+from tests.mdp.solids import random_solid
+from tests.shapes import box, hollow
+
+seeds = st.integers(0, 50)
+MOST_MM = 3.0
+
+
+def points_about(mesh: Mesh, seed: int, count: int = 60) -> Floats:
+    low, high = mesh.bounds_mm
+    return np.random.default_rng(seed).uniform(low - 2.0, high + 2.0, (count, 3))
+
+
+def windings(points: Floats, mesh: Mesh) -> Floats:
+    """How often the surface winds about each point: the solid angles of its faces (Van Oosterom and Strackee 1983)."""
+    corners = mesh.vertices[mesh.faces][None] - points[:, None, None]
+    a, b, c = (corners[:, :, k] for k in range(3))
+    p, q, r = (np.linalg.norm(side, axis=2) for side in (a, b, c))
+    volume = np.einsum("nfi,nfi->nf", a, np.cross(b, c))
+    below = p * q * r + (a * b).sum(2) * r + (b * c).sum(2) * p + (c * a).sum(2) * q
+    turns: Floats = np.arctan2(volume, below).sum(axis=1) / (2.0 * np.pi)
+    return turns
+
+
+def distances_mm(points: Floats, mesh: Mesh) -> Floats:
+    """(n, m) of each point from each face, by trimesh."""
+    m = len(mesh.faces)
+    triangles = np.tile(mesh.vertices[mesh.faces], (len(points), 1, 1))
+    each = np.repeat(points, m, axis=0)
+    away: Floats = np.linalg.norm(closest_point(triangles, each) - each, axis=1).reshape(-1, m)
+    return away
+
+
+@settings(max_examples=12)
+@given(seeds)
+def test_a_point_lies_inside_where_the_surface_winds_about_it(seed: int) -> None:
+    mesh = random_solid(seed)
+    points = points_about(mesh, seed)
+    assert np.array_equal(inside(points, mesh), windings(points, mesh) > 0.5)
+
+
+@pytest.mark.parametrize(("mesh", "z_mm", "within"), [(box(), 10.0, True), (hollow(), 10.0, False), (hollow(), 2.0, True)])
+def test_a_point_right_above_the_edges_of_faces_lies_inside_all_the_same(mesh: Mesh, z_mm: float, within: bool) -> None:
+    assert inside(np.array([(0.0, 0.0, z_mm), (1.0, 1.0, z_mm), (-2.0, 2.0, z_mm)]), mesh).tolist() == [within] * 3
+
+
+@settings(max_examples=12)
+@given(seeds)
+def test_points_are_as_far_from_a_solid_as_from_its_nearest_face(seed: int) -> None:
+    mesh = random_solid(seed)
+    points = points_about(mesh, seed, 40)
+    away = distances_mm(points, mesh)
+    nearest = away.min(axis=1)
+    distances, faces = nearest_faces(points, mesh, MOST_MM)
+    near = nearest < MOST_MM
+    assert distances == pytest.approx(np.minimum(nearest, MOST_MM), abs=1e-9)
+    assert away[near, faces[near]] == pytest.approx(nearest[near], abs=1e-9)
+    within = windings(points, mesh) > 0.5
+    assert outside_mm(points, mesh, MOST_MM) == pytest.approx(np.where(within, 0.0, np.minimum(nearest, MOST_MM)), abs=1e-9)
+    assert signed(points, distances, mesh) == pytest.approx(np.where(within, -distances, distances))
+
+
+def test_no_points_have_no_distance() -> None:
+    assert outside_mm(np.zeros((0, 3)), box(), 5.0).shape == (0,)
+
+
+@settings(max_examples=15)
+@given(seeds)
+def test_a_point_is_filled_where_it_lies_in_some_bar_below_its_segment(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = 40
+    ups = rng.normal(size=(count, 3))
+    ups /= np.linalg.norm(ups, axis=1, keepdims=True)
+    along = np.cross(ups, rng.normal(size=(count, 3)))
+    starts = rng.uniform(-8.0, 8.0, (count, 3))
+    segments = np.stack([starts, starts + along * rng.uniform(0.0, 6.0, (count, 1))], axis=1)
+    segments[0, 1] = segments[0, 0]  # of no length
+    width, height = rng.uniform(0.3, 2.0, count), rng.uniform(0.1, 1.0, count)
+    places = rng.uniform(-9.0, 9.0, (4000, 3))
+    filled = np.zeros(len(places), np.bool_)
+    for k in range(1, count):
+        length = np.linalg.norm(segments[k, 1] - segments[k, 0])
+        way = (segments[k, 1] - segments[k, 0]) / length
+        own = (places - segments[k, 0]) @ np.array([way, np.cross(ups[k], way), ups[k]]).T
+        beside, below = np.abs(own[:, 1]) <= 0.5 * width[k] + ROUND_MM, np.abs(own[:, 2] + 0.5 * height[k])
+        ends = (own[:, 0] >= -0.5 * width[k]) & (own[:, 0] <= length + 0.5 * width[k])
+        filled |= beside & ends & (below <= 0.5 * height[k] + ROUND_MM)
+    assert filled.sum() > 20
+    assert np.array_equal(in_beads(places, segments, ups, width, height), filled)
+
+
+@settings(max_examples=10)
+@given(seeds, st.integers(20_000, 60_000))
+def test_the_lattice_has_about_so_many_points_evenly_in_the_solid(seed: int, count: int) -> None:
+    mesh = random_solid(seed)
+    points = lattice(mesh, count)
+    assert len(points) == pytest.approx(count, rel=0.1)
+    few = points[:: max(len(points) // 100, 1)]
+    assert (windings(few, mesh) > 0.5).all()
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10**6), st.integers(60, 400))
+def test_a_shift_is_found_beside_a_constant_and_among_walls_that_lie_elsewhere(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    normals = rng.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    shift, constant = rng.uniform(-0.5, 0.5, 3), rng.uniform(-0.2, 0.2)
+    beside = normals @ shift + constant + rng.normal(0.0, 0.005, count)
+    beside[: count // 10] += rng.uniform(0.5, 1.4, count // 10)
+    found = _fit(normals, beside)
+    assert found == pytest.approx(shift, abs=0.03)
+
+
+def test_a_direction_in_which_no_wall_faces_is_not_told_and_few_walls_tell_nothing() -> None:
+    turns = 2.0 * np.pi * np.arange(100) / 100
+    level = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(100)])
+    assert _fit(level, level @ (0.3, -0.1, 9.0) + 0.1) == pytest.approx([0.3, -0.1, 0.0], abs=1e-6)
+    assert _fit(level[:39], level[:39, 0]) is None

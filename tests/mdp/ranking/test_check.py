@@ -1,0 +1,90 @@
+"""Why a plane cannot cut, against the exact cut of it: every criterion asked of the solids themselves, the first that holds."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.cost.cost import CostTerms
+from mdp.cut import cut, mesh_of, solid_of
+from mdp.directions.spread import spread
+from mdp.mesh import Mesh
+from mdp.overhang import risky_upright
+from mdp.plane import Plane
+from mdp.ranking.candidates import REASONS, Bounds, Reason, bounds_of, check, platform_disc, refusals, score_candidates
+from mdp.sweep.sweep import Remainder
+from profiles.profile import load
+from tests.mdp.solids import random_solid
+from tests.shapes import tee
+
+SEARCH = load(settings=["search.clearance=false", "search.offset_step_mm=2", "search.least_interface_mm2=20"]).search
+MACHINE = load().machine
+TERMS = CostTerms(45.0, False)
+
+
+def limits_for(mesh: Mesh, count: int) -> Bounds:
+    disc = platform_disc(mesh, SEARCH)
+    return bounds_of(spread(count, 0.15)[1:], disc=disc, volume_mm3=mesh.volume_mm3, machine=MACHINE, search=SEARCH)
+
+
+def reasons(mesh: Mesh, limits: Bounds, row: int, offset_mm: float) -> list[Reason]:
+    """All that the exact cut says against a plane, in the order in which they count."""
+    plane = Plane(limits.directions[row], offset_mm)
+    above, below = cut(solid_of(mesh), plane)
+    pieces = [piece for piece in above.decompose() if piece.volume() > 0.0]
+    high = [p for p in pieces if plane.heights_mm(mesh_of(p).vertices).max() >= SEARCH.least_interface_mm2**0.5]
+    areas = [_base_mm2(piece, plane) for piece in (high or [above])]
+    loose = [piece for piece in below.decompose() if piece.volume() > 0.0 and piece.bounding_box()[2] > 0.3]
+    against = {
+        Reason.PLATFORM: offset_mm < limits.least_offset_mm[row],
+        Reason.FLOATING: bool(loose),
+        Reason.VOLUME: above.volume() < limits.least_volume_mm3,
+        Reason.INTERFACE: not loose and min(areas) < SEARCH.least_interface_mm2,
+    }
+    return [reason for reason, holds in against.items() if holds]
+
+
+def _base_mm2(part: m3.Manifold, plane: Plane) -> float:
+    mesh = mesh_of(part)
+    return float(mesh.areas_mm2[(np.abs(plane.heights_mm(mesh.vertices)) < 1e-7)[mesh.faces].all(axis=1)].sum())
+
+
+@settings(max_examples=8)
+@given(st.integers(0, 50))
+def test_a_plane_is_refused_for_the_first_reason_that_its_cut_gives(seed: int) -> None:
+    mesh = random_solid(seed)
+    limits, remainder = limits_for(mesh, 6), Remainder(mesh, risky_upright(mesh, 45.0))
+    for row, direction in enumerate(limits.directions):
+        heights = mesh.vertices @ direction
+        offsets = 2.0 * np.arange(np.ceil(heights.min() / 2.0), np.ceil(heights.max() / 2.0))
+        checked = check(remainder, limits, SEARCH, np.full(len(offsets), row, np.int32), offsets)
+        for offset, reason in zip(offsets.tolist(), checked.reason.tolist(), strict=True):
+            if np.abs(heights - offset).min() < 1e-6:
+                continue  # a face in the plane belongs to either side
+            expected = reasons(mesh, limits, row, offset)
+            assert reason in ((expected[0],) if expected else (Reason.FEASIBLE, Reason.FRAGILE))
+
+
+def test_every_candidate_is_counted_under_one_reason_and_what_gains_too_little_is_not_scored() -> None:
+    mesh = tee()
+    limits, remainder = limits_for(mesh, 60), Remainder(mesh, risky_upright(mesh, 45.0))
+    scored = score_candidates(remainder, limits, TERMS, step_mm=2.0, least_gain_mm2=50.0)
+    counts = refusals(remainder, limits, SEARCH, TERMS, least_gain_mm2=50.0, is_weak=lambda _: False)
+    assert sum(counts.values()) == scored.evaluated
+    assert set(counts) == {Reason.FEASIBLE, *REASONS}
+    assert (scored.gain_mm2 >= 50.0).all()
+    feasible = check(remainder, limits, SEARCH, scored.direction, scored.offset_mm).reason == Reason.FEASIBLE
+    assert counts[Reason.FEASIBLE] == feasible.sum() > 0
+    weak = refusals(remainder, limits, SEARCH, TERMS, least_gain_mm2=50.0, is_weak=lambda _: True)
+    assert (weak[Reason.FEASIBLE], weak[Reason.WEAK]) == (0, counts[Reason.FEASIBLE])
+
+
+@pytest.mark.parametrize(("least_mm2", "scored"), [(-np.inf, True), (1e9, False)])
+def test_what_a_cut_must_gain_decides_what_is_scored(least_mm2: float, scored: bool) -> None:
+    mesh = tee()
+    found = score_candidates(
+        Remainder(mesh, risky_upright(mesh, 45.0)), limits_for(mesh, 10), TERMS, step_mm=2.0, least_gain_mm2=least_mm2
+    )
+    assert (len(found.gain_mm2) > 0) == scored
+    assert found.evaluated > 0

@@ -1,0 +1,167 @@
+"""Frames, sections and edges between the parts of a model: they share it out, and points stay where they are."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from slicer.bead import Bead
+from slicer.geometry.cross_section import cross_sections
+from slicer.geometry.polygons import Polygons, clean
+from slicer.interface.interface import (
+    begin_inside,
+    frame_change,
+    interface_edges,
+    plane_in_frame_of,
+    plastic_below,
+    sections_of,
+    touching,
+)
+from slicer.interface.model import joined
+from slicer.interface.plastic import _nearest_areas
+from slicer.paths import Kind
+from slicer.sectioning import section_part
+from slicer.travel.islands import OUTSIDE
+from tests.mdp.solids import random_direction, random_solid
+from tests.shapes import box
+from tests.slicer.hand import as_shapely, cut, profile
+
+seeds = st.integers(0, 40)
+LEANING = (0.5, -0.2, 0.8)
+NOTHING = Polygons()
+
+
+def in_workpiece(part: Part, points: Floats) -> Floats:
+    """Points of a part's frame in that of the workpiece."""
+    return (points + np.array([0.0, 0.0, part.base.offset_mm])) @ part.rotation
+
+
+def stacked() -> list[Part]:
+    return cut(box(20, 20, 40), ((0.0, 0.0, 1.0), 30.0), (LEANING, 12.0))
+
+
+def test_a_point_is_the_same_in_the_workpiece_from_whichever_part_s_frame_it_is_seen() -> None:
+    points = np.random.default_rng(1).uniform(-30.0, 30.0, (20, 3))
+    for part in stacked():
+        for other in stacked():
+            turn, shift = frame_change(part, other)
+            assert in_workpiece(other, points @ turn.T + shift) == pytest.approx(in_workpiece(part, points))
+
+
+@settings(max_examples=20)
+@given(st.integers(1, 999), st.integers(1, 999), st.floats(-20.0, 20.0))
+def test_a_plane_holds_the_same_points_in_a_part_s_frame(height: int, around: int, offset: float) -> None:
+    normal = random_direction(height, around)
+    for part in stacked():
+        x, y, z, distance = plane_in_frame_of(part, normal, offset)
+        points = np.random.default_rng(height).uniform(-30.0, 30.0, (20, 3))
+        assert points @ (x, y, z) - distance == pytest.approx(in_workpiece(part, points) @ normal - offset)
+
+
+@settings(max_examples=8)
+@given(seeds, st.floats(4.0, 8.0))
+def test_the_sections_of_a_part_and_of_the_others_are_the_model_s(seed: int, offset: float) -> None:
+    mesh = random_solid(seed)
+    lower, upper = cut(mesh, (LEANING, offset))
+    cuts = np.arange(0.55, float(mesh.bounds_mm[1, 2]), 1.7)
+    own = [clean(loops, 0.0) for loops in cross_sections(lower.in_part_frame(), cuts)]
+    whole = [clean(loops, 0.0) for loops in cross_sections(mesh, cuts)]
+    for mine, others, model in zip(own, sections_of([upper], lower, cuts), whole, strict=True):
+        assert mine.area() + others.area() == pytest.approx(model.area(), rel=0.002, abs=0.1)
+        assert as_shapely(mine).intersection(as_shapely(others)).area < 0.1
+    assert [area.is_empty() for area in sections_of([], lower, cuts)] == [True] * len(cuts)
+
+
+def test_parts_touch_that_come_as_near_as_that() -> None:
+    low, middle, high = cut(box(20, 20, 40), ((0.0, 0.0, 1.0), 30.0), ((0.0, 0.0, 1.0), 10.0))
+    assert touching(low, [middle, high], 0.5) == [middle]
+    assert touching(low, [middle, high], 20.5) == [middle, high]
+    assert touching(middle, [low, high], 0.5) == [low, high]
+
+
+def test_beneath_a_part_lies_what_earlier_ones_have_at_its_base_and_under_the_first_one_nothing() -> None:
+    low, middle, _ = stacked()
+    section = Polygons.square((3.0, 3.0))
+    assert plastic_below(low, [], section) is None
+    assert plastic_below(middle, [], section) is section
+    below = plastic_below(middle, [low], section)
+    assert below is not None
+    expected = clean(cross_sections(middle.in_part_frame(), np.array([0.02]))[0]).area()
+    assert below.area() == pytest.approx(expected, rel=0.02)
+
+
+def test_the_edges_of_an_interface_run_once_round_it_for_the_part_below_and_for_the_one_above() -> None:
+    low, high = cut(box(20, 20, 40), (LEANING, 12.0))
+    normal = high.base.normal
+    # the cut of a square prism along z: its outline, seen from above the square, each side lengthened by the slope along it
+    round_mm = sum(2 * 20.0 * np.hypot(1.0, normal[axis] / normal[2]) for axis in (0, 1))
+    for part, sections in (
+        (low, section_part(low, profile(), [], [high])),
+        (high, section_part(high, profile(), [low], [])),
+    ):
+        edges = interface_edges(sections)
+        assert np.linalg.norm(edges[:, 3:] - edges[:, :3], axis=1).sum() == pytest.approx(round_mm, rel=0.01)
+        ends = in_workpiece(part, edges[:, :3])
+        assert np.abs(high.base.heights_mm(ends)).max() < 0.15
+    assert interface_edges(section_part(low, profile())).shape == (0, 6)
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 10_000), st.integers(1, 4))
+def test_a_place_is_shared_out_to_the_least_of_linear_functions(seed: int, count: int) -> None:
+    functions = [f * (1.0, 1.0, 8.0) for f in np.random.default_rng(seed).normal(size=(count, 3))]
+    place = Polygons.square((20.0, 20.0), True) - Polygons.circle(4.0, 64)
+    x, y = (np.arange(-9.95, 10.0, 0.1) for _ in range(2))
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = points[shapely.contains_xy(as_shapely(place), points)]
+    least = np.argmin([points @ f[:2] + f[2] for f in functions], axis=0)
+    areas = _nearest_areas(place, functions)
+    assert areas == pytest.approx(0.01 * np.bincount(least, minlength=count), abs=1.5)
+    assert sum(areas) == pytest.approx(place.area())
+
+
+@pytest.mark.parametrize(
+    ("beside", "area_mm2"),
+    [
+        (Polygons.square((5.0, 10.0)).translate((10.0, 0.0)), 150.0),
+        (Polygons.square((5.0, 10.0)).translate((10.01, 0.0)), 150.1),  # a slit that is closed
+        (Polygons.square((5.0, 10.0)).translate((11.0, 0.0)), None),
+        (NOTHING, None),
+        (Polygons.square((5.0, 10.0)).translate((10.0, 0.0)) + Polygons.square((5.0, 5.0)).translate((40.0, 0.0)), 150.0),
+    ],
+)
+def test_the_islands_of_the_model_are_those_that_hold_some_of_a_section(beside: Polygons, area_mm2: float | None) -> None:
+    own = Polygons.square((10.0, 10.0))
+    model = joined(own, own, beside)
+    assert (None if model is None else pytest.approx(model.area(), abs=0.02)) == area_mm2
+
+
+def test_a_section_that_lost_grooves_belongs_to_the_one_it_had_before() -> None:
+    before = Polygons.square((10.0, 10.0))
+    assert joined(before, before - Polygons.square((2.0, 2.0)), NOTHING) is before
+    assert joined(NOTHING, NOTHING, before) is None
+
+
+def bead(kind: Kind, length: float, rank: int = 3) -> Bead:
+    return Bead(kind, np.array([(0.0, 0.0), (length, 0.0)]), 0.45, rank)
+
+
+@pytest.mark.parametrize(
+    ("beads", "first"),
+    [
+        ([bead(Kind.OUTER_WALL, 40), bead(Kind.SKIN, 30), bead(Kind.INFILL, 3), bead(Kind.INFILL, 5)], 3),
+        ([bead(Kind.OUTER_WALL, 40), bead(Kind.SKIN, 30), bead(Kind.SKIN, 30)], 1),
+        ([bead(Kind.OUTER_WALL, 40)], 0),
+        ([bead(Kind.OUTER_WALL, 40), bead(Kind.INFILL, 5), bead(Kind.SUPPORT, 5, OUTSIDE)], 0),
+        ([], None),
+    ],
+)
+def test_a_layer_on_plastic_begins_with_its_longest_line_inside_unless_it_has_support(
+    beads: list[Bead], first: int | None
+) -> None:
+    begun = begin_inside(beads)
+    assert [b.length_mm for b in begun] == [b.length_mm for b in sorted(beads, key=lambda b: beads.index(b) != first)]
+    assert first in (0, None) or begun[0].rank == OUTSIDE

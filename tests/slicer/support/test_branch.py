@@ -1,0 +1,95 @@
+"""Branches by themselves: what shrinking, joining and meeting do to their places, judged by shapely and by all pairs."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slicer.geometry.polygons import Polygons, islands
+from slicer.support.branch import MEETING, THICKEST_MM, Branch, Growth, _drop_enclosed, _goals, branch_of, trunk
+from slicer.support.tree import CELL_MM, Tree
+from tests.slicer.hand import as_shapely, profile, ragged
+
+seeds = st.integers(0, 10**6)
+
+
+def some_trunks(seed: int, count: int) -> list[Branch]:
+    rng = np.random.default_rng(seed)
+    return [trunk(x, y, radius, 20.0) for x, y, radius in rng.uniform((-15, -15, 0.3), (15, 15, 8.0), (count, 3)).tolist()]
+
+
+@settings(max_examples=25)
+@given(seeds, st.floats(0.05, 0.95))
+def test_a_branch_that_shrinks_moves_no_place_further_than_its_radius_becomes_less(seed: int, share: float) -> None:
+    whole = branch_of(ragged(seed), 20.0)
+    middle = shapely.Point(whole.x, whole.y)
+    assert middle.hausdorff_distance(as_shapely(whole.area)) == pytest.approx(whole.radius)
+    low = whole.shrink(share * whole.radius)
+    lean_mm = whole.radius - low.radius
+    assert as_shapely(low.area).buffer(lean_mm + 0.01, quad_segs=64).covers(as_shapely(whole.area).buffer(-1e-3))
+    assert low.area.area() == pytest.approx(share**2 * whole.area.area())
+    assert middle.hausdorff_distance(as_shapely(low.area)) == pytest.approx(low.radius)
+
+
+@given(st.floats(0.1, 5.0))
+def test_a_trunk_has_every_place_within_its_radius_and_reaches_little_further(radius: float) -> None:
+    branch = trunk(3.0, -2.0, radius, 20.0)
+    area = as_shapely(branch.area)
+    assert area.buffer(1e-9).covers(shapely.Point(3.0, -2.0).buffer(radius - 1e-9))
+    assert shapely.Point(3.0, -2.0).hausdorff_distance(area) == pytest.approx(branch.reach_mm)
+    assert radius < branch.reach_mm < 1.04 * radius
+
+
+@settings(max_examples=40)
+@given(seeds, st.integers(0, 12))
+def test_a_branch_is_dropped_where_a_trunk_has_all_its_places_and_of_equal_ones_one_stays(seed: int, count: int) -> None:
+    trunks = some_trunks(seed, count)
+    trunks += trunks[: count // 3]
+    left = _drop_enclosed(trunks)
+    discs = [shapely.Point(b.x, b.y).buffer(b.radius, quad_segs=64) for b in trunks]
+    assert shapely.union_all(discs).difference(shapely.union_all([discs[trunks.index(b)] for b in left])).area < 1e-6
+    pairs = [(a, b) for a in left for b in left if a is not b]
+    assert all(np.hypot(a.x - b.x, a.y - b.y) > a.radius - b.radius for a, b in pairs)
+    assert len({(b.x, b.y, b.radius) for b in left}) == len(left)
+
+
+@settings(max_examples=40)
+@given(seeds, st.integers(0, 9), st.floats(0.0, 20.0))
+def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: int, count: int, reach: float) -> None:
+    at = np.random.default_rng(seed).uniform(-15.0, 15.0, (count, 2))
+    expected = []
+    for k, own in enumerate(at):
+        others = sorted((float(np.hypot(*(own - other))), j) for j, other in enumerate(at) if j != k)
+        meets = others and others[0][0] <= 2.0 * MEETING * reach
+        expected.append(tuple(0.5 * (own + at[others[0][1]])) if meets else tuple(own))
+    assert np.array(_goals(at, reach)).reshape(-1, 2) == pytest.approx(np.array(expected).reshape(-1, 2))
+
+
+@pytest.mark.parametrize(
+    ("depth_mm", "radius"), [(-5.0, 0.55), (0.0, 0.55), (10.0, 0.55 + 10 * np.tan(np.pi / 36)), (1e4, THICKEST_MM)]
+)
+def test_a_trunk_gets_thicker_downward_by_its_angle_and_no_thicker_than_the_thickest(depth_mm: float, radius: float) -> None:
+    process = profile("process.support_branch_mm=2", "process.support_branch_growth_deg=5").process
+    growth = Growth.of(process, 0.45)
+    assert growth.radius_mm(trunk(0.0, 0.0, 1.0, 50.0), 50.0 - depth_mm) == pytest.approx(radius)
+
+
+@settings(max_examples=25)
+@given(seeds)
+def test_a_tree_takes_up_all_of_a_contact_that_is_reachable_in_a_branch_for_every_square(seed: int) -> None:
+    contact, reachable = ragged(seed), Polygons.square((60.0, 60.0), True) - Polygons.square((9.0, 60.0)).translate((4.0, -30.0))
+    grown = Tree(Growth(0.5, 0.05)).add_contact(contact ^ reachable, reachable, 20.0)
+    wanted, area = as_shapely(contact ^ reachable), as_shapely(grown.area)
+    assert wanted.difference(area).area < 0.02 * wanted.area
+    assert as_shapely(reachable).buffer(1e-6).covers(area)
+    squares = {(int(np.floor(b.x / CELL_MM)), int(np.floor(b.y / CELL_MM))) for b in grown.branches}
+    assert len(squares) <= len(grown.branches) <= len(islands(contact ^ reachable)) + 36
+    assert all(b.top_mm == 20.0 for b in grown.branches)
+
+
+def test_nothing_that_begins_changes_no_tree_and_no_branches_go_nowhere() -> None:
+    tree = Tree(Growth(0.5, 0.05))
+    assert tree.add_contact(Polygons(), Polygons.square((9.0, 9.0)), 20.0) is tree
+    assert tree.lower(None, 3) is tree  # type: ignore[arg-type]
+    assert tree.area.is_empty()
