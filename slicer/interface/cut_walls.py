@@ -41,13 +41,13 @@ def cut_walls(
 
     usual: how many walls the model would have here. Walls that end on a cut face are all of one width.
     """
-    width, outer = process.line_width_mm, process.outer_wall_line_width_mm
+    width = process.line_width_mm
     if model is None:
         round_ = layer_walls(section, process.walls, process, height_mm, nozzle_mm)
         fewer = round_ if usual == process.walls else layer_walls(section, usual, process, height_mm, nozzle_mm)
         return CutWalls(round_, (), fewer.inside)
-    whole = walls(model, process.walls, width, height_mm, outer)
-    fewer = whole if usual == process.walls else walls(model, usual, width, height_mm, outer)
+    whole = walls(model, process.walls, process, height_mm)
+    fewer = whole if usual == process.walls else walls(model, usual, process, height_mm)
     round_ = layer_walls(section, min(process.interface_walls, process.walls), process, height_mm, nozzle_mm)
     if process.interface_walls >= process.walls or round_.inside.is_empty():
         return CutWalls(round_, (), fewer.inside)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from slicer.bead import Bead, Course, length_mm, spacing_mm
+from slicer.bead import Bead, Course, length_mm, simplify_bead, spacing_mm
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.walls.variable.rule import Rule
@@ -27,6 +27,9 @@ def gaps(places: Polygons, line_width_mm: float, height_mm: float) -> list[Bead]
     courses = [course for course in courses if length_mm(course.points) > SHORTEST * line_width_mm]
     covered_mm2 = sum(course.width_mm * length_mm(course.points) for course in courses)
     wider = min(places.area() / covered_mm2, MOST_WIDER) if courses else 1.0
-    widths = [np.minimum(wider * course.widths + line_width_mm - spacing, widest_mm) for course in courses]
-    filling = [Course(course.points, own) for course, own in zip(courses, widths, strict=True)]
-    return [Bead(Kind.GAP, course.points, course.width_mm, RANK, course=course if course.varies else None) for course in filling]
+    beads = []
+    for course in courses:
+        widths = np.minimum(wider * course.widths + line_width_mm - spacing, widest_mm)
+        own = Course(course.points, widths)
+        beads.append(simplify_bead(Bead(Kind.GAP, own.points, own.width_mm, RANK, course=own if own.varies else None)))
+    return beads

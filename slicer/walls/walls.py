@@ -14,7 +14,7 @@ from slicer.paths import Kind
 from slicer.walls.variable.variable import Wall
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner
-LEAST_REST = 0.12  # of the line width: walls turn round in a place that is narrower than two by less than that
+LEAST_REST = 0.12  # of the line width: narrower places without a core behind them are corners, which walls run into
 LEAST_REST_MM2 = 1e-3
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
 
@@ -31,34 +31,35 @@ class Walls:
     varying: tuple[Wall, ...] = ()
 
 
-def walls(section: Polygons, count: int, width_mm: float, height_mm: float, outer_mm: float | None = None) -> Walls:
-    """Up to `count` walls of a section for beads of that width and height, the outermost outer_mm wide where that is given."""
-    outer = width_mm if outer_mm is None else outer_mm
-    spacing, least_mm = spacing_mm(width_mm, height_mm), LEAST_REST * width_mm
+def walls(section: Polygons, count: int, process: Process, height_mm: float) -> Walls:
+    """Up to `count` walls of a section, of the widths of the process."""
+    outer, width = outer_wall_width_mm(process), process.line_width_mm
+    spacing, least_mm = spacing_mm(width, height_mm), LEAST_REST * width
     area, levels = section, []
     for level in range(count):
         half, behind = (0.5 * spacing, 0.5 * spacing) if level else (0.5 * outer, 0.5 * spacing_mm(outer, height_mm))
         line = offset(area, -half)
         core = offset(line, -behind)
-        levels.append(tuple(contours(_backed(area, line, core, half, behind, least_mm))))
+        levels.append(tuple(contours(_backed(area, line, core, half_mm=half, behind_mm=behind, least_mm=least_mm))))
         area = core.simplify(PATH_RESOLUTION_MM)
         if core.is_empty():
             break
     core = offset(area, -0.5 * spacing)
-    return Walls(tuple(levels), _backed(area, area, core, SLACK_MM, 0.5 * spacing, least_mm))
+    inside = _backed(area, area, core, half_mm=SLACK_MM, behind_mm=0.5 * spacing, least_mm=least_mm)
+    return Walls(tuple(levels), inside)
 
 
-def _backed(area: Polygons, line: Polygons, core: Polygons, half: float, behind: float, least_mm: float) -> Polygons:
-    """What of a bead's centreline has the core behind it.
+def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, behind_mm: float, least_mm: float) -> Polygons:
+    """What of the centreline of an area's outermost bead has the core behind it: all, where no rest is at least so wide.
 
     half: reach of the bead outward from its centreline; behind: distance from the centreline to the core.
     """
     if area.is_empty():
         return line
-    rest = area - offset(core, half + behind + SLACK_MM, BLUNT)
+    rest = area - offset(core, half_mm + behind_mm + SLACK_MM, BLUNT)
     if rest.area() < LEAST_REST_MM2 or offset(rest, -0.5 * least_mm).is_empty():
         return line
-    return line ^ offset(core, behind + SLACK_MM)
+    return line ^ offset(core, behind_mm + SLACK_MM)
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:

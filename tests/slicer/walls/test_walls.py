@@ -15,6 +15,7 @@ from slicer.walls.walls import wall_beads, walls
 from tests.slicer.hand import distances_mm, profile, section_at, shared
 
 WIDTH, HEIGHT = 0.45, 0.2
+PROCESS = profile().process
 SPACING = 0.45 - 0.2 * (1 - np.pi / 4)
 Points = list[tuple[float, float]]
 
@@ -28,14 +29,14 @@ def test_spacing_makes_the_bead_as_large_as_its_strip() -> None:
 
 
 def test_three_walls_of_a_square_lie_at_half_a_width_and_then_a_spacing_apart() -> None:
-    walled = walls(rectangle(20, 20), 3, WIDTH, HEIGHT)
+    walled = walls(rectangle(20, 20), 3, PROCESS, HEIGHT)
     boxes = [loops[0].min(axis=0)[0] for loops in walled.loops]
     assert boxes == pytest.approx([0.225, 0.225 + SPACING, 0.225 + 2 * SPACING], abs=1e-6)
     assert walled.inside.area() == pytest.approx((20 - 2 * (0.225 + 2.5 * SPACING)) ** 2, rel=1e-6)
 
 
 def test_a_hole_gets_walls_of_its_own_running_the_other_way() -> None:
-    walled = walls(rectangle(20, 20) - rectangle(6, 6).translate((7, 7)), 1, WIDTH, HEIGHT)
+    walled = walls(rectangle(20, 20) - rectangle(6, 6).translate((7, 7)), 1, PROCESS, HEIGHT)
     across = sorted(np.ptp(loop[:, 0]) for loop in walled.loops[0])
     assert across == pytest.approx([6.45, 19.55], abs=1e-6)
 
@@ -44,7 +45,7 @@ def test_outer_walls_of_a_real_model_keep_half_a_width_from_its_exact_outline() 
     mesh, off = shared("org_kitten", 60.0), []
     for z in np.arange(0.5, 60, 2.7):
         exact = shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in cross_sections(mesh, np.array([z]))[0]])
-        for loop in walls(section_at(mesh, z), 3, WIDTH, HEIGHT).loops[0]:
+        for loop in walls(section_at(mesh, z), 3, PROCESS, HEIGHT).loops[0]:
             line = shapely.LineString(np.vstack([loop, loop[:1]]))
             points = shapely.line_interpolate_point(line, np.arange(0, line.length, 0.1))
             off.append(shapely.distance(exact, points) - WIDTH / 2)
@@ -57,7 +58,7 @@ def test_outer_walls_of_a_real_model_keep_half_a_width_from_its_exact_outline() 
 @given(st.lists(st.tuples(st.floats(-8, 8), st.floats(-8, 8)), min_size=5, max_size=12))
 def test_walls_stay_inside_any_polygon(points: Points) -> None:
     polygon = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(2.0, 24)
-    for level, loops in enumerate(walls(polygon, 3, WIDTH, HEIGHT).loops):
+    for level, loops in enumerate(walls(polygon, 3, PROCESS, HEIGHT).loops):
         for loop in loops:
             coarse = 0.01 + level * PATH_RESOLUTION_MM
             assert distances_mm(polygon, loop).min() > WIDTH / 2 + level * SPACING - coarse
@@ -65,14 +66,14 @@ def test_walls_stay_inside_any_polygon(points: Points) -> None:
 
 @pytest.mark.parametrize(("order", "first"), [("inner-first", Kind.INNER_WALL), ("outer-first", Kind.OUTER_WALL)])
 def test_walls_are_ranked_in_the_order_asked_for(order: str, first: Kind) -> None:
-    beads = wall_beads(walls(rectangle(20, 20), 3, WIDTH, HEIGHT), profile(f"process.wall_order={order}").process, HEIGHT)
+    beads = wall_beads(walls(rectangle(20, 20), 3, PROCESS, HEIGHT), profile(f"process.wall_order={order}").process, HEIGHT)
     ranked = sorted(beads, key=lambda bead: bead.rank)
     assert ranked[0].kind is first
     assert [b.rank <= 0 for b in ranked] == [True] * 3
 
 
 def test_outer_beads_carry_what_their_round_side_leaves_out_up_to_the_bulge() -> None:
-    walled = walls(rectangle(20, 20), 3, WIDTH, HEIGHT)
+    walled = walls(rectangle(20, 20), 3, PROCESS, HEIGHT)
     flows = [wall_beads(walled, profile(f"process.outer_bulge={b}").process, HEIGHT)[0].flow for b in (0.0, 0.04, 0.2)]
     strip = 0.2 * (WIDTH + SPACING) / 2  # from the outline to half a spacing inside the centreline
     assert flows == pytest.approx(
@@ -83,11 +84,11 @@ def test_outer_beads_carry_what_their_round_side_leaves_out_up_to_the_bulge() ->
 def test_five_thousand_holes_are_walled() -> None:
     holes = [Polygons.circle(0.8, 12).translate((3 * i, 3 * j)) for i in range(71) for j in range(71)]
     plate = Polygons.square((220, 220)).translate((-4, -4)) - Polygons.compose(holes)
-    walled = walls(plate, 3, WIDTH, HEIGHT)
+    walled = walls(plate, 3, PROCESS, HEIGHT)
     assert len(walled.loops[0]) == 71**2 + 1
 
 
 def test_where_no_pair_of_walls_has_room_none_turns_round() -> None:
     bar = rectangle(20, 1.5 * WIDTH).translate((9.0, 4.0))  # beside a block, which has room
-    for loop in walls(rectangle(10, 10) + bar, 3, WIDTH, HEIGHT).loops[0]:
+    for loop in walls(rectangle(10, 10) + bar, 3, PROCESS, HEIGHT).loops[0]:
         assert loop[:, 0].max() < 10.0
