@@ -14,7 +14,8 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not instal
 RING_Y = """(() => { const path = document.querySelector('[data-ring=y] .near'), box = $('rings').getBoundingClientRect();
   const at = (share) => path.getPointAtLength(share * path.getTotalLength());
   return [at(0.5), at(0.6)].map(({ x, y }) => [x + box.x, y + box.y]); })()"""
-SLIPPED = """(({ add, scaled, sub, unit }, { faceMet }) => { let seed = 7; const random = () => (seed = seed * 16807 % 2147483647) / 2147483647 - 0.5;
+SLIPPED = """(({ add, scaled, sub, unit }, { faceMet }) => { let seed = 7;
+  const random = () => (seed = seed * 16807 % 2147483647) / 2147483647 - 0.5;
   const place = () => [random(), random(), random()], ends = () => [place(), place()];
   return Array.from({ length: 2000 }, () => { const [a, b] = ends(), [c, d] = ends(), along = random() + 0.5;
     const on = add(scaled(a, along), scaled(b, 1 - along)), from = scaled(place(), 100);

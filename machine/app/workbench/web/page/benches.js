@@ -4,6 +4,7 @@
 import { $, made, notice } from "../../../../view/template/page.js";
 import { alike, partsInWords, putRows } from "./elements.js";
 import { sendFile } from "./line.js";
+import { onState } from "./store.js";
 
 const TOLD_MS = 8000;
 const HERE = Number(location.pathname.split("/").at(-2));
@@ -56,7 +57,7 @@ function benchRow({ number, name, parts, work }) {
 
 export function benchesPanel() {
   $("another").addEventListener("click", () => openBench());
-  return { told: ({ benches }, before) => { if (!alike(benches, before?.benches)) showBenches(benches); } };
+  onState(({ benches }, before) => { if (!alike(benches, before?.benches)) showBenches(benches); });
 }
 
 export async function leftFiles() {
