@@ -1,8 +1,8 @@
 // Benches: several models at once, each on a bench and in a page of its own; a page that is closed leaves its bench as it is. What lay on
 // those of a workbench that was killed is offered again.
 
-import { $, made, notice } from "../../../../view/template/page.js";
-import { alike, partsInWords, putRows } from "./elements.js";
+import { $, made, notice, partsInWords } from "../../../../view/template/page.js";
+import { alike, putRows } from "./elements.js";
 import { sendFile } from "./line.js";
 import { onState } from "./store.js";
 

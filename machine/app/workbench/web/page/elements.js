@@ -1,10 +1,8 @@
 // Elements: texts, lists and rows that several panels show in the same way.
 
-import { $, duration, made } from "../../../../view/template/page.js";
+import { $, made } from "../../../../view/template/page.js";
 
 export const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
-export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
-export const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 
 /** Pairs of a name and a text, and of a class where the text has one; what has not changed stays, and what is selected in it. */

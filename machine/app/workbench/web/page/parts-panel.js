@@ -1,7 +1,7 @@
 // Parts panel: the search, and its front as a slider.
 
-import { $, made } from "../../../../view/template/page.js";
-import { listIn, mm2, partsInWords, roughly, tellIn } from "./elements.js";
+import { $, made, partsInWords, roughly } from "../../../../view/template/page.js";
+import { listIn, mm2, tellIn } from "./elements.js";
 import { ask, send } from "./line.js";
 import { onState, store, update } from "./store.js";
 

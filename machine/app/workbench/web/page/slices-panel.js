@@ -1,7 +1,7 @@
 // Slices panel: copies and pauses, the parts sliced, what the print takes, what the dry run complains of, and what one piece would cost.
 
-import { $, duration, made } from "../../../../view/template/page.js";
-import { alike, listIn, mm2, roughly, swatch, tellIn } from "./elements.js";
+import { $, duration, made, roughly } from "../../../../view/template/page.js";
+import { alike, listIn, mm2, swatch, tellIn } from "./elements.js";
 import { send } from "./line.js";
 import { onState, store, update } from "./store.js";
 
