@@ -1,8 +1,7 @@
 // Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
 
 import { hex, RAMP, typeColour } from "./colours.js";
-import { inParts } from "./front.js";
-import { $, made } from "./page.js";
+import { $, made, partsInWords } from "./page.js";
 import { KIND } from "./rows.js";
 import { tabsOf } from "./tabs.js";
 
@@ -62,7 +61,7 @@ export function showLegend({ rows, header }, { mode, tried }, legend) {
   const box = $("legend");
   if (tried) {
     const entries = tried.colours.slice(0, 24).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`));
-    return box.replaceChildren(made("b", { text: `as ${inParts(tried.parts)}` }), ...entries);
+    return box.replaceChildren(made("b", { text: `as ${partsInWords(tried.parts)}` }), ...entries);
   }
   box.replaceChildren(made("b", { text: (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "") }));
   if (legend) {

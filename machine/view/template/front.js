@@ -1,14 +1,13 @@
 // Front: the best decomposition for every number of parts: its figures, and how another one than the taken would cut the model.
 
-import { $, duration, made } from "./page.js";
+import { $, made, roughly } from "./page.js";
 import { MOST_CUTS } from "./solids.js";
 
-export const inParts = (count) => `${count} part${count === 1 ? "" : "s"}`;
 const orDash = (value, told) => (value === null ? "–" : told(value));
 const FRONT = [
   ["support mm²", (row) => Math.max(row.support_area_mm2, 0).toFixed(1)],
   ["seams mm", (row) => row.seam_mm.toFixed(0)],
-  ["about", (row) => orDash(row.time_s, (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, "")))],
+  ["about", (row) => orDash(row.time_s, roughly)],
   ["filament m", (row) => orDash(row.filament_mm, (length) => (length / 1000).toFixed(1))],
 ];
 

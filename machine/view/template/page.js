@@ -18,6 +18,11 @@ export function duration(seconds) {
   return hours ? `${hours}h ${minutes}m ${rest}s` : minutes ? `${minutes}m ${rest}s` : `${rest}s`;
 }
 
+/** The same where a minute more or less is nothing. */
+export const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
+
+export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
+
 const NOTICES = new Map(); // what is said now, by what it is about
 
 /** Says something over the picture, or ("") says it no more; shown is what began to be said last.

@@ -12,6 +12,7 @@ from machine.app.workbench.bench.part_settings import option, renumbered
 from machine.app.workbench.bench.placing import Placing, moved_part, moved_zones
 from machine.app.workbench.bench.renumbering import gone_in_words, number_after, renumbered_stops
 from machine.app.workbench.bench.settings import USUAL
+from machine.app.workbench.bench.values import vector_of
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
@@ -181,7 +182,7 @@ def with_model_turned_as_read(bench: Bench, model: Model, turn: Floats, factor: 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
     """The model turned otherwise, with its zones; its cuts were for the way that it stood before."""
-    rows = tuple(_vector(row) for row in rotation)
+    rows = tuple(vector_of(row) for row in rotation)
     if rows == bench.rotation:
         return bench
     turned = replace(with_model_anew(bench, bench.model), rotation=rows)
@@ -282,7 +283,7 @@ def with_parts(bench: Bench, count: int) -> Bench:
 
 def parts_of(row: FrontRow) -> tuple[PlannedPart, ...]:
     """The parts of a row from the second on, in print order."""
-    return tuple(PlannedPart(_vector(plane.normal), float(plane.offset_mm)) for plane in reversed(row.planes))
+    return tuple(PlannedPart(vector_of(plane.normal), float(plane.offset_mm)) for plane in reversed(row.planes))
 
 
 def plan_of_bench(bench: Bench, name: str) -> PlanFile:
@@ -316,8 +317,3 @@ def _shortest(start: Floats, end: Floats) -> Floats:
     x, y, z = across
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + along))
-
-
-def _vector(values: Sequence[float] | Floats) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

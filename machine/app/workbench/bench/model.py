@@ -9,6 +9,7 @@ from secrets import token_hex
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.app.workbench.bench.values import vector_of
 from mdp.mesh import Mesh
 from profiles.frozen import Vector
 
@@ -32,8 +33,8 @@ class Model:
         """One whose mesh is written to a file first."""
         with mesh_file.open("wb") as file:
             file.writelines(mesh_blocks(mesh))
-        x, y, z = (float(side) for side in np.ptp(mesh.bounds_mm, axis=0))
-        return cls(name, path, mesh_file, len(mesh.faces), (x, y, z), mesh.volume_mm3, notes)
+        size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
+        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes)
 
     def mesh(self) -> Mesh:
         """Its triangles, read anew."""

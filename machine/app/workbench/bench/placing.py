@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from machine.app.workbench.bench.values import vector_of
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import ZONE_KINDS, PlannedPart
 from mdp.plans.reading import MOST_MM
@@ -63,7 +64,7 @@ def moved_part(part: PlannedPart, move: Placing) -> PlannedPart:
     if part.normal is None or part.offset_mm is None:
         return part
     normal = move.turn @ np.array(part.normal)
-    return replace(part, normal=_vector(normal), offset_mm=move.factor * part.offset_mm + float(normal @ move.shift_mm))
+    return replace(part, normal=vector_of(normal), offset_mm=move.factor * part.offset_mm + float(normal @ move.shift_mm))
 
 
 def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:
@@ -71,7 +72,7 @@ def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:
         return _moved_box(zone, move, label)
     if isinstance(zone, Grown):
         place = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
-        return replace(zone, point_mm=_vector(np.round(place, POINT_DIGITS)))
+        return replace(zone, point_mm=vector_of(np.round(place, POINT_DIGITS)))
     return zone
 
 
@@ -80,7 +81,7 @@ def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
     low, high = (move.factor * np.array(corner) + axes @ move.shift_mm for corner in (box.min_mm, box.max_mm))
     level = np.round(axes)
     if np.abs(axes - level).max() > LEVEL:
-        x, y, z = (_vector(row) for row in axes)
+        x, y, z = (vector_of(row) for row in axes)
         return Zone(*_sides(low, high, label), (x, y, z))
     low, high = level.T @ low, level.T @ high
     return Zone(*_sides(np.minimum(low, high), np.maximum(low, high), label))
@@ -99,9 +100,4 @@ def _sides(low: Floats, high: Floats, label: str) -> tuple[Vector, Vector]:
 
 def _side(values: Floats) -> Vector:
     values = np.clip(values, -MOST_MM, MOST_MM)
-    return _vector(np.round(values, BOX_DIGITS) + 0.0)
-
-
-def _vector(values: Floats) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+    return vector_of(np.round(values, BOX_DIGITS) + 0.0)

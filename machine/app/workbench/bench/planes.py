@@ -7,7 +7,7 @@ sense.
 from math import hypot
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.bench.values import MOST_MM, Asked, number, vector, whole
+from machine.app.workbench.bench.values import MOST_MM, Asked, number, vector, vector_of, whole
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
@@ -46,8 +46,7 @@ def reorder(bench: Bench, asked: Asked) -> Cuts:
 
 def snap(bench: Bench, asked: Asked, plane: Plane) -> Cuts:
     """The plane of `part` becomes another one."""
-    x, y, z = (float(value) for value in plane.normal)
-    return _replaced(bench, asked, PlannedPart((x, y, z), float(plane.offset_mm)))
+    return _replaced(bench, asked, PlannedPart(vector_of(plane.normal), float(plane.offset_mm)))
 
 
 def planned_part(bench: Bench, asked: Asked) -> PlannedPart:
@@ -72,5 +71,4 @@ def _plane(asked: Asked) -> PlannedPart:
     length = hypot(*normal)
     if not LEAST_NORMAL <= length <= MOST_NORMAL:
         raise PlanError(f"normal is {asked['normal']}: a direction of a length of about 1 is expected")
-    x, y, z = (value / length for value in normal)
-    return PlannedPart((x, y, z), number(asked, "offset_mm", -MOST_MM, MOST_MM))
+    return PlannedPart(vector_of(value / length for value in normal), number(asked, "offset_mm", -MOST_MM, MOST_MM))

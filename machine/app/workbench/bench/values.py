@@ -1,5 +1,6 @@
 """Values: what a page has sent with a command, checked one by one; each raises PlanError with a sentence for what it is not."""
 
+from collections.abc import Iterable
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -16,6 +17,11 @@ ROTATION_ERROR = 1e-6
 def is_number(value: Any) -> TypeGuard[int | float]:
     """Whether a value of a page's is a number to reckon with: no more digits than a float has."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MOST_NUMBER
+
+
+def is_small_number(text: str) -> bool:
+    """Whether the text of an address is a number of so few digits that it may be one of ours."""
+    return text.isascii() and text.isdigit() and len(text) < 6
 
 
 def whole(asked: Asked, key: str, least: int, most: int) -> int:
@@ -42,7 +48,12 @@ def vector(asked: Asked, key: str, most: float = MOST_NUMBER) -> Vector:
         raise PlanError(f"{key}: three numbers are expected")
     if max(map(abs, value)) > most:
         raise PlanError(f"{key} is {value}: {-most:g} to {most:g} is allowed")
-    x, y, z = map(float, value)
+    return vector_of(value)
+
+
+def vector_of(values: Iterable[float]) -> Vector:
+    """Three numbers as floats."""
+    x, y, z = map(float, values)
     return x, y, z
 
 

@@ -51,36 +51,24 @@ Order = PrintOrder | ResumeOrder | FollowOrder
 
 
 def first_state(order: Order) -> State:
-    """What is known of a print before its process has said anything."""
-    printing = order.printing
+    """What is known of a print before its process has said anything. resumes: the journal of the print whose rest it is; key: of
+    the slices."""
+    printing, slices = order.printing, order if isinstance(order, PrintOrder) else None
+    journal = order.journal if isinstance(order, ResumeOrder) else None
     return {
         "phase": "checking",
-        **_known(order),
-        "starts": not isinstance(order, PrintOrder) or order.starts,
+        "name": slices.name if slices else journal.stem if journal else "what it prints",
+        "machine": slices.profile.machine.name if slices else "",
+        "resumes": str(journal or ""),
+        "key": slices.key if slices else "",
+        "force": bool(slices and slices.force),
+        "starts": slices is None or slices.starts,
         "port": printing.port,
         "baud": printing.baud,
         "sim_speed": printing.sim_speed,
         "server": is_server_address(printing.port),
-        "checks": (),
-        "figures": None,
-        "question": "",
-        "upload": None,
-        "progress": None,
-        "words": (),
-        "said": (),
-        "log": "",
-        "journal": "",
-        "end": "",
-        "sentence": "",
-        "forcible": False,
-        "stop_given": False,
+        **dict.fromkeys(("question", "log", "journal", "end", "sentence"), ""),
+        **dict.fromkeys(("checks", "words", "said"), ()),
+        **dict.fromkeys(("figures", "upload", "progress")),
+        **dict.fromkeys(("forcible", "stop_given"), False),
     }
-
-
-def _known(order: Order) -> State:
-    """resumes: the journal of the print whose rest it is; key: of the slices."""
-    if isinstance(order, FollowOrder):
-        return {"resumes": "", "name": "what it prints", "machine": "", "force": False, "key": ""}
-    if isinstance(order, ResumeOrder):
-        return {"resumes": str(order.journal), "name": order.journal.stem, "machine": "", "force": False, "key": ""}
-    return {"resumes": "", "name": order.name, "machine": order.profile.machine.name, "force": order.force, "key": order.key}

@@ -35,7 +35,6 @@ class SessionBase(Observable):
         self.problem = ""
         self.answers: dict[str, str] = {}
         self.busy = ""
-        self.closed = False
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
         self.received = Received()

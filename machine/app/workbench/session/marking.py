@@ -18,8 +18,8 @@ class Marking:
         self._one = asyncio.Lock()
 
     async def take(self, task: str, asked: Asked) -> None:
-        """Do what a task of `work.models` makes of a command; planes that it forbids go, and the reason is told. Raises PlanError
-        for what makes no sense, and where a plane that would go is locked."""
+        """Do what a task, a function of `bench.marks`, makes of a command; planes that it forbids go, and the reason is told.
+        Raises PlanError for what makes no sense, and where a plane that would go is locked."""
         async with self._one:
             while not await self._taken(task, asked):
                 pass  # something else came in between

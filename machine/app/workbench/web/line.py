@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -11,10 +11,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.snapshot import snapshot
+from machine.app.workbench.work.observable import Observable
 from profiles.errors import PlanError
 
 MOST_COMMAND = 100_000  # characters
-_states: WeakKeyDictionary[Session, tuple[int, str]] = WeakKeyDictionary()
+_states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
 CLOSED = "this bench is not open any more"
 CLOSED_CODE = 4404  # of a websocket that is closed for that
 GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
@@ -23,7 +24,7 @@ GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
 async def talk(session: Session, socket: WebSocket) -> None:
     """State out, commands in, until either side goes. A page that reads nothing holds up nobody but itself."""
     await socket.accept()
-    await until_either_ends(_tell(session, socket), _hear(session, socket))
+    await until_either_ends(tell(session, lambda: snapshot(session), socket), _hear(session, socket))
 
 
 async def refuse_closed(socket: WebSocket) -> None:
@@ -58,22 +59,16 @@ async def receive(socket: WebSocket) -> str:
     return message.get("text") or ""
 
 
-async def _tell(session: Session, socket: WebSocket) -> None:
-    """The newest state whenever there is one; what came in between while a slow page was reading is left out."""
-    while not session.closed:
-        seen = session.version
-        await send(socket, _state(session))
-        await session.changed(seen)
+async def tell(source: Observable, state: Callable[[], dict[str, Any]], socket: WebSocket) -> None:
+    """The newest state whenever there is one, put into words once for all pages; what came in between while a slow page was
+    reading is left out."""
+    while not source.closed:
+        seen, text = _states.get(source, (-1, ""))
+        if seen != source.version:
+            seen, text = _states[source] = source.version, json.dumps(state())
+        await send(socket, text)
+        await source.changed(seen)
     await socket.close(CLOSED_CODE, CLOSED)
-
-
-def _state(session: Session) -> str:
-    """The state as it goes over the line, made once for all pages."""
-    version, text = _states.get(session, (-1, ""))
-    if version != session.version:
-        text = json.dumps(snapshot(session))
-        _states[session] = session.version, text
-    return text
 
 
 async def _hear(session: Session, socket: WebSocket) -> None:

@@ -3,7 +3,6 @@
 import json
 import secrets
 from collections.abc import Awaitable, Callable
-from functools import lru_cache
 from pathlib import Path
 
 from starlette.requests import Request
@@ -14,7 +13,7 @@ from machine.app.crash import bug_in_words, log_bug
 from machine.app.workbench.printing.commands import PageOfPrints, obey
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.workbench import Workbench
-from machine.app.workbench.web.line import parsed, receive, refuse_closed, send, until_either_ends
+from machine.app.workbench.web.line import parsed, receive, refuse_closed, send, tell, until_either_ends
 from profiles.errors import UserError
 
 MOST_COMMAND = 10_000  # characters
@@ -37,7 +36,7 @@ def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], A
         await socket.accept()
         with prints.page(page):
             try:
-                await until_either_ends(_tell(prints, socket), _hear(socket, PageOfPrints(page, session, prints)))
+                await until_either_ends(tell(prints, prints.snapshot, socket), _hear(socket, PageOfPrints(page, session, prints)))
             except ExceptionGroup as bugs:
                 log_bug(bugs.exceptions[0], ())
 
@@ -55,19 +54,6 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
         return Response("there is no log of this print\n", 404)
 
     return answer
-
-
-async def _tell(prints: Prints, socket: WebSocket) -> None:
-    while True:
-        seen = prints.version
-        await send(socket, _text(prints, seen))
-        await prints.changed(seen)
-
-
-@lru_cache(maxsize=1)
-def _text(prints: Prints, version: int) -> str:
-    """The state as all pages get it: put into words once a version."""
-    return json.dumps(prints.snapshot())
 
 
 async def _hear(socket: WebSocket, page: PageOfPrints) -> None:

@@ -12,6 +12,7 @@ from starlette.websockets import WebSocket
 
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import settings_list
+from machine.app.workbench.bench.values import is_small_number
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.commands import Need, check_need
 from machine.app.workbench.session.session import Session
@@ -154,7 +155,7 @@ def _settings(files: ProfileFiles) -> Act:
         bench = replace(session.bench, given=given)
         names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
         part = request.query_params.get("part", "")
-        rows = settings_list(bench.profile, given, int(part) if part.isascii() and part.isdigit() and len(part) < 6 else 0)
+        rows = settings_list(bench.profile, given, int(part) if is_small_number(part) else 0)
         return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
 
     return answer

@@ -46,10 +46,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "pedestal": session.standing.pedestal_key,
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATFORM_TOLERANCE_MM,
-        "resting": [
-            {"rotation": rest.rotation, "words": rest.words, "overhang_mm2": rest.overhang_mm2, "height_mm": rest.height_mm}
-            for rest in resting
-        ],
+        "resting": [asdict(rest) for rest in resting],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
         **slices_told(session),
         "front": [front_record(row) for row in bench.rows],
@@ -84,11 +81,8 @@ def marks_key(bench: Bench) -> str:
 
 
 def _zones(bench: Bench) -> list[dict[str, Any]]:
-    return [
-        {"kind": kind, "number": number, **asdict(zone)}
-        for kind in ZONE_KINDS
-        for number, zone in enumerate(getattr(bench.zones, kind), start=1)
-    ]
+    kinds = ((kind, enumerate(getattr(bench.zones, kind), start=1)) for kind in ZONE_KINDS)
+    return [{"kind": kind, "number": number, **asdict(zone)} for kind, zones in kinds for number, zone in zones]
 
 
 def _model(model: Model) -> dict[str, Any]:

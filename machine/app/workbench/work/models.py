@@ -1,4 +1,4 @@
-"""Models: reading one, the ways in which it rests, and what a person marks on it, as tasks of the workbench."""
+"""Models: reading one, the ways in which it rests, and the faces that are marked on it, as tasks of the workbench."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,14 +7,12 @@ import numpy as np
 
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.bench.marks import mark, named_faces, unmark
+from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.bench.values import Asked
 from machine.app.workbench.work.processes import Tell
 from mdp.directions.orientation import in_words, side_in_words
 from mdp.read import read_mesh
 from mdp.search.laying import distinct_orientations
-from mdp.zone import Zones
 from profiles.errors import MeshError
 from profiles.profile import Profile
 
@@ -50,16 +48,6 @@ def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, .
         )
         for orientation in distinct_orientations(model.mesh(), profile)
     )
-
-
-def mark_bench(tell: Tell, bench: Bench, asked: Asked) -> tuple[str, Zones]:
-    """What `bench.marks.mark` makes of a command. Raises PlanError."""
-    return mark(bench, asked)
-
-
-def unmark_bench(tell: Tell, bench: Bench, asked: Asked) -> tuple[str, Zones]:
-    """The same of `bench.marks.unmark`."""
-    return unmark(bench, asked)
 
 
 def mark_faces(tell: Tell, bench: Bench) -> bytes:

@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 
 class Observable:
-    """All from the event loop. listeners: called with every change, before whoever waits for it."""
+    """All from the event loop. listeners: called with every change, before whoever waits for it; closed: no more come."""
 
     def __init__(self) -> None:
-        self.version = 0
+        self.version, self.closed = 0, False
         self.listeners: list[Callable[[], None]] = []
         self._changed = asyncio.Event()
 

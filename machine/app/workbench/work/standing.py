@@ -6,6 +6,7 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import mesh_blocks
+from machine.app.workbench.bench.values import vector_of
 from machine.app.workbench.work.cutting import standing_mesh
 from machine.app.workbench.work.pieces import out_of_reach
 from machine.app.workbench.work.processes import Tell
@@ -32,7 +33,7 @@ class Standing:
 def stand(tell: Tell, bench: Bench) -> Standing:
     """How the model on the bench stands."""
     mesh, profile, pedestal, refusal = standing_mesh(bench), bench.profile, b"", ""
-    x, y, z = (float(side) for side in np.ptp(mesh.bounds_mm, axis=0))
+    size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
     height_mm = profile.search.pedestal_mm
     if height_mm > 0.0:
         try:
@@ -42,4 +43,4 @@ def stand(tell: Tell, bench: Bench) -> Standing:
             pedestal, refusal = b"", str(error)
     risky = risky_upright(mesh, profile.process.self_supporting_angle_deg)
     problem = out_of_reach((one_piece(mesh, profile.machine),), profile)
-    return Standing((x, y, z), float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal)
+    return Standing(size_mm, float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal)

@@ -6,7 +6,7 @@ from tests.machine.fake_page import needs_node, on_fake_page
 
 # A print that is heard of once, at the beginning of time.
 HEARD = """
-    printPanel({ state: null });
+    printPanel();
     const heats = { nozzle_c: 209.6, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, heat_s: 0, heat_is_old: false };
     const moment = { state: "printing", ...heats, at: {}, elapsed_s: 5 };
     const known = { number: 1, name: "box", port: "sim", phase: "printing", checks: [], words: [], said: [] };

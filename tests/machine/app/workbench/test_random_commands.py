@@ -16,8 +16,9 @@ from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import named
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.work.models import mark_bench, read_model, unmark_bench
+from machine.app.workbench.work.models import read_model
 from machine.app.workbench.work.standing import Standing
+from machine.app.workbench.work.tasks import TASKS
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
@@ -131,10 +132,8 @@ class Tried:
                 return Trial(())
             case "read_model":
                 return read_model(lambda told: None, *given)
-            case "mark_bench":
-                return mark_bench(lambda told: None, *given)
-            case "unmark_bench":
-                return unmark_bench(lambda told: None, *given)
+            case "mark" | "unmark":
+                return TASKS[task](lambda told: None, *given)
             case "stand":
                 return Standing((40.0, 8.0, 40.0), 0.0, "")
             case "price_row":

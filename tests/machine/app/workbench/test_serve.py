@@ -113,7 +113,7 @@ def test_a_page_of_a_workbench_that_hangs_waits_for_it(browser: Browser) -> None
         browser.wait("document.documentElement.dataset.line === 'open'")
         running.process.send_signal(signal.SIGSTOP)
         try:
-            browser.value("{ window.why = whyUnanswered(); }")
+            browser.value("{ window.whyUnanswered = modules['page/line'].whyUnanswered; window.why = whyUnanswered(); }")
             assert browser.value("window.why") == "lost"
         finally:
             running.process.send_signal(signal.SIGCONT)

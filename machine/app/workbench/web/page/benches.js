@@ -1,9 +1,10 @@
 // Benches: several models at once, each on a bench and in a page of its own; a page that is closed leaves its bench as it is. What lay on
 // those of a workbench that was killed is offered again.
 
-import { $, made, notice } from "../../../../view/template/page.js";
-import { alike, partsInWords, putRows } from "./elements.js";
+import { $, made, notice, partsInWords } from "../../../../view/template/page.js";
+import { alike, putRows } from "./elements.js";
 import { sendFile } from "./line.js";
+import { onState } from "./store.js";
 
 const TOLD_MS = 8000;
 const HERE = Number(location.pathname.split("/").at(-2));
@@ -56,7 +57,7 @@ function benchRow({ number, name, parts, work }) {
 
 export function benchesPanel() {
   $("another").addEventListener("click", () => openBench());
-  return { told: ({ benches }, before) => { if (!alike(benches, before?.benches)) showBenches(benches); } };
+  onState(({ benches }, before) => { if (!alike(benches, before?.benches)) showBenches(benches); });
 }
 
 export async function leftFiles() {

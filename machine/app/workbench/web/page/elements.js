@@ -1,10 +1,8 @@
 // Elements: texts, lists and rows that several panels show in the same way.
 
-import { $, duration, made } from "../../../../view/template/page.js";
+import { $, made } from "../../../../view/template/page.js";
 
 export const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
-export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
-export const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 
 /** Pairs of a name and a text, and of a class where the text has one; what has not changed stays, and what is selected in it. */
@@ -41,4 +39,30 @@ export function swatch(colour) {
   const mark = made("span", { className: "swatch" });
   mark.style.backgroundColor = colour;
   return mark;
+}
+
+/** A table's head and rows(), where what they tell has changed: else the keyboard would lose its place, which it has again after. */
+export function putTable(table, told, head, rows) {
+  const fresh = JSON.stringify(told);
+  if (table.dataset.shown === fresh) return;
+  table.dataset.shown = fresh;
+  const name = table.contains(document.activeElement) ? document.activeElement.name : "", body = rows();
+  const titles = made("tr", {}, ...head.map(([text, className = ""]) => made("th", { text, scope: "col", className })));
+  table.replaceChildren(...(body.length && head.length ? [made("thead", {}, titles)] : []), ...(body.length ? [made("tbody", {}, ...body)] : []));
+  if (name) table.querySelector(`[name=${name}]:checked`)?.focus();
+}
+
+/** A row that is chosen by its radio button, in the label of which its name stands, or by a click; cells: [content, class]. */
+export function choiceRow(name, value, checked, label, cells, choose) {
+  const mark = made("input", { type: "radio", name, value, checked });
+  mark.addEventListener("change", choose);
+  const row = made("tr", {}, made("td", {}, made("label", {}, mark, ...label)), ...cells.map(([content, className]) => made("td", { className }, content)));
+  row.addEventListener("click", (event) => { if (!["INPUT", "LABEL", "BUTTON"].includes(event.target.tagName)) choose(); });
+  return row;
+}
+
+/** A knob put where a place is seen; null: it is not. */
+export function putAt(knob, place) {
+  knob.hidden = !place;
+  if (place) knob.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
 }

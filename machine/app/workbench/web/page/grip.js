@@ -1,5 +1,7 @@
 // Grip: what in the picture a hand, a finger or arrow keys take hold of, follow and let go.
 
+import { add } from "../../../../view/template/math.js";
+
 const ARROWS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 };
 
 /** An element that is dragged: take(event) gives what is held, null: not now; move(held, event) follows the hand; put(held) ends
@@ -33,4 +35,14 @@ export function gripOf(element, { take, move, put, drop, step, stepped = () => {
   const letGo = () => { if (stepping) [stepping] = [false, stepped()]; };
   element.addEventListener("keyup", (event) => { if (event.key in ARROWS) letGo(); });
   element.addEventListener("blur", letGo);
+}
+
+const LEAST_PIXELS = 0.5; // of a mm along a way: seen head on, what is held would jump
+
+/** later(event): how many mm a hand has gone along a way since it took hold of a place; null where that is not seen. */
+export function alongWay(picture, place, way, event) {
+  const from = picture.placeOf(place), to = picture.placeOf(add(place, way));
+  if (!from || !to) return null;
+  const seen = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...seen), LEAST_PIXELS);
+  return (later) => ((later.clientX - event.clientX) * seen[0] + (later.clientY - event.clientY) * seen[1]) / (pixels * pixels);
 }

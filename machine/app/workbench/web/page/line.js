@@ -33,13 +33,14 @@ export function lineAt(path, heard, stands) {
 }
 
 /** Why no line can be opened: nobody is there, or one that does not know the page's address, which has another token at each start. */
-const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
+export const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
   ({ status }) => (status === 404 ? "replaced" : "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
 
-/** {send(command), ask(command, answered)}: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD;
- * answered(refusal) after the state by which a command is done ("") or refused. */
-export function lineTo(follow, stands) {
-  const page = crypto.randomUUID(), asked = new Map(); // by a name that no other page has
+let line = null, asked = new Map(), count = 0; // asked: what is called when a command is answered, by its name
+const page = crypto.randomUUID(); // in the names of commands, for no other page has it
+
+/** The page's line to its bench: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD. */
+export function openLine(follow, stands) {
   const answer = ({ answers }) => {
     for (const [name, refusal] of Object.entries(answers)) {
       const answered = asked.get(name);
@@ -47,18 +48,18 @@ export function lineTo(follow, stands) {
       answered?.(refusal);
     }
   };
-  const line = lineAt("line", (state) => { follow(state); answer(state); }, stands);
-  const send = (command) => { if (line.isOpen()) line.send(command); };
-  let count = 0;
-  return {
-    send,
-    ask: (command, answered) => {
-      if (!line.isOpen()) return answered(NOT_SENT);
-      const name = `${page} ${++count}`;
-      asked.set(name, answered);
-      send({ ...command, ask: name });
-    },
-  };
+  line = lineAt("line", (state) => { follow(state); answer(state); }, stands);
+}
+
+/** A command; what becomes of it is seen by the next states. */
+export const send = (command) => { if (line?.isOpen()) line.send(command); };
+
+/** The same; answered(refusal) is called after the state by which it is done ("") or refused. */
+export function ask(command, answered) {
+  if (!line?.isOpen()) return answered(NOT_SENT);
+  const name = `${page} ${++count}`;
+  asked.set(name, answered);
+  send({ ...command, ask: name });
 }
 
 /** Sends a file of the person's to a bench; what is wrong with it comes back by the line, also where it is not taken to its end. */

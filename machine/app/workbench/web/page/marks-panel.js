@@ -1,12 +1,13 @@
 // Marks: boxes and faces that are left alone: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
 import { add, bounds, scaled } from "../../../../view/template/math.js";
-import { $, made, notice } from "../../../../view/template/page.js";
+import { $, made } from "../../../../view/template/page.js";
 import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/solids.js";
-import { alike, swatch } from "./elements.js";
-import { gripOf } from "./grip.js";
+import { alike, choiceRow, putAt, putTable, swatch } from "./elements.js";
+import { alongWay, gripOf } from "./grip.js";
+import { send } from "./line.js";
 import { sizeOf } from "./model-panel.js";
-import { LEAST_PIXELS, STEP_MM } from "./planes-panel.js";
+import { onState, store, subscribe, update } from "./store.js";
 import { wordOf } from "./triangles.js";
 
 const MARK_KINDS = {
@@ -16,7 +17,7 @@ const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a fa
 const BOX_SIDES = [0, 1, 2].flatMap((axis) => [{ axis, end: "min_mm", name: `least ${"xyz"[axis]}` }, { axis, end: "max_mm", name: `greatest ${"xyz"[axis]}` }]);
 const PAINT = 0.6; // faces are painted in darker colours, which no part has
 const AROUND_MM = 1; // of the corners that are clicked, so that a box reaches through the surface
-const THINNEST_MM = 0.2;
+const THINNEST_MM = 0.2, STEP_MM = 0.5;
 
 /** A box's own axes: a model that was turned has taken them along. */
 const axesOf = ({ axes }) => axes || [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
@@ -33,147 +34,127 @@ export function markedOver(bits, colours) {
   return colours;
 }
 
-export function marksPanel(bench) {
-  let chosen = null, hand = null, corner = null, drawn = "", painted = "", shown = "";
-  const same = (one, other) => Boolean(one && other) && one.kind === other.kind && one.number === other.number;
-  const boxes = () => bench.state.zones.filter((zone) => zone.min_mm).map((zone) => (same(hand, zone) ? hand : zone));
-  const box = () => boxes().find((zone) => same(zone, chosen)) || null;
-  const kind = () => $("mark-kind").value;
-  /** What clicks on the model do: "" nothing here, "faces", "box". */
-  bench.mark = (what) => {
-    bench.marking = what;
-    corner = null;
-    $("mark-faces").setAttribute("aria-pressed", what === "faces");
-    $("mark-box").setAttribute("aria-pressed", what === "box");
-    const told = { faces: `Click where there is to be ${MARK_KINDS[kind()].word}; Esc ends it.`, box: "Click a corner of the box." };
-    if (what) bench.snap(false);
-    notice(told[what] || "", "hand");
-  };
-  const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
-  bench.markAt = (place) => {
-    if (bench.marking === "faces") return bench.send({ do: "mark", kind: kind(), point_mm: fine(place), angle_deg: Number($("mark-angle").value) });
-    if (!corner) {
-      corner = place;
-      return notice("Now the opposite corner.", "hand");
-    }
-    const [least, most] = bounds([...corner, ...place]);
-    bench.mark("");
-    addBox(least.map((x) => x - AROUND_MM), most.map((x) => x + AROUND_MM));
-  };
-  const addBox = (least, most) => {
-    chosen = { kind: kind(), number: bench.state.zones.filter((zone) => zone.kind === kind()).length + 1 };
-    bench.send({ do: "mark", kind: kind(), min_mm: fine(least), max_mm: fine(most) });
-  };
-  const put = (zone) => {
-    hand = zone;
-    bench.send({ do: "mark", kind: zone.kind, number: zone.number, min_mm: fine(zone.min_mm), max_mm: fine(zone.max_mm), axes: zone.axes || null });
-  };
-  /** A box with one side somewhere else, never thinner than it can be. */
-  const withSide = (zone, { axis, end }, at) => {
-    const limit = end === "min_mm" ? zone.max_mm[axis] - THINNEST_MM : zone.min_mm[axis] + THINNEST_MM;
-    const value = end === "min_mm" ? Math.min(at, limit) : Math.max(at, limit);
-    return { ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) };
-  };
-  const sidePlace = (zone, { axis, end }) => fromBox(zone, [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2)));
-  const choose = (zone) => {
-    chosen = zone && { kind: zone.kind, number: zone.number };
-    hand = null;
-    const faces = bench.state.zones.find((each) => same(each, chosen) && each.point_mm);
-    if (faces) $("mark-angle").value = faces.angle_deg;
-    tellMarks();
-    bench.showMarks();
-  };
-  $("mark-angle").addEventListener("change", () => {
-    const faces = bench.state.zones.find((each) => same(each, chosen) && each.point_mm);
-    if (faces) bench.send({ do: "mark", ...faces, angle_deg: Number($("mark-angle").value) });
-  });
-  $("mark-faces").disabled = $("mark-box").disabled = !bench.picture;
-  for (const what of ["faces", "box"]) $(`mark-${what}`).addEventListener("click", () => bench.mark(bench.marking === what ? "" : what));
-  $("mark-kind").addEventListener("change", () => bench.mark(bench.marking || ""));
+const sameMark = (a, b) => Boolean(a && b) && a.kind === b.kind && a.number === b.number;
+const kindNow = () => $("mark-kind").value;
+export const markWord = () => MARK_KINDS[kindNow()].word;
+const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
+
+const boxes = () => store.state.zones.filter((zone) => zone.min_mm).map((zone) => (sameMark(store.zoneHand, zone) ? store.zoneHand : zone));
+const boxNow = () => boxes().find((zone) => sameMark(zone, store.zone)) || null;
+const facesNow = () => store.state.zones.find((zone) => sameMark(zone, store.zone) && zone.point_mm);
+
+/** A click on the model where faces or a corner of a box are marked. */
+export function markAt(place) {
+  if (store.clicks === "faces") return send({ do: "mark", kind: kindNow(), point_mm: fine(place), angle_deg: Number($("mark-angle").value) });
+  if (!store.corner) return update({ corner: place });
+  const [least, most] = bounds([...store.corner, ...place]);
+  update({ clicks: "", corner: null });
+  addBox(least.map((x) => x - AROUND_MM), most.map((x) => x + AROUND_MM));
+}
+
+function addBox(least, most) {
+  const kind = kindNow();
+  update({ zone: { kind, number: store.state.zones.filter((zone) => zone.kind === kind).length + 1 }, zoneHand: null });
+  send({ do: "mark", kind, min_mm: fine(least), max_mm: fine(most) });
+}
+
+const holdBox = (zone) => update({ zoneHand: zone });
+
+function putBox(zone) {
+  holdBox(zone);
+  send({ do: "mark", kind: zone.kind, number: zone.number, min_mm: fine(zone.min_mm), max_mm: fine(zone.max_mm), axes: zone.axes || null });
+}
+
+/** A box with one side somewhere else, never thinner than it can be. */
+function withSide(zone, { axis, end }, at) {
+  const limit = end === "min_mm" ? zone.max_mm[axis] - THINNEST_MM : zone.min_mm[axis] + THINNEST_MM;
+  const value = end === "min_mm" ? Math.min(at, limit) : Math.max(at, limit);
+  return { ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) };
+}
+
+const sidePlace = (zone, { axis, end }) => fromBox(zone, [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2)));
+
+function chooseMark(zone) {
+  update({ zone: zone && { kind: zone.kind, number: zone.number }, zoneHand: null });
+  if (facesNow()) $("mark-angle").value = facesNow().angle_deg;
+}
+
+export function marksPanel(picture) {
+  let asked = ""; // which faces are marked, or come
+  $("mark-angle").addEventListener("change", () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: Number($("mark-angle").value) }); });
   $("mark-middle").addEventListener("click", () => {
-    bench.mark("");
-    const [x, y, z] = sizeOf(bench.state), low = bench.state.pedestal_mm;
+    update({ clicks: "" });
+    const [x, y, z] = sizeOf(store.state), low = store.state.pedestal_mm;
     addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
   });
-  const knobs = BOX_SIDES.map((side) => {
-    const knob = made("button", { type: "button", text: "xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), ariaLabel: `${side.name} of the box: drag, or arrow keys` });
-    knob.dataset.side = `${side.end} ${side.axis}`;
-    const move = (zone) => { hand = zone; bench.showMarks(); tellMarks(); };
-    gripOf(knob, {
-      take: (event) => {
-        const zone = box(), place = sidePlace(zone, side), from = bench.picture.placeOf(place);
-        const to = bench.picture.placeOf(add(place, axesOf(zone)[side.axis]));
-        if (!from || !to) return null;
-        const way = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...way), LEAST_PIXELS);
-        return { zone, at: zone[side.end][side.axis], start: [event.clientX, event.clientY], way: way.map((x) => x / pixels), pixels };
-      },
-      move: ({ zone, at, start, way, pixels }, event) => move(withSide(zone, side, at + ((event.clientX - start[0]) * way[0] + (event.clientY - start[1]) * way[1]) / pixels)),
-      put: () => { if (hand) put(hand); },
-      drop: () => choose(chosen),
-      step: (sign) => { const zone = box(); move(withSide(zone, side, zone[side.end][side.axis] + sign * STEP_MM)); },
-      stepped: () => { if (hand) put(hand); },
-    });
-    return { side, knob };
-  });
-  $("mark-handles").replaceChildren(...knobs.map(({ knob }) => knob));
-  const numbers = BOX_SIDES.map((side) => {
-    const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${side.name}, mm` });
-    input.dataset.side = `${side.end} ${side.axis}`;
-    input.addEventListener("change", () => { if (box()) put({ ...box(), [side.end]: box()[side.end].map((x, k) => (k === side.axis ? Number(input.value) : x)) }); });
-    return { side, input };
-  });
-  $("mark-numbers").replaceChildren(...numbers.map(({ side, input }) => made("label", {}, `${side.name} `, input)));
-  bench.placeMarks = () => {
-    const zone = bench.tab === "parts" && bench.triangles ? box() : null;
+  const knobs = BOX_SIDES.map((side) => knobOf(side, picture)), numbers = BOX_SIDES.map(numberOf);
+  $("mark-handles").replaceChildren(...knobs);
+  $("mark-numbers").replaceChildren(...numbers.map((input, k) => made("label", {}, `${BOX_SIDES[k].name} `, input)));
+  picture?.drawn.push(() => {
+    const zone = store.tab === "parts" && store.triangles ? boxNow() : null;
     $("mark-handles").hidden = !zone;
-    if (!zone) return;
-    for (const { side, knob } of knobs) {
-      const place = bench.picture.placeOf(sidePlace(zone, side));
-      knob.hidden = !place;
+    if (zone) knobs.forEach((knob, k) => {
+      putAt(knob, picture.placeOf(sidePlace(zone, BOX_SIDES[k])));
       knob.style.backgroundColor = `rgb(${MARK_KINDS[zone.kind].colour})`;
-      if (place) knob.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
-    }
-  };
-  /** Boxes and marked faces in the picture, where parts are looked at. */
-  bench.showMarks = () => {
-    if (!bench.picture || !bench.triangles) return;
-    const seen = bench.tab === "parts" && bench.state.model ? boxes() : [], fresh = JSON.stringify([seen, chosen]);
-    if (fresh !== drawn) bench.picture.extra("marks", seen.flatMap((zone) => boxDrawn(zone, same(zone, chosen))));
-    drawn = fresh;
-    const wanted = bench.tab === "parts" ? bench.faceMarks || null : null, key = wanted ? bench.faceMarksKey : "";
-    if (key !== painted) bench.picture.marks(wanted);
-    painted = key;
-  };
+    });
+  });
   const fetchMarks = async (key) => {
-    bench.faceMarksKey = key;
+    asked = key;
     const answer = key ? await fetch(`marks/${key}`).catch(() => null) : null;
-    if (bench.faceMarksKey !== key) return;
-    if (!answer) bench.faceMarksKey = ""; // the line is lost: the next state asks again
-    bench.faceMarks = answer && answer.status === 200 ? new Uint8Array(await answer.arrayBuffer()) : null;
-    bench.showMarks();
+    if (asked !== key) return;
+    if (!answer) asked = ""; // the line is lost: the next state asks again
+    update({ faceMarks: answer?.status === 200 ? new Uint8Array(await answer.arrayBuffer()) : null });
     document.documentElement.dataset.marks = key;
   };
-  const tellMarks = () => {
-    const zone = box();
+  onState((state, before) => {
+    const changed = !alike(state.zones, before?.zones), gone = before && !state.busy && changed && store.zone && !state.zones.some((zone) => sameMark(zone, store.zone));
+    if (changed || (state.problem && state.problem !== before?.problem)) update({ zoneHand: null, ...(gone ? { zone: null } : {}) });
+    document.body.classList.toggle("no-marks", !state.zones.length);
+    if (state.marks !== asked) fetchMarks(state.marks);
+  });
+  subscribe((now) => {
+    const zone = boxNow();
     $("mark-numbers").hidden = !zone;
-    if (zone) for (const { side, input } of numbers) if (document.activeElement !== input) input.value = zone[side.end][side.axis].toFixed(2);
-    const fresh = JSON.stringify([bench.state.zones, chosen]);
-    if (fresh === shown) return;
-    shown = fresh;
-    const kept = document.activeElement?.name === "mark";
-    $("marks").replaceChildren(made("tbody", {}, ...bench.state.zones.map((each) => markRow(each, same(each, chosen), () => choose(each), bench))));
-    if (kept) $("marks").querySelector(":checked")?.focus();
-  };
-  return {
-    told: (state, before) => {
-      if (!alike(state.zones, before?.zones) || (state.problem && state.problem !== before?.problem)) hand = null;
-      if (chosen && !state.busy && !state.zones.some((zone) => same(zone, chosen)) && before && !alike(state.zones, before.zones)) chosen = null;
-      document.body.classList.toggle("no-marks", !state.zones.length);
-      if (state.model?.key !== before?.model?.key) painted = ""; // the picture's own went with the model before
-      if (state.marks !== (bench.faceMarksKey || "")) fetchMarks(state.marks);
-      tellMarks();
+    if (zone) BOX_SIDES.forEach(({ axis, end }, k) => { if (document.activeElement !== numbers[k]) numbers[k].value = zone[end][axis].toFixed(2); });
+    putTable($("marks"), [now.state.zones, now.zone], [], () => now.state.zones.map((mark) => markRow(mark, sameMark(mark, now.zone))));
+    if (picture && now.triangles) showMarks(picture);
+  });
+}
+
+/** Boxes and marked faces in the picture, where parts are looked at. */
+function showMarks(picture) {
+  const { tab, state, zone: chosen, faceMarks } = store, seen = tab === "parts" && state.model ? boxes() : [];
+  picture.extra("marks", JSON.stringify([seen, chosen]), () => seen.flatMap((zone) => boxDrawn(zone, sameMark(zone, chosen))));
+  picture.marks(tab === "parts" ? faceMarks : null);
+}
+
+const sideTitle = ({ axis, end }) => `${end} ${axis}`;
+
+/** A knob that moves one side of the chosen box. */
+function knobOf(side, picture) {
+  const knob = made("button", { type: "button", text: "xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), ariaLabel: `${side.name} of the box: drag, or arrow keys` });
+  knob.dataset.side = sideTitle(side);
+  const put = () => { if (store.zoneHand) putBox(store.zoneHand); };
+  gripOf(knob, {
+    take: (event) => {
+      const zone = boxNow(), along = alongWay(picture, sidePlace(zone, side), axesOf(zone)[side.axis], event);
+      return along && { zone, along };
     },
-  };
+    move: ({ zone, along }, event) => holdBox(withSide(zone, side, zone[side.end][side.axis] + along(event))),
+    put,
+    drop: () => holdBox(null),
+    step: (sign) => holdBox(withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM)),
+    stepped: put,
+  });
+  return knob;
+}
+
+/** A field for one side of the chosen box. */
+function numberOf(side) {
+  const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${side.name}, mm` });
+  input.dataset.side = sideTitle(side);
+  input.addEventListener("change", () => { if (boxNow()) putBox({ ...boxNow(), [side.end]: boxNow()[side.end].map((x, k) => (k === side.axis ? Number(input.value) : x)) }); });
+  return input;
 }
 
 /** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */
@@ -184,15 +165,13 @@ function boxDrawn(zone, chosen) {
   return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: ink }]), over: chosen }];
 }
 
-function markRow(zone, chosen, choose, bench) {
+function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
-  const mark = made("input", { type: "radio", name: "mark", value: `${zone.kind} ${zone.number}`, checked: chosen, ariaLabel: name });
-  mark.addEventListener("change", choose);
   const remove = made("button", { type: "button", text: "×", title: `Remove ${name}`, ariaLabel: `remove ${name}` });
-  remove.addEventListener("click", () => bench.send({ do: "unmark", kind: zone.kind, number: zone.number }));
+  remove.addEventListener("click", () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
-  const row = made("tr", {}, made("td", {}, made("label", {}, mark, swatch(`rgb(${colour})`), word)), made("td", { text: where }), made("td", {}, remove));
-  row.addEventListener("click", (event) => { if (!["INPUT", "LABEL", "BUTTON"].includes(event.target.tagName)) choose(); });
+  const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [[where], [remove]], () => chooseMark(zone));
+  row.querySelector("input").ariaLabel = name;
   return row;
 }

@@ -3,50 +3,48 @@
 import { $, made } from "../../../../view/template/page.js";
 import { leftFiles, takeFiles } from "./benches.js";
 import { alike, listIn, mm2, tellIn } from "./elements.js";
+import { send } from "./line.js";
+import { onState, store, update } from "./store.js";
 import { turnedFurther } from "./triangles.js";
 
 const TURNS = ["x", "y", "z"];
 
-/** {told(state)}; bench: {state, send, preview(rotation or null), laying}. */
-export function modelPanel(bench) {
+export function modelPanel() {
   $("file").addEventListener("change", () => { takeFiles([...$("file").files]); $("file").value = ""; });
-  $("demo").addEventListener("change", () => { if ($("demo").value) bench.send({ do: "demo", name: $("demo").value }); });
+  $("demo").addEventListener("change", () => { if ($("demo").value) send({ do: "demo", name: $("demo").value }); });
   const by = () => TURNS.map((axis) => Number($(`turn-${axis}`).value));
   const tellTurn = () => TURNS.forEach((axis, k) => { $(`turn-${axis}-told`).textContent = `${by()[k]}°`; });
   for (const axis of TURNS) {
-    $(`turn-${axis}`).addEventListener("input", () => { tellTurn(); bench.preview(turnedFurther(bench.state.rotation, by())); });
-    $(`turn-${axis}`).addEventListener("change", () => { if (by().some(Boolean)) bench.send({ do: "stand", rotation: turnedFurther(bench.state.rotation, by()) }); });
+    $(`turn-${axis}`).addEventListener("input", () => { tellTurn(); update({ turning: turnedFurther(store.state.rotation, by()) }); });
+    $(`turn-${axis}`).addEventListener("change", () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); });
   }
   document.querySelectorAll("[data-turn]").forEach((button) => button.addEventListener("click", () => {
-    bench.send({ do: "turn", axis: button.dataset.turn, deg: Number(button.dataset.deg) });
+    send({ do: "turn", axis: button.dataset.turn, deg: Number(button.dataset.deg) });
   }));
-  $("as-read").addEventListener("click", () => bench.send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }));
-  $("lay").addEventListener("click", () => bench.lay($("lay").getAttribute("aria-pressed") !== "true"));
+  $("as-read").addEventListener("click", () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }));
   dropping();
   leftFiles();
-  return {
-    told: ({ model, rotation, resting, overhang_mm2: area }, before) => {
-      if (JSON.stringify(rotation) !== JSON.stringify(before?.rotation)) {
-        TURNS.forEach((axis) => { $(`turn-${axis}`).value = 0; });
-        tellTurn();
-      }
-      if (!model) return;
-      if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
-      tellIn("model-told", [
-        ["name", model.name], ["faces", model.faces.toLocaleString("en")],
-        ["size", `${model.size_mm.map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
-      ]);
-      listIn("model-notes", model.notes);
-      if (area !== null) $("overhang").textContent = mm2(area);
-      if (JSON.stringify(resting) !== JSON.stringify(before?.resting)) showResting(resting, bench);
-    },
-  };
+  onState(({ model, rotation, resting, overhang_mm2: area }, before) => {
+    if (JSON.stringify(rotation) !== JSON.stringify(before?.rotation)) {
+      TURNS.forEach((axis) => { $(`turn-${axis}`).value = 0; });
+      tellTurn();
+    }
+    if (!model) return;
+    if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
+    tellIn("model-told", [
+      ["name", model.name], ["faces", model.faces.toLocaleString("en")],
+      ["size", `${model.size_mm.map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
+    ]);
+    listIn("model-notes", model.notes);
+    if (area !== null) $("overhang").textContent = mm2(area);
+    if (JSON.stringify(resting) !== JSON.stringify(before?.resting)) showResting(resting);
+  });
 }
 
-function showResting(resting, bench) {
+function showResting(resting) {
   $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
     const button = made("button", { type: "button" }, made("span", { text: words }), made("small", { text: mm2(area) }));
-    button.addEventListener("click", () => bench.send({ do: "stand", rotation }));
+    button.addEventListener("click", () => send({ do: "stand", rotation }));
     return button;
   }));
 }
@@ -66,26 +64,24 @@ function dropping() {
 /** Sides along the platform's axes; as it is read, until it is known how it stands. */
 export const sizeOf = ({ standing, model }) => (standing || model).size_mm;
 
-export function sizePanel(bench) {
+export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
-  const scale = (factor) => bench.send({ do: "set", key: "process.scale", value: String(Number(factor.toPrecision(9))) });
+  const scale = (factor) => send({ do: "set", key: "process.scale", value: String(Number(factor.toPrecision(9))) });
   $("scale").addEventListener("change", () => scale(Number($("scale").value) / 100));
   sides.forEach((side, k) => side.addEventListener("change", () => {
-    const { standing } = bench.state;
-    if (standing) scale((bench.state.scale * Number(side.value)) / standing.size_mm[k]);
+    const { standing } = store.state;
+    if (standing) scale((store.state.scale * Number(side.value)) / standing.size_mm[k]);
   }));
   let shown = null; // the standing that was told last
-  $("scale-as-read").addEventListener("click", () => bench.send({ do: "set", key: "process.scale", value: null }));
-  return {
-    told: ({ standing, scale: factor, machine, problem }, before) => {
-      if (!standing) return;
-      const fresh = problem !== before?.problem || !alike(standing, shown);
-      shown = standing;
-      const fill = (input, value) => { if (fresh || document.activeElement !== input) input.value = value; };
-      fill($("scale"), Number((100 * factor).toPrecision(6)));
-      sides.forEach((side, k) => fill(side, standing.size_mm[k].toFixed(2)));
-      $("fit-told").textContent = standing.problem ? `Too large in one piece: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
-      $("fit-told").classList.toggle("refused", Boolean(standing.problem));
-    },
-  };
+  $("scale-as-read").addEventListener("click", () => send({ do: "set", key: "process.scale", value: null }));
+  onState(({ standing, scale: factor, machine, problem }, before) => {
+    if (!standing) return;
+    const fresh = problem !== before?.problem || !alike(standing, shown);
+    shown = standing;
+    const fill = (input, value) => { if (fresh || document.activeElement !== input) input.value = value; };
+    fill($("scale"), Number((100 * factor).toPrecision(6)));
+    sides.forEach((side, k) => fill(side, standing.size_mm[k].toFixed(2)));
+    $("fit-told").textContent = standing.problem ? `Too large in one piece: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
+    $("fit-told").classList.toggle("refused", Boolean(standing.problem));
+  });
 }

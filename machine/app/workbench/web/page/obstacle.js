@@ -4,26 +4,23 @@ import { boxesOf, headOf } from "../../../../view/template/bodies.js";
 import { length, sub } from "../../../../view/template/math.js";
 import { RED } from "../../../../view/template/model.js";
 import { chained, circle, trianglesOf } from "../../../../view/template/solids.js";
-import { trialOf } from "./planes-panel.js";
+import { trialNow } from "./planes.js";
+import { subscribe } from "./store.js";
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked
 const TOUCH_COLOUR = [255, 221, 70, 255]; // seen on the red body and on the table
 const RING_SHARES = [1, 0.5]; // of that mark's size: rings on the table where the head would touch it
 
-export function obstacleOf(bench) {
-  let drawn = "";
-  bench.showObstacle = () => {
-    if (!bench.picture || !bench.triangles || !bench.state.model) return;
-    const trial = trialOf(bench), { refused } = bench.state, tried = trial && trial.refused;
-    const found = bench.tab === "parts" ? (tried ? trial.obstacle : refused) : null, fresh = JSON.stringify([found, bench.state.machine.name]);
-    if (fresh === drawn) return;
-    drawn = fresh;
-    const size = PLACE_SHARE * length(sub(...bench.picture.box()));
-    const things = found ? found.places_mm.map((place) => placeDrawn(place, size)) : [];
-    if (found && found.touch) things.push(...headDrawn(found.touch, bench.state.machine.head), ...touchDrawn(found.touch, 2 * size));
-    bench.picture.extra("obstacle", things);
-    document.documentElement.dataset.obstacle = found ? (found.touch ? "head" : "places") : "";
-  };
+export function obstacleOf(picture) {
+  subscribe(({ state, triangles, tab }) => {
+    if (!triangles || !state.model) return;
+    const trial = trialNow(), obstacle = tab === "parts" ? (trial?.refused ? trial.obstacle : state.refused) : null;
+    picture.extra("obstacle", JSON.stringify([obstacle, state.machine.name]), () => {
+      const size = PLACE_SHARE * length(sub(...picture.box())), { places_mm: places = [], touch } = obstacle || {};
+      return [...places.map((place) => placeDrawn(place, size)), ...(touch ? [...headDrawn(touch, state.machine.head), ...touchDrawn(touch, 2 * size)] : [])];
+    });
+    document.documentElement.dataset.obstacle = obstacle ? (obstacle.touch ? "head" : "places") : "";
+  });
 }
 
 /** The head where it would touch, the body that does in red. */

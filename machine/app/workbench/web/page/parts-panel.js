@@ -1,17 +1,19 @@
 // Parts panel: the search, and its front as a slider.
 
-import { $, made } from "../../../../view/template/page.js";
-import { listIn, mm2, partsInWords, roughly, tellIn } from "./elements.js";
+import { $, made, partsInWords, roughly } from "../../../../view/template/page.js";
+import { listIn, mm2, tellIn } from "./elements.js";
+import { ask, send } from "./line.js";
+import { onState, store, update } from "./store.js";
 
-export function partsPanel(bench) {
-  $("find").addEventListener("click", () => bench.send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }));
-  $("stop").addEventListener("click", () => bench.send({ do: "stop" }));
+export function partsPanel() {
+  $("find").addEventListener("click", () => send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }));
+  $("stop").addEventListener("click", () => send({ do: "stop" }));
   let shown = ""; // of which front the slider is
   const told = ({ front, parts, recommended, cuts, priced }) => JSON.stringify([front, parts, recommended, cuts, priced]);
   const show = (state) => {
     const { front, parts, recommended } = state, place = front.findIndex((row) => row.parts === parts);
     shown = told(state);
-    bench.rowInHand = null;
+    update({ row: null });
     $("front").max = front.length - 1;
     $("front").value = Math.max(place, 0);
     $("front").disabled = front.length < 2;
@@ -21,46 +23,46 @@ export function partsPanel(bench) {
     $("recommended").hidden = !recommended;
   };
   let held = null; // the front whose slider is under the hand: nothing moves it there, not even another front
-  const hold = () => { held ||= bench.state.front; };
+  const hold = () => { held ||= store.state.front; };
+  /** The slider's row, as the newest front has it. */
+  const follow = (row) => {
+    const newest = rowUnder(row, store.state);
+    update({ row: newest });
+    tellRow(newest, store.state);
+  };
   const letGo = () => {
     if (!held) return;
     held = null;
-    show(bench.state);
-    bench.look();
+    show(store.state);
   };
   $("front").addEventListener("pointerdown", hold);
   for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first
   $("front").addEventListener("blur", letGo);
   $("front").addEventListener("input", () => {
     hold();
-    bench.rowInHand = rowUnder(held[$("front").value], bench.state);
-    tellRow(bench.rowInHand, bench.state);
-    bench.look();
+    follow(held[$("front").value]);
   });
   $("front").addEventListener("change", () => {
-    const { parts } = (held || bench.state.front)[$("front").value];
-    held = bench.rowInHand = null;
-    bench.ask({ do: "take", parts }, (refusal) => { if (refusal && !held && bench.state.front.length) show(bench.state); });
+    const { parts } = (held || store.state.front)[$("front").value];
+    held = null;
+    update({ row: null });
+    ask({ do: "take", parts }, (refusal) => { if (refusal && !held && store.state.front.length) show(store.state); });
   });
-  $("recommended").addEventListener("click", () => bench.send({ do: "take", parts: bench.state.recommended }));
-  return {
-    told: (state) => {
-      const { front, search, parts } = state;
-      $("find").disabled = Boolean(search);
-      $("stop").hidden = !search;
-      $("search-told").textContent = search ? search.text : "";
-      document.body.classList.toggle("no-cuts", !parts);
-      $("front-field").hidden = !front.length;
-      if (!front.length) {
-        held = bench.rowInHand = null;
-        shown = "";
-      } else if (!held) { if (told(state) !== shown) show(state); }
-      else if (bench.rowInHand) {
-        bench.rowInHand = rowUnder(bench.rowInHand, state);
-        tellRow(bench.rowInHand, state);
-      }
-    },
-  };
+  $("recommended").addEventListener("click", () => send({ do: "take", parts: store.state.recommended }));
+  onState((state) => {
+    const { front, search, parts } = state;
+    $("find").disabled = Boolean(search);
+    $("stop").hidden = !search;
+    $("search-told").textContent = search ? search.text : "";
+    document.body.classList.toggle("no-cuts", !parts);
+    $("front-field").hidden = !front.length;
+    if (!front.length) {
+      held = null;
+      shown = "";
+      if (store.row) update({ row: null });
+    } else if (!held) { if (told(state) !== shown) show(state); }
+    else if (store.row) follow(store.row);
+  });
 }
 
 /** The row in hand as the newest front has it, with its time and plastic; as it was where that has none of so many parts. */

@@ -30,14 +30,14 @@ export function placesDrawn({ box, pieces, shifts, walls, wallsAlone, plane, ped
   return [...whole.filter((each) => each.length).flatMap(cornersOf), ...rim, ...around];
 }
 
-/** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws;
- * drawn() is called after that. */
-export function pictureOf(canvas, camera, drawn) {
+/** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws; what is in
+ * `drawn` is called after that. */
+export function pictureOf(canvas, camera) {
   const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
   if (!gl) return null;
   const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, pedestal: null, machine: null, dark: false, marks: null, extras: {} };
   let card = null, asked = false, count = 0;
-  const stale = new Set(); // of what the card holds: made anew before it is drawn, once however often it has changed by then
+  const drawn = [], drawnOf = {}, stale = new Set(); // of what the card holds: made anew before it is drawn, once however often it has changed by then
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
@@ -96,7 +96,7 @@ export function pictureOf(canvas, camera, drawn) {
     for (const things of Object.values(card.extras)) for (const thing of things) paintExtra(thing, seenAs(thing.matrix));
     card.frame.show();
     scene.toClip = flat.toClip;
-    drawn();
+    drawn.forEach((act) => act());
     document.documentElement.dataset.drawn = ++count;
   };
   const plane = () => {
@@ -149,6 +149,7 @@ export function pictureOf(canvas, camera, drawn) {
   build();
   return {
     ask,
+    drawn,
     machine: (machine, dark) => { Object.assign(scene, { machine, dark }); anew(table); },
     show: (model) => { scene.model = model; scene.red = scene.marks = null; anew(solid); },
     stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
@@ -158,9 +159,18 @@ export function pictureOf(canvas, camera, drawn) {
       anew(painted);
     },
     /** A byte of each face: the kinds of zones it is marked for. */
-    marks: (bits) => { scene.marks = bits; anew(painted); },
-    /** More to draw under a name: [{solid, lines, matrix, strength, over: before all else}]. */
-    extra: (name, things) => { scene.extras[name] = things; anew(name); },
+    marks: (bits) => {
+      if (bits === scene.marks) return;
+      scene.marks = bits;
+      anew(painted);
+    },
+    /** More to draw under a name: things(): [{solid, lines, matrix, strength, over: before all else}], made where what it tells is new. */
+    extra: (name, told, things) => {
+      if ((drawnOf[name] ?? "") === told) return;
+      drawnOf[name] = told;
+      scene.extras[name] = things();
+      anew(name);
+    },
     cut: (planes, colours) => {
       const drawable = planes && planes.length <= MOST_CUTS;
       scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;

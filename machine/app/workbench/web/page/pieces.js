@@ -4,10 +4,11 @@ import { blockOf } from "../../../../view/template/block.js";
 import { rgb } from "../../../../view/template/colours.js";
 import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/math.js";
 import { arrowsOf, LEFT, RED, surfacesOf } from "../../../../view/template/model.js";
-import { $, made } from "../../../../view/template/page.js";
+import { $ } from "../../../../view/template/page.js";
 import { solidOf } from "../../../../view/template/solids.js";
-import { mm2, swatch } from "./elements.js";
-import { anglesOf } from "./planes-panel.js";
+import { choiceRow, mm2, putTable, swatch } from "./elements.js";
+import { anglesOf, choosePart } from "./planes.js";
+import { store, subscribe, update } from "./store.js";
 import { cornersAt, faceMet, wordOf } from "./triangles.js";
 
 const CUT_MM = 2e-3; // within which a corner lies in the plane of a cut: places come in thousandths of a mm
@@ -42,7 +43,7 @@ function cutFaces(places, [first, end], planes) {
 }
 
 /** How far each part is from its place when they are drawn apart by a share of the model's size. */
-const shiftsOf = ({ parts, span }, share) => parts.map(({ way }) => scaled(way, share * span));
+export const shiftsOf = ({ parts, span }, share) => parts.map(({ way }) => scaled(way, share * span));
 
 /** Colours of all corners: the parts', paler those not chosen (0: all are), light the cuts, red what needs support. */
 function pieceColours({ parts, marks, places }, chosen) {
@@ -76,7 +77,7 @@ export function piecesOn(gl, pieces, chosen) {
 }
 
 /** The number of the part that a ray of the platform's frame meets first; 0: none. */
-function pieceMet({ places, parts }, shifts, [from, along]) {
+export function pieceMet({ places, parts }, shifts, [from, along]) {
   let best = 0, least = Infinity;
   parts.forEach(({ part, range }, k) => {
     const corners = places.subarray(3 * range[0], 3 * range[1]), start = sub(from, shifts[k]);
@@ -88,7 +89,7 @@ function pieceMet({ places, parts }, shifts, [from, along]) {
   return best;
 }
 
-const PART_HEAD = ["part", "cm³", "support", "printed"];
+const PART_HEAD = [["part"], ["cm³"], ["support"], ["printed", "words"]];
 const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
 
 /** A printing direction as somebody in front of the machine sees it. */
@@ -99,65 +100,33 @@ function directionInWords(direction) {
   return `${Number(tilt.toFixed(1))}° to the ${side}`;
 }
 
-export function apartPanel(bench) {
-  let pieces = null, asked = ""; // asked: of which state the pieces are, or come
+/** By which share of the model's size the parts are drawn apart now. */
+export const apartNow = () => (store.pieces && store.tab === "parts" && !store.hand && !store.state.search ? store.apart : 0);
+
+export function apartPanel(picture) {
+  let asked = ""; // of which state the pieces are, or come
   const keyOf = ({ model, rotation, cuts, given, parts }) => (parts && model.drawn ? JSON.stringify([model.key, rotation, cuts, given]) : "");
-  const share = () => Number($("apart").value);
-  bench.apart = () => (pieces && bench.tab === "parts" && !bench.hand && !bench.state.search ? share() : 0);
-  /** A part chosen, here or by a click: its plane is taken in hand, too, where it has one. */
-  bench.chosen = 0;
-  const choose = (number) => {
-    bench.chosen = number;
-    bench.select(number);
-    show();
-    tellParts(pieces, bench.chosen, choose);
-  };
-  bench.pieceAt = (event) => choose(pieceMet(pieces, shiftsOf(pieces, share()), bench.picture.sight(event)));
-  const show = () => {
-    if (bench.picture) bench.picture.pieces(bench.apart() ? pieces : null, pieces ? shiftsOf(pieces, share()) : [], bench.chosen);
-  };
-  bench.showApart = show;
-  const fetchPieces = async () => {
-    const key = keyOf(bench.state);
-    if (key === asked || bench.tab !== "parts" || bench.state.search) return;
+  const fetchPieces = async (key) => {
     asked = key;
-    pieces = null;
-    show();
-    tellParts(null, 0, choose);
+    update({ pieces: null });
     const answer = key ? await fetch("pieces").catch(() => null) : null;
-    const found = answer && answer.ok ? await piecesIn(new Uint8Array(await answer.arrayBuffer())) : null;
+    const pieces = answer?.ok ? await piecesIn(new Uint8Array(await answer.arrayBuffer())) : null;
     if (asked !== key) return;
     if (!answer) asked = ""; // the line is lost: the next state asks again
-    pieces = found;
-    if (pieces && bench.chosen > pieces.parts.length) bench.chosen = 0;
     $("parts-fit").textContent = pieces ? pieces.header.fit : "";
-    tellParts(pieces, bench.chosen, choose);
-    bench.look();
+    update({ pieces });
     document.documentElement.dataset.pieces = pieces ? pieces.parts.length : "";
   };
-  bench.fetchPieces = fetchPieces;
-  $("apart").disabled = !bench.picture;
-  $("apart").addEventListener("input", () => { bench.look(); bench.showPlane(); });
-  return {
-    told: (state) => {
-      if (bench.selected) bench.chosen = bench.selected;
-      $("parts-field").hidden = !state.parts || !state.model.drawn;
-      fetchPieces();
-    },
-  };
+  $("apart").disabled = !picture;
+  $("apart").addEventListener("input", () => update({ apart: Number($("apart").value) }));
+  subscribe(({ state, tab, pieces, part, apart }, before) => {
+    $("parts-field").hidden = !state.parts || !state.model.drawn;
+    const key = keyOf(state);
+    if (key !== asked && tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) return void fetchPieces(key);
+    picture?.pieces(apartNow() ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
+    putTable($("parts-list"), [asked, Boolean(pieces), part], PART_HEAD, () => (pieces ? pieces.parts : []).map(({ part: piece }) => pieceRow(piece, part)));
+  });
 }
 
-function tellParts(pieces, chosen, choose) {
-  const rows = (pieces ? pieces.parts : []).map(({ part }) => {
-    const mark = made("input", { type: "radio", name: "piece", value: part.index, checked: part.index === chosen });
-    mark.addEventListener("change", () => choose(part.index));
-    const row = made("tr", {}, made("td", {}, made("label", {}, mark, swatch(part.colour), `${part.index}`)),
-      made("td", { text: (part.volume_mm3 / 1000).toFixed(2) }), made("td", { text: mm2(part.risky_after_mm2) }), made("td", { className: "words", text: directionInWords(part.direction) }));
-    row.addEventListener("click", (event) => { if (!["INPUT", "LABEL"].includes(event.target.tagName)) choose(part.index); });
-    return row;
-  });
-  const kept = document.activeElement?.name === "piece";
-  const head = made("tr", {}, ...PART_HEAD.map((text, k) => made("th", { text, scope: "col", className: k === 3 ? "words" : "" })));
-  $("parts-list").replaceChildren(...(rows.length ? [made("thead", {}, head), made("tbody", {}, ...rows)] : []));
-  if (kept) $("parts-list").querySelector(":checked")?.focus();
-}
+const pieceRow = ({ index, colour, volume_mm3: volume, risky_after_mm2: risky, direction }, chosen) => choiceRow("piece", index, index === chosen, [swatch(colour), `${index}`],
+  [[(volume / 1000).toFixed(2)], [mm2(risky)], [directionInWords(direction), "words"]], () => choosePart(index));

@@ -2,8 +2,10 @@
 // pages tell each other what to show.
 
 import { $ } from "../../../../view/template/page.js";
+import { store, subscribe, update } from "./store.js";
 
-export function printFrame(bench, isDark) {
+/** {showFinding(its place in the list)}. */
+export function printFrame() {
   const frame = $("print-page");
   let ready = false, waiting = [];
   const post = (message) => frame.contentWindow.postMessage(message, location.origin);
@@ -11,7 +13,7 @@ export function printFrame(bench, isDark) {
   const heard = {
     ready: () => {
       ready = true;
-      post({ tiltprint: "theme", dark: isDark() });
+      post({ tiltprint: "theme", dark: store.dark });
       waiting.splice(0).forEach(post);
     },
     text: async () => {
@@ -23,26 +25,32 @@ export function printFrame(bench, isDark) {
   addEventListener("message", ({ data, origin, source }) => {
     if (source === frame.contentWindow && origin === location.origin) heard[data?.tiltprint]?.();
   });
-  bench.lookAtPrint = (whether) => {
-    const { sliced } = bench.state, address = sliced ? `print/${sliced.key}` : "";
-    document.body.classList.toggle("looking", whether && bench.tab !== "printing");
-    $("look").setAttribute("aria-pressed", whether);
-    frame.hidden = $("leave-print").hidden = !whether;
-    if (!whether || frame.getAttribute("src") === address) return;
+  const show = () => {
+    const { state: { sliced }, looking, tab } = store, address = sliced ? `print/${sliced.key}` : "";
+    document.body.classList.toggle("looking", looking && tab !== "printing");
+    $("look").setAttribute("aria-pressed", looking);
+    frame.hidden = $("leave-print").hidden = !looking;
+    if (!looking || frame.getAttribute("src") === address) return;
     [ready, waiting] = [false, []];
     frame.src = address;
   };
-  bench.showFinding = (finding) => {
-    bench.lookAtPrint(true);
-    say({ tiltprint: "finding", finding });
+  subscribe((now, before) => {
+    if (now.looking !== before.looking) show();
+    if (now.dark !== before.dark && ready) post({ tiltprint: "theme", dark: now.dark });
+  });
+  return {
+    showFinding: (finding) => {
+      update({ looking: true });
+      show();
+      say({ tiltprint: "finding", finding });
+    },
   };
-  bench.themed = (dark) => { if (ready) say({ tiltprint: "theme", dark }); };
 }
 
-/** The page of the print follows in the picture's place, where what lies here is what is printed. */
-export function followIn(bench, print) {
+/** The page of the print follows in the picture's place, where what lies here is what is printed; what it gives is called with all news. */
+export function followIn(print) {
   let on = false, shown = 0;
-  const same = () => print()?.key && print().key === bench.state?.sliced?.key;
+  const same = () => print()?.key && print().key === store.state?.sliced?.key;
   const tell = () => {
     const line = print()?.progress?.line;
     if (!on || !same() || !line || line === shown) return;
@@ -51,18 +59,18 @@ export function followIn(bench, print) {
   };
   const set = (whether) => {
     on = whether;
-    shown = 0;
     $("follow").setAttribute("aria-pressed", whether);
-    if (whether === ($("look").getAttribute("aria-pressed") !== "true")) $("look").click();
   };
-  $("follow").addEventListener("click", () => set(!on));
+  $("follow").addEventListener("click", () => {
+    set(!on);
+    shown = 0;
+    update({ looking: on });
+  });
   addEventListener("message", ({ data, origin }) => { if (origin === location.origin && data?.tiltprint === "ready") { shown = 0; tell(); } });
-  return {
-    told: () => {
-      const runs = same() && print().progress && print().phase !== "over";
-      $("follow").hidden = !runs;
-      tell();
-      if (on && ($("look").getAttribute("aria-pressed") !== "true" || !runs)) { on = false; $("follow").setAttribute("aria-pressed", false); }
-    },
+  return () => {
+    const runs = same() && print().progress && print().phase !== "over";
+    $("follow").hidden = !runs;
+    tell();
+    if (on && (!store.looking || !runs)) set(false);
   };
 }

@@ -6,15 +6,15 @@ import { alike, withWholeOptions } from "./elements.js";
 import { followIn } from "./print-frame.js";
 import { hear, showBar, showPrint, showProgress, showWhich, silence, sure } from "./print-shown.js";
 import { OWN_PAGE, printsLine, stopsAsked } from "./prints-line.js";
-import { unsliced } from "./slices-panel.js";
+import { onState } from "./store.js";
 import { chosenOr, port, SERVERS, showJournals, showPort, showPorts, unforce } from "./where-to-print.js";
 
 const STOP_KEY = "e";
 
-export function printPanel(bench) {
+export function printPanel() {
   let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
   const socket = printsLine((told) => { const before = state; state = told; show(before); }, refused, () => stops.expired());
-  const follow = followIn(bench, () => print());
+  const follow = followIn(() => print());
   const send = (command) => { problem(""); socket.send(command); };
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
   const print = () => state.prints.find((each) => each.number === chosen) || null;
@@ -34,7 +34,7 @@ export function printPanel(bench) {
     showJournals(state.journals, before.journals);
     showWhich(state.prints, chosen);
     showPrint(print(), print()?.holder === OWN_PAGE);
-    follow.told();
+    follow();
     hear(state.prints);
     showBar(running, print());
     stops.told();
@@ -90,16 +90,14 @@ export function printPanel(bench) {
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
   const which = ({ sliced }) => sliced && [sliced.key, sliced.stale];
-  return {
-    told: (now, before) => {
-      const why = unsliced(now);
-      $("check").disabled = Boolean(why);
-      $("unsliced").hidden = !why;
-      $("unsliced").textContent = `Nothing to print: ${why}.`;
-      if (!alike(which(now), which(before || {}))) { unforce(); problem(""); } // what was found of others
-      follow.told();
-    },
-  };
+  onState((now, before) => {
+    const why = now.lacking.slices;
+    $("check").disabled = Boolean(why);
+    $("unsliced").hidden = !why;
+    $("unsliced").textContent = `Nothing to print: ${why}.`;
+    if (!alike(which(now), which(before || {}))) { unforce(); problem(""); } // what was found of others
+    follow();
+  });
 }
 
 function problem(text) {

@@ -3,6 +3,8 @@
 import { add, bounds, dot, length, RAD, scaled, sub, unit } from "../../../../view/template/math.js";
 import { $ } from "../../../../view/template/page.js";
 import { gripOf } from "./grip.js";
+import { send } from "./line.js";
+import { store, update } from "./store.js";
 import { turnedFurther } from "./triangles.js";
 
 const RING_AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
@@ -10,12 +12,12 @@ const RING_STEPS = 96, RING_REACH = 1.05; // of the farthest vertex from the mid
 const RING_KEY_DEG = 1, RING_SNAP_DEG = 15; // the latter with Shift held
 const FLATTEST = 0.25; // cosine between look and axis below which a ring is seen from its edge: its tangent is followed, not its plane
 
-export function ringsOf(bench) {
+export function ringsOf(picture) {
   const svg = $("rings"), groups = [...svg.querySelectorAll("[data-ring]")], on = () => $("show-rings").getAttribute("aria-pressed") === "true";
   let turning = null; // {axis, ring, deg}: how far it is turned from where it stood
   const ringNow = () => {
-    const [least, most] = bench.picture.box();
-    return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * reachOf(bench.triangles) };
+    const [least, most] = picture.box();
+    return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * reachOf(store.triangles) };
   };
   const told = (axis, deg) => {
     const group = groups.find((each) => each.dataset.ring === axis);
@@ -25,20 +27,20 @@ export function ringsOf(bench) {
   const preview = (axis, ring, deg) => {
     turning = { axis, ring, deg };
     told(axis, deg);
-    bench.preview(turnedFurther(bench.state.rotation, scaled(RING_AXES[axis], deg)));
+    update({ turning: turnedFurther(store.state.rotation, scaled(RING_AXES[axis], deg)) });
   };
-  const done = (send) => {
+  const done = (taken) => {
     const last = turning;
     turning = null;
     if (!last) return;
     told(last.axis, 0);
-    if (send && last.deg) bench.send({ do: "turn", axis: last.axis, deg: last.deg });
-    else bench.preview(bench.state.rotation);
+    if (taken && last.deg) send({ do: "turn", axis: last.axis, deg: last.deg });
+    else update({ turning: null });
   };
   groups.forEach((group) => {
     const axis = group.dataset.ring;
     gripOf(group, {
-      take: (event) => ({ ring: ringNow(), ...graspOf(bench.picture, RING_AXES[axis], ringNow(), event) }),
+      take: (event) => ({ ring: ringNow(), ...graspOf(picture, RING_AXES[axis], ringNow(), event) }),
       move: (held, event) => {
         const deg = held.turnedTo(event), step = event.shiftKey ? RING_SNAP_DEG : RING_KEY_DEG;
         preview(axis, { ...held.ring, from: held.from }, Math.round(deg / step) * step);
@@ -52,17 +54,14 @@ export function ringsOf(bench) {
       stepped: () => done(true),
     });
   });
-  const shown = () => Boolean(on() && bench.tab === "model" && bench.triangles && bench.state.model && !bench.laying);
-  /** Places of the rings, as far as they are shown. */
-  bench.ringPlaces = () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
-  /** Where the rings are seen now; called whenever the picture is drawn. */
-  bench.placeRings = () => {
+  const shown = () => Boolean(on() && store.tab === "model" && store.triangles && store.state.model && store.clicks !== "lay");
+  picture.drawn.push(() => { // where the rings are seen now
     svg.toggleAttribute("hidden", !shown());
     if (!shown()) return;
-    const ring = turning ? turning.ring : ringNow(), eye = bench.picture.eye();
+    const ring = turning ? turning.ring : ringNow(), eye = picture.eye();
     groups.forEach((group) => {
       const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));
-      const sides = points.map((place) => ({ at: bench.picture.placeOf(place), near: length(sub(eye, place)) < middle }));
+      const sides = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
       const seen = sides.flatMap((each, k) => (k && each.near !== sides[k - 1].near ? [{ ...each, near: !each.near }, each] : [each]));
       group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
       group.querySelector(".far").setAttribute("d", pathOf(seen, ({ near }) => !near));
@@ -72,10 +71,11 @@ export function ringsOf(bench) {
       group.querySelector("text").setAttribute("x", label[0]);
       group.querySelector("text").setAttribute("y", label[1]);
     });
-    showSweep(bench.picture, turning);
-  };
-  $("show-rings").addEventListener("click", () => { $("show-rings").setAttribute("aria-pressed", !on()); bench.picture?.ask(); });
-  $("show-rings").disabled = !bench.picture;
+    showSweep(picture, turning);
+  });
+  $("show-rings").addEventListener("click", () => { $("show-rings").setAttribute("aria-pressed", !on()); picture.ask(); });
+  /** Places of the rings, as far as they are shown. */
+  return () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
 }
 
 const REACHES = new WeakMap(); // of triangles: they stay as they are

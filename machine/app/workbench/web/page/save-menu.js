@@ -3,11 +3,11 @@
 import { $ } from "../../../../view/template/page.js";
 import { listIn } from "./elements.js";
 import { save } from "./line.js";
-import { unsliced } from "./slices-panel.js";
+import { onState, store } from "./store.js";
 
 const SECTIONS_OF = { machine: ["machine"], material: ["material"], process: ["process", "search"] }; // of the profiles' files
 
-export function saveMenu(bench) {
+export function saveMenu() {
   const button = $("save"), menu = $("save-menu"), dialog = $("save-anyway");
   const show = (whether) => {
     menu.hidden = !whether;
@@ -17,7 +17,7 @@ export function saveMenu(bench) {
   const close = () => { if (!menu.hidden) { show(false); button.focus(); } };
   const saving = (address) => () => { close(); save(address); };
   const confirm = () => {
-    const { errors } = bench.state.sliced;
+    const { errors } = store.state.sliced;
     $("errors-title").textContent = `The dry run found ${errors.length} error${errors.length === 1 ? "" : "s"}`;
     listIn("errors-list", errors.slice(0, 3));
     dialog.showModal();
@@ -29,7 +29,7 @@ export function saveMenu(bench) {
   $("save-parts").addEventListener("click", saving("parts.zip"));
   $("save-pictures").addEventListener("click", saving("pictures.zip"));
   $("save-page").addEventListener("click", saving("print.html"));
-  $("save-gcode").addEventListener("click", () => { close(); if (bench.state.sliced.errors.length) confirm(); else save("print.gcode"); });
+  $("save-gcode").addEventListener("click", () => { close(); if (store.state.sliced.errors.length) confirm(); else save("print.gcode"); });
   $("save-errors").addEventListener("click", () => { dialog.close(); save("print.gcode?force=yes"); });
   $("save-not").addEventListener("click", () => dialog.close());
   for (const kind of Object.keys(SECTIONS_OF)) $(`save-${kind}`).addEventListener("click", saving(`profile/${kind}.toml`));
@@ -37,20 +37,16 @@ export function saveMenu(bench) {
     $(id).disabled = Boolean(why);
     $(id).querySelector("small").textContent = why || otherwise;
   };
-  return {
-    told: (state) => {
-      const { model, parts, zones, sliced, compared, given } = state, lacking = unsliced(state);
-      const uncut = !model ? "no model yet" : parts || zones.length ? "" : "no parts yet: find them, or add a plane";
-      tell("save-plan", uncut, "the command line takes it with --plan");
-      tell("save-parts", uncut, "zip of an STL each, a coloured 3MF and the plan");
-      tell("save-pictures", uncut, "zip of PNGs: the parts, the print order, every number of parts");
-      tell("save-gcode", lacking, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
-      for (const [kind, sections] of Object.entries(SECTIONS_OF)) {
-        const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length;
-        const name = given[kind].split(/[\\/]/).at(-1), changed = `${name} with ${count} change${count === 1 ? "" : "s"}: --${kind} takes it, profiles save writes the same`;
-        tell(`save-${kind}`, count ? "" : `nothing of ${name} is changed`, changed);
-      }
-      tell("save-page", lacking, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
-    },
-  };
+  onState(({ lacking, sliced, compared, given }) => {
+    tell("save-plan", lacking.parts, "the command line takes it with --plan");
+    tell("save-parts", lacking.parts, "zip of an STL each, a coloured 3MF and the plan");
+    tell("save-pictures", lacking.parts, "zip of PNGs: the parts, the print order, every number of parts");
+    tell("save-gcode", lacking.slices, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
+    for (const [kind, sections] of Object.entries(SECTIONS_OF)) {
+      const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length;
+      const name = given[kind].split(/[\\/]/).at(-1), changed = `${name} with ${count} change${count === 1 ? "" : "s"}: --${kind} takes it, profiles save writes the same`;
+      tell(`save-${kind}`, count ? "" : `nothing of ${name} is changed`, changed);
+    }
+    tell("save-page", lacking.slices, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
+  });
 }

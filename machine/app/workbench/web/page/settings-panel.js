@@ -2,14 +2,16 @@
 
 import { $, made } from "../../../../view/template/page.js";
 import { alike, putRows } from "./elements.js";
+import { ask, send } from "./line.js";
+import { onState, store } from "./store.js";
 
-export function settingsPanel(bench) {
+export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   let settings = [], missed = false; // missed: they have not come
   const part = () => Number($("settings-part").value) || 0;
-  const send = (key, value, typed) => {
+  const set = (key, value, typed) => {
     const of = part();
-    bench.ask(of ? { do: "set_part", part: of, key, value } : { do: "set", key, value }, (refusal) => {
+    ask(of ? { do: "set_part", part: of, key, value } : { do: "set", key, value }, (refusal) => {
       if (of !== part()) return;
       if (refusal) {
         wrongs.set(key, { text: refusal, typed });
@@ -20,8 +22,8 @@ export function settingsPanel(bench) {
   };
   /** What is refused stands beside its field, whatever is told next. */
   const tellBeside = () => {
-    const beside = [...wrongs.values()].some(({ text }) => text === bench.state.problem);
-    if (beside && bench.tab === "settings") $("problem").hidden = true;
+    const beside = [...wrongs.values()].some(({ text }) => text === store.state.problem);
+    if (beside && store.tab === "settings") $("problem").hidden = true;
   };
   const shown = ({ key, meaning, about, changed }) => {
     const words = $("search-settings").value.toLowerCase().split(/\s+/), text = `${key} ${meaning} ${about}`.toLowerCase();
@@ -33,7 +35,7 @@ export function settingsPanel(bench) {
     $("reset-settings").disabled = !changed;
     putRows(rows.flatMap((setting, k) => {
       const wrong = wrongs.get(setting.key), title = rows[k - 1]?.group === setting.group ? [] : [groupTitle(setting)];
-      return [...title, { id: setting.key, told: JSON.stringify([setting, wrong]), make: () => settingRow(setting, wrong, send, list) }];
+      return [...title, { id: setting.key, told: JSON.stringify([setting, wrong]), make: () => settingRow(setting, wrong, set, list) }];
     }), $("settings-list"));
   };
   const fetchAll = async () => {
@@ -42,7 +44,7 @@ export function settingsPanel(bench) {
     if (!answer?.ok || asked !== part()) return;
     const told = await answer.json();
     settings = told.settings;
-    showProfiles(told.profiles, bench);
+    showProfiles(told.profiles);
     $("command-line").replaceChildren(...told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
     $("command-field").hidden = !told.command;
     list();
@@ -58,23 +60,21 @@ export function settingsPanel(bench) {
   $("search-settings").addEventListener("input", list);
   $("only-changed").addEventListener("change", list);
   $("settings-part").addEventListener("change", () => { wrongs.clear(); fetchAll(); });
-  $("reset-settings").addEventListener("click", () => bench.send(part() ? { do: "reset_part", part: part() } : { do: "reset" }));
+  $("reset-settings").addEventListener("click", () => send(part() ? { do: "reset_part", part: part() } : { do: "reset" }));
   $("copy-command").addEventListener("click", () => copyText($("command-line"), $("copy-command")));
   const ofSettings = ({ given, part_settings: own, parts, model, rotation, stops, copies } = {}) => [given, own, parts, model?.name, rotation, stops, copies];
-  return {
-    told: (state, before) => {
-      const fresh = !before || !alike(ofSettings(state), ofSettings(before));
-      if (fresh) partsToChoose(state);
-      tellBeside();
-      if (fresh || missed) fetchAll();
-    },
-  };
+  onState((state, before) => {
+    const fresh = !before || !alike(ofSettings(state), ofSettings(before));
+    if (fresh) partsToChoose(state);
+    tellBeside();
+    if (fresh || missed) fetchAll();
+  });
 }
 
-function showProfiles(profiles, bench) {
+function showProfiles(profiles) {
   const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
     const select = made("select", {}, ...names.map((text) => made("option", { text, value: text, selected: text === name })));
-    select.addEventListener("change", () => bench.ask({ do: "profile", kind, name: select.value }, (refusal) => { if (refusal) select.value = name; }));
+    select.addEventListener("change", () => ask({ do: "profile", kind, name: select.value }, (refusal) => { if (refusal) select.value = name; }));
     return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
   });
   putRows(rows, $("profiles-list"));
@@ -89,18 +89,18 @@ function groupTitle({ group, about }) {
 const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
 
 /** again(): called when a person leaves what was typed in, for what has been told meanwhile. */
-function settingRow(setting, wrong, send, again) {
+function settingRow(setting, wrong, set, again) {
   const { key, meaning, kind, least, most, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
   const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
   const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
   input.setAttribute("aria-describedby", told.id);
   input.setAttribute("aria-invalid", Boolean(wrong));
   const back = made("button", { type: "button", text: "↺", title: "As it was", ariaLabel: `${key} as it was`, hidden: !changed && !wrong });
-  back.addEventListener("click", () => send(key, null));
+  back.addEventListener("click", () => set(key, null));
   const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
   const row = settingBox(setting, [made("label", {}, made("span", {}, ...breakable(key)), input, back), refused, told, named]);
   input.addEventListener("input", () => { row.dataset.typing = kind; });
-  input.addEventListener("change", () => send(key, typedIn(input, kind, optional), typedAs(input, kind)));
+  input.addEventListener("change", () => set(key, typedIn(input, kind, optional), typedAs(input, kind)));
   for (const done of ["change", "blur"]) {
     input.addEventListener(done, () => {
       if (!row.dataset.typing) return;

@@ -1,32 +1,29 @@
 // Slices panel: copies and pauses, the parts sliced, what the print takes, what the dry run complains of, and what one piece would cost.
 
-import { $, duration, made } from "../../../../view/template/page.js";
-import { alike, listIn, mm2, roughly, swatch, tellIn } from "./elements.js";
+import { $, duration, made, roughly } from "../../../../view/template/page.js";
+import { alike, listIn, mm2, swatch, tellIn } from "./elements.js";
+import { send } from "./line.js";
+import { onState, store, update } from "./store.js";
 
-/** Why there are no slices of what lies on the bench to save or to print; "" where there are. */
-export const unsliced = ({ model, sliced }) => (!model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "the slices are out of date: slice again" : "");
-
-export function slicesPanel(bench) {
-  $("slice").addEventListener("click", () => bench.send({ do: "slice" }));
-  $("again").addEventListener("click", () => { bench.lookAtPrint(false); $("tab-slices").click(); bench.send({ do: "slice" }); });
-  $("stop-slicing").addEventListener("click", () => bench.send({ do: "stop" }));
-  $("look").addEventListener("click", () => bench.lookAtPrint($("look").getAttribute("aria-pressed") !== "true"));
-  $("leave-print").addEventListener("click", () => { bench.lookAtPrint(false); $("look").focus(); });
-  return {
-    told: (state, before) => {
-      const { slicing, sliced } = state, stale = Boolean(sliced && sliced.stale);
-      $("slice").disabled = Boolean(slicing);
-      $("stop-slicing").hidden = !slicing;
-      $("slicing-told").textContent = slicing ? slicing.text : "";
-      showShares(slicing, state.colours);
-      document.body.classList.toggle("no-slices", !sliced);
-      document.body.classList.toggle("stale", stale);
-      if (alike(sliced, before?.sliced)) return;
-      if (!sliced) bench.lookAtPrint(false);
-      tellIn("sliced-told", sliced ? [["takes", duration(sliced.time_s)], ["filament", `${(sliced.filament_mm / 1000).toFixed(2)} m`]] : []);
-      showFindings(sliced, bench);
-    },
-  };
+export function slicesPanel(showFinding) {
+  $("slice").addEventListener("click", () => send({ do: "slice" }));
+  $("again").addEventListener("click", () => { update({ looking: false }); $("tab-slices").click(); send({ do: "slice" }); });
+  $("stop-slicing").addEventListener("click", () => send({ do: "stop" }));
+  $("look").addEventListener("click", () => update({ looking: !store.looking }));
+  $("leave-print").addEventListener("click", () => { update({ looking: false }); $("look").focus(); });
+  onState((state, before) => {
+    const { slicing, sliced } = state, stale = Boolean(sliced && sliced.stale);
+    $("slice").disabled = Boolean(slicing);
+    $("stop-slicing").hidden = !slicing;
+    $("slicing-told").textContent = slicing ? slicing.text : "";
+    showShares(slicing, state.colours);
+    document.body.classList.toggle("no-slices", !sliced);
+    document.body.classList.toggle("stale", stale);
+    if (alike(sliced, before?.sliced)) return;
+    if (!sliced) update({ looking: false });
+    tellIn("sliced-told", sliced ? [["takes", duration(sliced.time_s)], ["filament", `${(sliced.filament_mm / 1000).toFixed(2)} m`]] : []);
+    showFindings(sliced, showFinding);
+  });
 }
 
 /** Of every part how much is sliced; the whole as one bar where there is one part. */
@@ -43,7 +40,7 @@ function showShares(slicing, colours) {
   }));
 }
 
-function showFindings(sliced, bench) {
+function showFindings(sliced, showFinding) {
   const { findings = [], more_findings: more = 0 } = sliced || {};
   $("no-findings").hidden = !sliced || findings.length > 0;
   const rows = findings.map((finding, k) => {
@@ -51,31 +48,29 @@ function showFindings(sliced, bench) {
     const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
     const button = made("button", { type: "button", className: severity },
       made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? `${where}: show it` : "the whole print" }));
-    button.addEventListener("click", () => bench.showFinding(k));
+    button.addEventListener("click", () => showFinding(k));
     return made("li", {}, button);
   });
   $("sliced-findings").replaceChildren(...rows, ...(more ? [made("li", { text: `and ${more} more, in the page of the print` })] : []));
 }
 
-export function stopsPanel(bench) {
+export function stopsPanel() {
   let adding = false; // what was typed stays until it is taken
-  $("copies").addEventListener("change", () => bench.send({ do: "copies", count: Number($("copies").value) }));
+  $("copies").addEventListener("change", () => send({ do: "copies", count: Number($("copies").value) }));
   $("add-stop").addEventListener("submit", (event) => {
     event.preventDefault();
     adding = true;
-    bench.send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
+    send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
   });
-  return {
-    told: ({ copies, stops, problem }, before) => {
-      if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
-      if (alike(stops, before?.stops)) return;
-      if (adding) $("stop-at").value = "";
-      adding = false;
-      const held = $("stops").contains(document.activeElement);
-      $("stops").replaceChildren(made("tbody", {}, ...stops.map((stop, k) => stopRow(stop, () => bench.send({ do: "remove_stop", number: k + 1 })))));
-      if (held) $("stop-at").focus(); // the row that had the focus is gone
-    },
-  };
+  onState(({ copies, stops, problem }, before) => {
+    if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
+    if (alike(stops, before?.stops)) return;
+    if (adding) $("stop-at").value = "";
+    adding = false;
+    const held = $("stops").contains(document.activeElement);
+    $("stops").replaceChildren(made("tbody", {}, ...stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 })))));
+    if (held) $("stop-at").focus(); // the row that had the focus is gone
+  });
 }
 
 function stopRow({ part, layer, height_mm: height, change }, remove) {
@@ -94,20 +89,18 @@ const COSTS = [
   ["findings", ({ findings }) => `${findings}`],
 ];
 
-export function comparePanel(bench) {
-  $("compare").addEventListener("click", () => bench.send({ do: "compare" }));
-  $("stop-comparing").addEventListener("click", () => bench.send({ do: "stop" }));
-  return {
-    told: ({ comparing, compared, sliced }, before) => {
-      $("compare").disabled = Boolean(comparing || compared.length || !sliced || sliced.stale);
-      $("stop-comparing").hidden = !comparing;
-      $("comparing-told").textContent = comparing;
-      if (alike(compared, before?.compared)) return;
-      const [, standing, lying] = compared, shown = compared.filter((each) => each !== lying || lying.note !== standing.note);
-      const head = made("tr", {}, made("td"), ...shown.map(({ name }) => made("th", { text: name, scope: "col" })));
-      const rows = COSTS.map(([name, of]) => made("tr", {}, made("th", { text: name, scope: "row" }), ...shown.map((each) => made("td", { text: each.time_s === null ? "–" : of(each) }))));
-      $("compared").replaceChildren(...(compared.length ? [made("thead", {}, head), made("tbody", {}, ...rows)] : []));
-      listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
-    },
-  };
+export function comparePanel() {
+  $("compare").addEventListener("click", () => send({ do: "compare" }));
+  $("stop-comparing").addEventListener("click", () => send({ do: "stop" }));
+  onState(({ comparing, compared, sliced }, before) => {
+    $("compare").disabled = Boolean(comparing || compared.length || !sliced || sliced.stale);
+    $("stop-comparing").hidden = !comparing;
+    $("comparing-told").textContent = comparing;
+    if (alike(compared, before?.compared)) return;
+    const [, standing, lying] = compared, shown = compared.filter((each) => each !== lying || lying.note !== standing.note);
+    const head = made("tr", {}, made("td"), ...shown.map(({ name }) => made("th", { text: name, scope: "col" })));
+    const rows = COSTS.map(([name, of]) => made("tr", {}, made("th", { text: name, scope: "row" }), ...shown.map((each) => made("td", { text: each.time_s === null ? "–" : of(each) }))));
+    $("compared").replaceChildren(...(compared.length ? [made("thead", {}, head), made("tbody", {}, ...rows)] : []));
+    listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
+  });
 }

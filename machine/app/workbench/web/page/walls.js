@@ -2,6 +2,7 @@
 
 import { PLAIN, rgb } from "../../../../view/template/colours.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/math.js";
+import { store, subscribe, update } from "./store.js";
 import { wordOf } from "./triangles.js";
 
 const PIECE = 7; // numbers of a straight piece: two ends and its height
@@ -23,36 +24,25 @@ function bandsOf(bytes, colour) {
   return { places, colours: new Uint8Array(colours.buffer) };
 }
 
-/** bench.showWalls(): the parts of the slices that are made, or lie there and are not out of date, while the slices are looked at. */
-export function wallsOf(bench) {
-  const bands = new Map(); // of parts, as soon as they have come
-  let number = 0;
-  const slices = () => {
-    const { slicing, sliced } = bench.state;
-    return slicing || (sliced && !sliced.stale ? sliced : null);
-  };
-  const shown = () => bench.tab === "slices" && bench.triangles && slices() && bands.size > 0;
-  const show = () => {
-    if (bench.picture) bench.picture.walls(shown() ? [...bands.values()].filter(Boolean) : null, bench.state.copies > 1);
-    document.documentElement.dataset.walls = shown() ? [...bands.keys()].sort((a, b) => a - b).join(" ") : "";
-  };
+/** The parts of the slices that are made, or lie there and are not out of date, while the slices are looked at. */
+export function wallsOf(picture) {
+  let number = 0, asked = new Set(); // of the slices whose walls are there, or asked for
   const fetchPart = async (part, of) => {
-    bands.set(part, null);
+    asked.add(part);
     const answer = await fetch(`walls/${of}/${part}`).catch(() => null);
     if (number !== of) return;
-    if (!answer) bands.delete(part); // the line is lost: the next state asks again
-    if (!answer?.ok) return;
-    bands.set(part, bandsOf(await answer.arrayBuffer(), bench.state.colours[part - 1] || PLAIN));
-    show();
+    if (!answer) asked.delete(part); // the line is lost: the next state asks again
+    if (answer?.ok) update({ walls: new Map(store.walls).set(part, bandsOf(await answer.arrayBuffer(), store.state.colours[part - 1] || PLAIN)) });
   };
-  bench.showWalls = () => {
-    const now = slices();
-    if (!bench.picture || bench.tab !== "slices" || !now) return show();
-    if (now.number !== number) {
-      number = now.number;
-      bands.clear();
+  subscribe(({ state: { slicing, sliced, copies }, tab, triangles }) => {
+    const slices = tab !== "slices" ? null : slicing || (sliced && !sliced.stale ? sliced : null);
+    if (slices && slices.number !== number) {
+      [number, asked] = [slices.number, new Set()];
+      return update({ walls: new Map() });
     }
-    now.ready.filter((part) => !bands.has(part)).forEach((part) => fetchPart(part, number));
-    show();
-  };
+    slices?.ready.filter((part) => !asked.has(part)).forEach((part) => fetchPart(part, number));
+    const shown = slices && triangles && store.walls.size > 0;
+    picture.walls(shown ? [...store.walls.values()] : null, copies > 1);
+    document.documentElement.dataset.walls = shown ? [...store.walls.keys()].sort((a, b) => a - b).join(" ") : "";
+  });
 }
