@@ -51,7 +51,7 @@ class Prints(Observable):
             "version": self.version,
             "ports": self._ports,
             "asking": self._over is not None,
-            "journals": self._journals_told(),
+            "journals": self._journals_state(),
             "prints": [
                 {**job.state, "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
                 for job in self.prints
@@ -124,7 +124,7 @@ class Prints(Observable):
                 return running
         raise PrinterError("this print is not there any more")
 
-    def _journals_told(self) -> list[dict[str, Any]] | None:
+    def _journals_state(self) -> list[dict[str, Any]] | None:
         """Those that can be resumed, None before anybody has asked."""
         if self._journals is None:
             return None
