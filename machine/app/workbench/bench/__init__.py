@@ -1,1 +1,4 @@
-"""The bench as a value: what lies on the workbench, and what a page may change of it."""
+"""Bench: what lies on the workbench and what a page may change of it, as values; nothing here writes or waits.
+
+Public: `bench.Bench` and `bench.History`, the changes in `changes`, `planes`, `marks` and `stops`, `settings.settings_list`.
+"""

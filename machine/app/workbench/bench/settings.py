@@ -61,13 +61,8 @@ def with_name(given: Given, kind: str, name: str) -> Given:
 
 def named(given: Given, kind: str, name: str) -> Given:
     """The same with another machine, material or process, by its name or its file."""
-    match kind:
-        case "machine":
-            return replace(given, machine=name)
-        case "material":
-            return replace(given, material=name)
-        case _:
-            return replace(given, process=name)
+    change: dict[str, Any] = {kind: name}
+    return replace(given, **change)
 
 
 def profile_as_given(given: Given, before: Profile) -> Profile:

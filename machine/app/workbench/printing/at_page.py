@@ -76,14 +76,14 @@ class AtPage:
         return self.stop.is_set()
 
     @contextmanager
-    def show(self, observers: Observers, course: Timeline) -> Iterator["_Shown"]:
+    def show(self, observers: Observers, timeline: Timeline) -> Iterator["_Shown"]:
         """The print as its state."""
         journal = "" if observers.journal is None else str(observers.journal.path)
-        self._reporter.tell(log=log_told(observers.log), journal=journal)
-        yield _Shown(self._reporter, course, self.words)
+        self._reporter.tell(log=log_path(observers.log), journal=journal)
+        yield _Shown(self._reporter, timeline, self.words)
 
 
-def log_told(log: SerialLog) -> str:
+def log_path(log: SerialLog) -> str:
     """The file of a log for the pages; "" for one that is not written."""
     return "" if log.trouble else str(log.file)
 
@@ -92,8 +92,8 @@ class _Shown:
     """A display whose screen is the state that the pages are told. Moments are counted: a print of which nothing changes, as a
     paused one on a print server, is heard of all the same."""
 
-    def __init__(self, reporter: StateReporter, course: Timeline, words: PrinterMessages) -> None:
-        self._reporter, self._course, self._words = reporter, course, words
+    def __init__(self, reporter: StateReporter, timeline: Timeline, words: PrinterMessages) -> None:
+        self._reporter, self._timeline, self._words = reporter, timeline, words
         self._opened = False  # before, a person is asked
         self._moments = 0
 
@@ -109,18 +109,18 @@ class _Shown:
         phase = "leaving" if progress.state == "cancelling" else "printing"
         words = tuple(plain_line(word) for word in self._words.last)
         self._moments += 1
-        moment = told(progress, self._course) | {"moment": self._moments}
+        moment = moment_of(progress, self._timeline) | {"moment": self._moments}
         self._reporter.tell(phase=phase, progress=moment, words=words)
 
 
-def told(progress: Progress, course: Timeline) -> dict[str, Any]:
+def moment_of(progress: Progress, timeline: Timeline) -> dict[str, Any]:
     """A moment of a print for the page: what every page that watches is told, and what a terminal's screen adds. heat_s: since
     when the temperatures are known, seconds since 1970, for the page goes on counting when nothing more comes."""
     return {
         **state_of(progress),
         "parts": progress.parts,
-        "layers": course.layers(progress.part),
-        "at": course.at(progress.file_line),
+        "layers": timeline.layers(progress.part),
+        "at": timeline.at(progress.file_line),
         "feed_percent": progress.feed_percent,
         "flow_percent": progress.flow_percent,
         "heat_s": time() - progress.heat_age_s,

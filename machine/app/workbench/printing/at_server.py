@@ -13,7 +13,7 @@ from machine.app.printer.network_print import (
     server_session,
 )
 from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
-from machine.app.workbench.printing.at_page import AtPage, log_told
+from machine.app.workbench.printing.at_page import AtPage, log_path
 from machine.app.workbench.printing.checks import CLEAN, DONE, LEFT, STOPPED, Checks, figures, program_of
 from machine.app.workbench.printing.order import FollowOrder, PrintOrder, State
 from machine.link.pending_commands import CancelledError
@@ -31,7 +31,7 @@ def print_on_server(order: PrintOrder, person: AtPage, checks: Checks) -> State:
         checks.reporter.tell(phase="ready")
         if not person.agrees():
             return LEFT
-        checks.reporter.tell(phase="uploading", log=log_told(log))
+        checks.reporter.tell(phase="uploading", log=log_path(log))
         try:
             if not order.starts:
                 file = hand_over(server, GcodeUpload(job.name, job.program.lines), job.name, person)

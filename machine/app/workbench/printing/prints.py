@@ -14,7 +14,7 @@ from threading import Event as Flag
 from typing import Any
 
 from machine.app.printer.journal_folder import ResumableJournal, resumable_journals
-from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
+from machine.app.printer.port_reports import answer_words, ask_ports, known_ports, port_json
 from machine.app.workbench.printing.order import Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.observable import Observable
@@ -51,7 +51,7 @@ class Prints(Observable):
             "version": self.version,
             "ports": self._ports,
             "asking": self._over is not None,
-            "journals": self._journals_told(),
+            "journals": self._journals_state(),
             "prints": [
                 {**job.state, "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
                 for job in self.prints
@@ -124,7 +124,7 @@ class Prints(Observable):
                 return running
         raise PrinterError("this print is not there any more")
 
-    def _journals_told(self) -> list[dict[str, Any]] | None:
+    def _journals_state(self) -> list[dict[str, Any]] | None:
         """Those that can be resumed, None before anybody has asked."""
         if self._journals is None:
             return None
@@ -160,7 +160,7 @@ class Prints(Observable):
             used = [job.state["port"] for job in self.running]
             devices = await asyncio.to_thread(known_ports)
             reports = await asyncio.to_thread(ask_ports, devices, baud, over, [*used, *map(stable_name, used)])
-            self._ports = [_port(report) for report in reports]
+            self._ports = [{**port_json(report), "words": answer_words(report)} for report in reports]
         finally:
             self._over = None
             self.notify()
@@ -169,10 +169,6 @@ class Prints(Observable):
         task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-
-
-def _port(report: PortReport) -> dict[str, Any]:
-    return {**port_json(report), "words": answer_words(report)}
 
 
 def _same(one: str, other: str) -> bool:

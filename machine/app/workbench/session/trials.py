@@ -1,4 +1,4 @@
-"""PlaneTrials: planes in a person's hand, tried as they move, and taken when they can be cut."""
+"""Plane trials: planes in a person's hand, tried as they move, and taken when they can be cut."""
 
 import asyncio
 from collections.abc import Callable

@@ -1,1 +1,1 @@
-"""The workbench's server, its page, and what the page is told."""
+"""Web: the server, its addresses and lines, and the page. Public: `serve.serve_workbench`."""

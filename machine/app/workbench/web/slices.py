@@ -8,7 +8,7 @@ from machine.app.workbench.session.session import Session
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 
 
-def slices_told(session: Session) -> dict[str, Any]:
+def slices_state(session: Session) -> dict[str, Any]:
     """The keys `slicing`, `sliced`, `comparing` and `compared` of the state."""
     return {
         "slicing": _under_way(session),

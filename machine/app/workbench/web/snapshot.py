@@ -9,7 +9,7 @@ from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.commands import Need, lacking
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.web.slices import slices_told
+from machine.app.workbench.web.slices import slices_state
 from machine.view.front import front_record
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
@@ -48,7 +48,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "platform_mm": PLATFORM_TOLERANCE_MM,
         "resting": [asdict(rest) for rest in resting],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
-        **slices_told(session),
+        **slices_state(session),
         "front": [front_record(row) for row in bench.rows],
         "parts": bench.parts,
         "recommended": bench.recommended,

@@ -1,1 +1,1 @@
-"""The long work of the workbench, done in processes of its own."""
+"""Work: what takes time for a bench, in processes of its own. Public: `tasks.TASKS`, `worker_pool.TaskQueue`."""

@@ -2,22 +2,15 @@
 pickled."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from machine.app.workbench.bench.marks import mark, unmark
 from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, measure_plan, price_row
 from machine.app.workbench.work.models import mark_faces, rank_resting, read_model
 from machine.app.workbench.work.pieces import draw_pieces, make_pictures
-from machine.app.workbench.work.processes import Tell
 from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
 from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
-
-
-def _without_telling(task: Callable[..., Any], tell: Tell, *given: Any) -> Any:
-    return task(*given)
-
 
 TASKS: dict[str, Callable[..., Any]] = {
     task.__name__: task
@@ -41,4 +34,4 @@ TASKS: dict[str, Callable[..., Any]] = {
         try_cuts,
         near_neck,
     )
-} | {task.__name__: partial(_without_telling, task) for task in (mark, unmark)}
+} | {"mark": lambda tell, *given: mark(*given), "unmark": lambda tell, *given: unmark(*given)}

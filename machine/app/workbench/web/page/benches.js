@@ -50,8 +50,7 @@ function showBenches(benches) {
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
   const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
-  const close = made("button", { type: "button", text: "×", title: "Close this bench and end its work", ariaLabel: `Close the bench of ${text}` });
-  close.addEventListener("click", () => closeBench(number));
+  const close = made("button", { type: "button", text: "×", title: "Close this bench and end its work", ariaLabel: `Close the bench of ${text}`, onclick: () => closeBench(number) });
   return made("li", {}, label, close);
 }
 
@@ -65,8 +64,7 @@ export async function leftFiles() {
   $("left-field").hidden = !files.length;
   $("left-files").replaceChildren(...files.map(({ number, name, bytes, written_s: written }) => {
     const told = `${Math.ceil(bytes / 1000).toLocaleString("en")} kB, ${new Date(1000 * written).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })}`;
-    const button = made("button", { type: "button" }, made("span", { text: name }), made("small", { text: told }));
-    button.addEventListener("click", () => fetch(`left/${number}`, { method: "POST" }).catch(() => {})); // a refusal comes by the line
-    return button;
+    const open = () => fetch(`left/${number}`, { method: "POST" }).catch(() => {}); // a refusal comes by the line
+    return made("button", { type: "button", onclick: open }, made("span", { text: name }), made("small", { text: told }));
   }));
 }

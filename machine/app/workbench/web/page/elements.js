@@ -54,11 +54,9 @@ export function putTable(table, told, head, rows) {
 
 /** A row that is chosen by its radio button, in the label of which its name stands, or by a click; cells: [content, class]. */
 export function choiceRow(name, value, checked, label, cells, choose) {
-  const mark = made("input", { type: "radio", name, value, checked });
-  mark.addEventListener("change", choose);
-  const row = made("tr", {}, made("td", {}, made("label", {}, mark, ...label)), ...cells.map(([content, className]) => made("td", { className }, content)));
-  row.addEventListener("click", (event) => { if (!["INPUT", "LABEL", "BUTTON"].includes(event.target.tagName)) choose(); });
-  return row;
+  const mark = made("input", { type: "radio", name, value, checked, onchange: choose });
+  const onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
+  return made("tr", { onclick }, made("td", {}, made("label", {}, mark, ...label)), ...cells.map(([content, className]) => made("td", { className }, content)));
 }
 
 /** A knob put where a place is seen; null: it is not. */

@@ -167,8 +167,8 @@ function boxDrawn(zone, chosen) {
 
 function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
-  const remove = made("button", { type: "button", text: "×", title: `Remove ${name}`, ariaLabel: `remove ${name}` });
-  remove.addEventListener("click", () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
+  const unmark = () => send({ do: "unmark", kind: zone.kind, number: zone.number });
+  const remove = made("button", { type: "button", text: "×", title: `Remove ${name}`, ariaLabel: `remove ${name}`, onclick: unmark });
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
   const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [[where], [remove]], () => chooseMark(zone));

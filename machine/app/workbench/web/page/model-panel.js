@@ -42,11 +42,8 @@ export function modelPanel() {
 }
 
 function showResting(resting) {
-  $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
-    const button = made("button", { type: "button" }, made("span", { text: words }), made("small", { text: mm2(area) }));
-    button.addEventListener("click", () => send({ do: "stand", rotation }));
-    return button;
-  }));
+  $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) =>
+    made("button", { type: "button", onclick: () => send({ do: "stand", rotation }) }, made("span", { text: words }), made("small", { text: mm2(area) }))));
 }
 
 /** A file may be dropped anywhere on the page. */

@@ -25,9 +25,9 @@ export function placesDrawn({ box, pieces, shifts, walls, wallsAlone, plane, ped
   const bands = (pieces ? null : walls) || [], whole = pieces ? pieces.parts.map((part, k) => part.box.map((place) => add(place, shifts[k]))) : bands.map(({ places }) => bounds(places));
   if (!pieces && !(wallsAlone && bands.length)) whole.push(box, pedestal ? bounds(pedestal.vertices) : []);
   const rim = plane ? beside(plane.normal).flatMap((way) => [1, -1].map((sign) => add(plane.centre_mm, scaled(way, sign * plane.radius_mm)))) : [];
-  const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((each) => each && each.places.length)
+  const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((shape) => shape && shape.places.length)
     .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
-  return [...whole.filter((each) => each.length).flatMap(cornersOf), ...rim, ...around];
+  return [...whole.filter((box) => box.length).flatMap(cornersOf), ...rim, ...around];
 }
 
 /** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws; what is in
@@ -43,15 +43,15 @@ export function pictureOf(canvas, camera) {
     gl.depthFunc(gl.LEQUAL);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     card = { frame: frameOf(gl, 4), table: null, solid: null, extras: {} };
-    [table, solid, plane, pedestal, pieces, walls, ...Object.keys(scene.extras)].forEach((each) => stale.add(each));
+    [table, solid, plane, pedestal, pieces, walls, ...Object.keys(scene.extras)].forEach((part) => stale.add(part));
   };
   const anew = (...things) => {
-    things.forEach((each) => stale.add(each));
+    things.forEach((part) => stale.add(part));
     ask();
   };
   const renew = () => {
     if (stale.has(solid)) stale.delete(painted); // it has the new colours
-    stale.forEach((each) => (typeof each === "string" ? extra(each) : each()));
+    stale.forEach((part) => (typeof part === "string" ? extra(part) : part()));
     stale.clear();
   };
   const release = (thing) => { if (thing) thing.free(); };
@@ -83,7 +83,7 @@ export function pictureOf(canvas, camera) {
     if (card.table && !below) paintPlate(flat);
     if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
     else if (card.solid) {
-      (card.walls || []).forEach((each) => each.draw(flat));
+      (card.walls || []).forEach((wall) => wall.draw(flat));
       const ghost = card.walls ? FAINT : 0, alone = scene.wallsAlone && card.walls?.length;
       if (!alone) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost });
       if (!alone && card.pedestal) card.pedestal.draw(flat, { ghost });
@@ -132,9 +132,9 @@ export function pictureOf(canvas, camera) {
     if (card.solid) card.solid.paint(markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, card.colours)));
   };
   const walls = () => {
-    const kept = new Map((card.walls || []).map((each) => [each.of, each]));
+    const kept = new Map((card.walls || []).map((wall) => [wall.of, wall]));
     card.walls = scene.walls && scene.walls.map((of) => kept.get(of) || { of, ...solidOf(gl, of) });
-    kept.forEach((each, of) => { if (!(scene.walls || []).includes(of)) each.free(); });
+    kept.forEach((wall, of) => { if (!(scene.walls || []).includes(of)) wall.free(); });
   };
   const paintPlate = (seen, look = {}) => {
     card.table.solid.draw(seen, look);
@@ -186,7 +186,7 @@ export function pictureOf(canvas, camera) {
     /** The walls of what is sliced, triangles of each part, with the model as a ghost about them, or without it; null: none. */
     walls: (found, alone) => {
       scene.wallsAlone = alone;
-      const same = (scene.walls || []).length === (found || []).length && (found || []).every((each, k) => each === scene.walls[k]);
+      const same = (scene.walls || []).length === (found || []).length && (found || []).every((wall, k) => wall === scene.walls[k]);
       if (same && Boolean(found) === Boolean(scene.walls)) return;
       scene.walls = found;
       anew(walls);

@@ -72,7 +72,7 @@ export function piecesOn(gl, pieces, chosen) {
       arrows.draw(seen, { range: [k * share, (k + 1) * share] });
     }),
     paint: (number) => solid.paint(pieceColours(pieces, number)),
-    free: () => [solid, arrows].forEach((each) => each.free()),
+    free: () => [solid, arrows].forEach((drawing) => drawing.free()),
   };
 }
 

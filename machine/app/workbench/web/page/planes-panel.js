@@ -70,8 +70,8 @@ function tellPlanes() {
   const { state: { cuts, locked, search, colours }, part } = store, known = trialNow()?.parts || [];
   $("find-others").disabled = Boolean(search) || !locked.some(Boolean);
   const rowOf = (_, k) => {
-    const figures = known[k], number = k + 2, lock = made("input", { type: "checkbox", checked: locked[k], ariaLabel: `lock the plane of part ${number}` });
-    lock.addEventListener("change", () => send({ do: "lock", part: number, locked: lock.checked }));
+    const figures = known[k], number = k + 2, onchange = ({ target }) => send({ do: "lock", part: number, locked: target.checked });
+    const lock = made("input", { type: "checkbox", checked: locked[k], ariaLabel: `lock the plane of part ${number}`, onchange });
     return choiceRow("plane", number, number === part, [swatch(colours[k + 1]), `${number}`], [...FIGURES.map((of) => [figures ? of(figures) : "–"]), [lock]], () => choosePart(number));
   };
   putTable($("planes"), [cuts, locked, known, part], PLANE_HEAD, () => cuts.map(rowOf));

@@ -17,19 +17,19 @@ export function printPanel() {
   const follow = followIn(() => print());
   const send = (command) => { problem(""); socket.send(command); };
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
-  const print = () => state.prints.find((each) => each.number === chosen) || null;
+  const print = () => state.prints.find((job) => job.number === chosen) || null;
   const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
 
   function show(before) {
-    const running = state.prints.filter((each) => each.phase !== "over");
-    const known = before.prints.map((each) => each.number), fresh = state.prints.findLast((each) => !known.includes(each.number));
+    const running = state.prints.filter((job) => job.phase !== "over");
+    const known = before.prints.map((job) => job.number), fresh = state.prints.findLast((job) => !known.includes(job.number));
     if (fresh && chosen && (fresh.holder === OWN_PAGE || !running.includes(print()))) chosen = fresh.number; // the stop beside a hand stays its print's
     else if (!print()) chosen = (running.at(-1) || state.prints.at(-1) || { number: 0 }).number;
-    const lost = state.prints.find((each) => mine.has(each.number) && each.holder !== OWN_PAGE);
+    const lost = state.prints.find((job) => mine.has(job.number) && job.holder !== OWN_PAGE);
     if (lost) notice(`Another page has taken over the command of the print of ${lost.name}.`, "taken");
-    taken = (lost || running.find((each) => each.number === taken && each.holder !== OWN_PAGE))?.number || 0;
+    taken = (lost || running.find((job) => job.number === taken && job.holder !== OWN_PAGE))?.number || 0;
     if (!taken) notice("", "taken");
-    mine = new Set(state.prints.filter((each) => each.holder === OWN_PAGE).map((each) => each.number));
+    mine = new Set(state.prints.filter((job) => job.holder === OWN_PAGE).map((job) => job.number));
     showPorts(state, before);
     showJournals(state.journals, before.journals);
     showWhich(state.prints, chosen);
@@ -43,9 +43,9 @@ export function printPanel() {
 
   setInterval(() => {
     if (print()?.progress) showProgress(print()); // its temperatures grow old
-    if (!state.prints.some((each) => silence(each))) return;
+    if (!state.prints.some((job) => silence(job))) return;
     showPrint(print(), print()?.holder === OWN_PAGE);
-    showBar(state.prints.filter((each) => each.phase !== "over"), print());
+    showBar(state.prints.filter((job) => job.phase !== "over"), print());
   }, 1000);
   $("ask-ports").addEventListener("click", () => send({ do: "ports", baud: Number($("baud").value) }));
   for (const event of ["change", "input"]) $("ports").addEventListener(event, () => { showPort(); unforce(); });

@@ -27,9 +27,9 @@ export function sure(whether) {
 
 export function showWhich(prints, chosen) {
   $("which-line").hidden = prints.length < 2;
-  const told = prints.map((each) => `${each.name} at ${each.port}: ${each.phase === "over" ? each.end : each.phase}`);
+  const told = prints.map((job) => `${job.name} at ${job.port}: ${job.phase === "over" ? job.end : job.phase}`);
   if ([...$("which").options].map((option) => option.text).join("\n") !== told.join("\n")) {
-    $("which").replaceChildren(...prints.map((each, k) => made("option", { value: each.number, text: told[k] })));
+    $("which").replaceChildren(...prints.map((job, k) => made("option", { value: job.number, text: told[k] })));
   }
   $("which").value = chosen;
 }

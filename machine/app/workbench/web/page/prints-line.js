@@ -57,7 +57,7 @@ export function stopsAsked(prints, send, isOpen) {
     say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
   };
   const ask = (number) => {
-    if (prints().some((each) => going(each) && each.number === number)) asked.add(number);
+    if (prints().some((job) => going(job) && job.number === number)) asked.add(number);
     send({ do: "emergency", print: number });
     if (!isOpen()) doubt();
     clearTimeout(late);

@@ -20,7 +20,7 @@ export function ringsOf(picture) {
     return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * reachOf(store.triangles) };
   };
   const told = (axis, deg) => {
-    const group = groups.find((each) => each.dataset.ring === axis);
+    const group = groups.find(({ dataset }) => dataset.ring === axis);
     group.setAttribute("aria-valuenow", deg);
     group.setAttribute("aria-valuetext", `${deg} degrees`);
   };
@@ -62,12 +62,12 @@ export function ringsOf(picture) {
     groups.forEach((group) => {
       const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));
       const sides = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
-      const seen = sides.flatMap((each, k) => (k && each.near !== sides[k - 1].near ? [{ ...each, near: !each.near }, each] : [each]));
+      const seen = sides.flatMap((spot, k) => (k && spot.near !== sides[k - 1].near ? [{ ...spot, near: !spot.near }, spot] : [spot]));
       group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
       group.querySelector(".far").setAttribute("d", pathOf(seen, ({ near }) => !near));
       group.querySelector(".near").setAttribute("d", pathOf(seen, ({ near }) => near));
       group.querySelector(".reach").setAttribute("d", pathOf(seen, () => true));
-      const label = seen.reduce((best, each) => (each.at && each.near && (!best || each.at[1] < best[1]) ? each.at : best), null) || [-99, -99];
+      const label = seen.reduce((best, spot) => (spot.at && spot.near && (!best || spot.at[1] < best[1]) ? spot.at : best), null) || [-99, -99];
       group.querySelector("text").setAttribute("x", label[0]);
       group.querySelector("text").setAttribute("y", label[1]);
     });
@@ -142,9 +142,9 @@ function graspEdge(picture, axis, ring, event) {
 /** An SVG path along the places that are seen and wanted. */
 function pathOf(seen, wanted) {
   let text = "", open = false;
-  for (const each of seen) {
-    const drawn = each.at && wanted(each);
-    if (drawn) text += `${open ? "L" : "M"}${each.at[0].toFixed(1)} ${each.at[1].toFixed(1)}`;
+  for (const spot of seen) {
+    const drawn = spot.at && wanted(spot);
+    if (drawn) text += `${open ? "L" : "M"}${spot.at[0].toFixed(1)} ${spot.at[1].toFixed(1)}`;
     open = drawn;
   }
   return text;

@@ -51,7 +51,7 @@ export function settingsPanel() {
   };
   const partsToChoose = ({ parts, part_settings: own, model }) => {
     const names = ["all parts", ...Array.from({ length: model ? Math.max(parts, 1) : 0 }, (_, k) => {
-      const keys = own.find((each) => each.part === k + 1)?.keys.length || 0;
+      const keys = own.find((ofPart) => ofPart.part === k + 1)?.keys.length || 0;
       return `part ${k + 1}${keys ? ` (${keys} of its own)` : ""}`;
     })];
     const chosen = part() < names.length ? part() : 0;
@@ -95,8 +95,7 @@ function settingRow(setting, wrong, set, again) {
   const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
   input.setAttribute("aria-describedby", told.id);
   input.setAttribute("aria-invalid", Boolean(wrong));
-  const back = made("button", { type: "button", text: "↺", title: "As it was", ariaLabel: `${key} as it was`, hidden: !changed && !wrong });
-  back.addEventListener("click", () => set(key, null));
+  const back = made("button", { type: "button", text: "↺", title: "As it was", ariaLabel: `${key} as it was`, hidden: !changed && !wrong, onclick: () => set(key, null) });
   const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
   const row = settingBox(setting, [made("label", {}, made("span", {}, ...breakable(key)), input, back), refused, told, named]);
   input.addEventListener("input", () => { row.dataset.typing = kind; });

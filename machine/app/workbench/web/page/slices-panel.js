@@ -46,10 +46,8 @@ function showFindings(sliced, showFinding) {
   const rows = findings.map((finding, k) => {
     const { severity, code, message, part, layer, line } = finding;
     const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
-    const button = made("button", { type: "button", className: severity },
-      made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? `${where}: show it` : "the whole print" }));
-    button.addEventListener("click", () => showFinding(k));
-    return made("li", {}, button);
+    return made("li", {}, made("button", { type: "button", className: severity, onclick: () => showFinding(k) },
+      made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? `${where}: show it` : "the whole print" })));
   });
   $("sliced-findings").replaceChildren(...rows, ...(more ? [made("li", { text: `and ${more} more, in the page of the print` })] : []));
 }
@@ -75,8 +73,7 @@ export function stopsPanel() {
 
 function stopRow({ part, layer, height_mm: height, change }, remove) {
   const kind = change ? "filament change" : "pause", where = layer === null ? `part ${part}, at ${height} mm` : `part ${part}, before layer ${layer}`;
-  const button = made("button", { type: "button", text: "×", title: `Remove this ${kind}`, ariaLabel: `remove the ${kind} of ${where}` });
-  button.addEventListener("click", remove);
+  const button = made("button", { type: "button", text: "×", title: `Remove this ${kind}`, ariaLabel: `remove the ${kind} of ${where}`, onclick: remove });
   return made("tr", {}, made("td", { text: kind }), made("td", { text: where }), made("td", {}, button));
 }
 
@@ -97,9 +94,9 @@ export function comparePanel() {
     $("stop-comparing").hidden = !comparing;
     $("comparing-told").textContent = comparing;
     if (alike(compared, before?.compared)) return;
-    const [, standing, lying] = compared, shown = compared.filter((each) => each !== lying || lying.note !== standing.note);
+    const [, standing, lying] = compared, shown = compared.filter((alternative) => alternative !== lying || lying.note !== standing.note);
     const head = made("tr", {}, made("td"), ...shown.map(({ name }) => made("th", { text: name, scope: "col" })));
-    const rows = COSTS.map(([name, of]) => made("tr", {}, made("th", { text: name, scope: "row" }), ...shown.map((each) => made("td", { text: each.time_s === null ? "–" : of(each) }))));
+    const rows = COSTS.map(([name, of]) => made("tr", {}, made("th", { text: name, scope: "row" }), ...shown.map((alternative) => made("td", { text: alternative.time_s === null ? "–" : of(alternative) }))));
     $("compared").replaceChildren(...(compared.length ? [made("thead", {}, head), made("tbody", {}, ...rows)] : []));
     listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
   });

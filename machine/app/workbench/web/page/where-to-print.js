@@ -30,9 +30,9 @@ export function showPorts({ ports, asking }, before) {
   $("ports-told").textContent = asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "";
   if (JSON.stringify(ports) === JSON.stringify(before.ports) && $("ports-found").children.length) return;
   const now = port();
-  $("ports-found").replaceChildren(...(ports || []).map((each) => made("label", { className: "port" },
-    made("input", { type: "radio", name: "port", value: each.port, checked: each.port === now }),
-    made("span", {}, made("b", { text: each.port }), made("small", { text: [each.description, each.words].filter(Boolean).join(": ") })))));
+  $("ports-found").replaceChildren(...(ports || []).map((device) => made("label", { className: "port" },
+    made("input", { type: "radio", name: "port", value: device.port, checked: device.port === now }),
+    made("span", {}, made("b", { text: device.port }), made("small", { text: [device.description, device.words].filter(Boolean).join(": ") })))));
 }
 
 /** Prints that were cut off, those of the last run of the program among them. */
