@@ -1,7 +1,8 @@
 """Compensation: layers whose outsides and holes are larger or smaller, so that the print's sizes are the model's.
 
 Plastic bulges and shrinks where it meets air. A cut face meets plastic: what lies beside it, of a part printed later, stays where
-it is, or the parts would leave a gap or be pressed into each other.
+it is, or the parts would leave a gap or be pressed into each other. Nor does what is added beside the end of a cut reach over the
+later part's base plane, above which the head moves.
 """
 
 from collections.abc import Sequence
@@ -9,8 +10,8 @@ from collections.abc import Sequence
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, area_mm2, closing, contours, islands, offset, union
-from slicer.interface.interface import sections_of
+from slicer.geometry.polygons import Polygons, area_mm2, closing, contours, half_plane, islands, offset, union
+from slicer.interface.interface import plane_in_frame_of, sections_of
 
 TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
 
@@ -27,17 +28,24 @@ def compensate(
     if process.outline_compensation_mm == 0.0 and process.hole_compensation_mm == 0.0:
         return list(outlines)
     beside = sections_of(later, part, cuts_mm) if later else [Polygons()] * len(outlines)
-    return [compensated(own, others, process) for own, others in zip(outlines, beside, strict=True)]
+    planes = [plane_in_frame_of(part, other.base.normal, other.base.offset_mm) for other in later]
+    below = [[(-x, -y, distance - z * cut_mm) for x, y, z, distance in planes] for cut_mm in cuts_mm.tolist()]
+    return [compensated(*layer, process=process) for layer in zip(outlines, beside, below, strict=True)]
 
 
-def compensated(own: Polygons, others: Polygons, process: Process) -> Polygons:
-    """A part's section, which others of its model touch, with the sides compensated that no other touches."""
+def compensated(own: Polygons, others: Polygons, below: Sequence[Sequence[float]], *, process: Process) -> Polygons:
+    """A part's section, which others of its model touch, with the sides compensated that no other touches.
+
+    below: a, b, c of every later part's base plane; what is added stays where a x + b y + c > 0.
+    """
     if own.is_empty():
         return own
     whole = own if others.is_empty() else own + closing(own + others, TOUCHING_MM)
     grown = reach_mm(process)
-    wider = own if grown == 0.0 else own + (offset(own, grown) - whole)
-    return wider ^ _resized(whole, process)
+    added = Polygons() if grown == 0.0 else offset(own, grown) - whole
+    for a, b, c in below:
+        added = half_plane(added, a, b, c)
+    return (own + added) ^ _resized(whole, process)
 
 
 def _resized(whole: Polygons, process: Process) -> Polygons:

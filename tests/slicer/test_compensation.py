@@ -7,9 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from profiles.process import Process
-from slicer.finish.compensation import compensate_elephant_foot, compensated, reach_mm
-from slicer.geometry.polygons import MITRE, Polygons, offset
-from tests.slicer.hand import as_shapely, profile
+from slicer.finish.compensation import compensate, compensate_elephant_foot, compensated, reach_mm
+from slicer.geometry.cross_section import cross_sections
+from slicer.geometry.polygons import MITRE, Polygons, clean, half_plane, offset
+from tests.shapes import box
+from tests.slicer.hand import as_shapely, cut, profile
 
 seeds = st.integers(0, 10**6)
 NOTHING = Polygons()
@@ -44,27 +46,44 @@ def test_outsides_and_holes_are_offset_each_by_its_own(seed: int, outline_mm: fl
             for island in shapely.get_parts(as_shapely(section))
         ]
     )
-    difference = as_shapely(compensated(section, NOTHING, process(outline_mm, hole_mm))) ^ expected
+    difference = as_shapely(compensated(section, NOTHING, (), process=process(outline_mm, hole_mm))) ^ expected
     assert difference.area < 0.01
 
 
 @pytest.mark.parametrize(("outline_mm", "hole_mm"), [(0.2, 0.0), (-0.2, 0.0), (0.2, 0.3), (-0.1, -0.3), (0.0, 0.25)])
-def test_what_another_part_touches_stays_where_it_is(outline_mm: float, hole_mm: float) -> None:
+def test_what_another_part_touches_stays_where_it_is_and_the_parts_overlap_nowhere(outline_mm: float, hole_mm: float) -> None:
     whole, right_half = plate(), Polygons.square((20.0, 40.0)).translate((0.0, -20.0))
     right, left = whole ^ right_half, whole - right_half
     asked = process(outline_mm, hole_mm)
-    own, other = (as_shapely(compensated(part, rest, asked)) for part, rest in ((left, right), (right, left)))
-    beyond = own.intersection(other)  # in the corners that both grow into beside the two ends of the cut
-    assert beyond.area <= 4.0 * reach_mm(asked) ** 2 + 1e-6
-    assert beyond.intersection(as_shapely(whole)).area == pytest.approx(0.0, abs=1e-6)
-    assert own.union(other).symmetric_difference(as_shapely(compensated(whole, NOTHING, asked))).area < 0.05
+    own, other = (
+        as_shapely(compensated(part, rest, [below], process=asked))
+        for part, rest, below in ((left, right, (-1.0, 0.0, 0.0)), (right, left, (1.0, 0.0, 0.0)))
+    )
+    assert own.intersection(other).area == pytest.approx(0.0, abs=1e-6)
+    assert own.union(other).symmetric_difference(as_shapely(compensated(whole, NOTHING, (), process=asked))).area < 0.05
     assert own.intersection(as_shapely(right)).area == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("asked_mm", [0.1, 0.3])
+def test_no_layer_reaches_over_the_base_plane_of_a_later_part(asked_mm: float) -> None:
+    low, high = cut(box(20, 20, 40), ((0.6, 0.2, 0.8), 14.0))
+    cuts = np.arange(0.1, 25.0, 0.2)
+    outlines = [clean(loops, 0.0) for loops in cross_sections(low.in_part_frame(), cuts)]
+    grown = compensate(outlines, low, [high], cuts, process(asked_mm, 0.0))
+    square = shapely.box(-10.0, -10.0, 10.0, 10.0).buffer(asked_mm, join_style="mitre")
+    normal = high.base.normal
+    for z, area in zip(cuts.tolist(), grown, strict=True):
+        below = as_shapely(
+            half_plane(Polygons.square((30.0, 30.0), True), -normal[0], -normal[1], high.base.offset_mm - z * normal[2])
+        )
+        assert as_shapely(area).difference(below.buffer(1e-6)).area < 1e-6
+        assert as_shapely(area).symmetric_difference(square & below).area < 0.02 + asked_mm**2  # corners too sharp for a mitre
+
+
 def test_a_section_with_no_compensation_is_itself_and_of_nothing_there_is_nothing() -> None:
-    assert (compensated(plate(), NOTHING, process(0.0, 0.0)) - plate()).area() == pytest.approx(0.0, abs=1e-9)
-    assert compensated(plate(), NOTHING, process(0.0, 0.0)).area() == pytest.approx(400.0 - 16.0)
-    assert compensated(NOTHING, plate(), process(0.1, 0.1)).is_empty()
+    assert (compensated(plate(), NOTHING, (), process=process(0.0, 0.0)) - plate()).area() == pytest.approx(0.0, abs=1e-9)
+    assert compensated(plate(), NOTHING, (), process=process(0.0, 0.0)).area() == pytest.approx(400.0 - 16.0)
+    assert compensated(NOTHING, plate(), (), process=process(0.1, 0.1)).is_empty()
 
 
 @pytest.mark.parametrize(("outline_mm", "hole_mm", "reach"), [(0.2, 0.1, 0.2), (-0.2, -0.3, 0.3), (-0.2, 0.3, 0.0)])
@@ -73,7 +92,7 @@ def test_plastic_lies_outside_a_model_as_far_as_its_outside_grows_or_its_holes_s
 ) -> None:
     asked = process(outline_mm, hole_mm)
     assert reach_mm(asked) == reach
-    grown = as_shapely(compensated(plate(), NOTHING, asked))
+    grown = as_shapely(compensated(plate(), NOTHING, (), process=asked))
     assert grown.hausdorff_distance(as_shapely(plate())) <= 2**0.5 * max(abs(outline_mm), abs(hole_mm)) + 1e-6
     assert as_shapely(plate()).buffer(reach + 1e-6, join_style="mitre").covers(grown)
 

@@ -164,4 +164,5 @@ def test_a_layer_on_plastic_begins_with_its_longest_line_inside_unless_it_has_su
 ) -> None:
     begun = begin_inside(beads)
     assert [b.length_mm for b in begun] == [b.length_mm for b in sorted(beads, key=lambda b: beads.index(b) != first)]
+    assert first is None or begun[0].points is beads[first].points
     assert first in (0, None) or begun[0].rank == OUTSIDE
