@@ -78,11 +78,6 @@ def union(several: Sequence[Polygons]) -> Polygons:
     return Polygons.batch_boolean(list(several), OpType.Add) if several else Polygons()
 
 
-def difference(polygons: Polygons, *others: Polygons) -> Polygons:
-    """What of polygons lies in none of the others, in one pass."""
-    return Polygons.batch_boolean([polygons, *others], OpType.Subtract)
-
-
 def islands(polygons: Polygons) -> list[Polygons]:
     """The connected pieces, each with its holes.
 
@@ -122,13 +117,13 @@ def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
     return polygons ^ Polygons([np.array([near - aside, end - aside, end + aside, near + aside])])
 
 
-def strips(lines: Sequence[Floats], reach_mm: float) -> Polygons:
-    """Everything nearer than the reach to lines (n, 2), with square ends."""
+def strips(lines: Sequence[Floats], reach_mm: float | Floats) -> Polygons:
+    """Everything nearer than the reach to lines (n, 2), with square ends; an array holds the reach of every segment."""
     quads = _quads(np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines]), reach_mm)
     return Polygons(list(quads), FillRule.Positive)
 
 
-def _quads(starts: Floats, ends: Floats, reach_mm: float) -> Floats:
+def _quads(starts: Floats, ends: Floats, reach_mm: float | Floats) -> Floats:
     """(n, 4, 2) a counter-clockwise rectangle round every segment."""
     steps = ends - starts
     along = steps * (reach_mm / np.maximum(np.hypot(*steps.T), 1e-9))[:, None]

@@ -5,10 +5,11 @@ An island that is nowhere narrower than its walls want gets walls of one width, 
 
 from itertools import chain
 
+import numpy as np
+
 from profiles.process import Process
 from slicer.bead import PATH_RESOLUTION_MM, length_mm, outer_wall_width_mm, spacing_mm
-from slicer.geometry.polygons import Polygons, close_loop, contours, difference, islands, offset, offset_round, opening, strips
-from slicer.walls.variable.pieces import split_course
+from slicer.geometry.polygons import Polygons, close_loop, contours, islands, offset, offset_round, opening, strips
 from slicer.walls.variable.rule import FEATURE, ROOM, Rule
 from slicer.walls.variable.variable import Wall, variable_walls
 from slicer.walls.walls import SLACK_MM, Walls, walls
@@ -78,11 +79,8 @@ def _is_thick(island: Polygons, rule: Rule) -> bool:
 def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polygons:
     """What the walls leave inside, where it has room for more than one bead."""
     inside = offset_round(section, -_wall_mm(rule)).simplify(PATH_RESOLUTION_MM)
-    middle = [
-        strips([piece], 0.5 * width)
-        for wall in varying
-        if wall.level == rule.walls
-        for piece, width in split_course(wall.course.points, wall.course.widths)
-    ]
-    inside = difference(inside, *middle) if middle else inside
+    middle = [wall.course for wall in varying if wall.level == rule.walls]
+    if middle:
+        reach_mm = [0.25 * (course.widths[1:] + course.widths[:-1]) for course in middle]
+        inside = inside - strips([course.points for course in middle], np.concatenate(reach_mm))
     return inside if inside.is_empty() else opening(inside, 0.5 * rule.inner)

@@ -11,6 +11,7 @@ from profiles.process import Process
 from slicer.bead import PATH_RESOLUTION_MM, Bead, bulge_flow, outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, contours, offset
 from slicer.paths import Kind
+from slicer.walls.variable.rule import ROOM
 from slicer.walls.variable.variable import Wall
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner
@@ -44,8 +45,8 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
         area = core.simplify(PATH_RESOLUTION_MM)
         if core.is_empty():
             break
-    core = offset(area, -0.5 * spacing)
-    inside = _backed(area, area, core, half_mm=SLACK_MM, behind_mm=0.5 * spacing, least_mm=least_mm)
+    core = offset(area, -0.5 * ROOM * spacing)
+    inside = _backed(area, area, core, half_mm=SLACK_MM, behind_mm=0.5 * ROOM * spacing, least_mm=least_mm)
     return Walls(tuple(levels), inside)
 
 
