@@ -13,6 +13,7 @@ from slicer.shells import Shells
 from slicer.support.beads import support_beads
 from slicer.support.pedestal import pedestal_beads
 from slicer.walls.brim import brim
+from slicer.walls.gap import gaps
 from slicer.walls.walls import wall_beads
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
@@ -32,7 +33,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     process, region, height_mm = shell.process, shell.region, float(heights.height_mm[layer])
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     lines = SolidLines(angle_of_layer_deg(process.infill_angle_deg, layer), width, height_mm, overlap)
-    beads = wall_beads(shell.walls, process, height_mm)
+    beads = wall_beads(shell.walls, process, height_mm) + gaps(shell.walls.narrow, width, height_mm)
     for bridge in shell.bridges:
         area = bridge_area(bridge, shell.walls.inside, width)
         if not area.is_empty():

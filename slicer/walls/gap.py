@@ -5,12 +5,12 @@ import numpy as np
 from slicer.bead import Bead, Course, length_mm, simplify_bead, spacing_mm
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
-from slicer.walls.variable.rule import Rule
+from slicer.walls.variable.rule import SPLIT, Rule
 from slicer.walls.variable.variable import variable_walls
 
 RANK = 1
 LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
-MOST_WIDTH = 2.0  # line widths of a bead
+MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie beside each other
 ROUNDS = 50  # beads round a place at most: as many as walls
 SHORTEST = 0.25  # of the line width: what is shorter is no bead
 MOST_WIDER = 1.3  # times as wide as its place is a bead, at most, to make up for the tips of the place that it does not reach
@@ -22,7 +22,7 @@ def gaps(places: Polygons, line_width_mm: float, height_mm: float) -> list[Bead]
     They are as wide as the place. What is narrower than LEAST_GAP of a line stays empty.
     """
     spacing, widest_mm = spacing_mm(line_width_mm, height_mm), MOST_WIDTH * line_width_mm
-    rule = Rule(ROUNDS, spacing, spacing, 0.0, LEAST_GAP * line_width_mm, spacing_mm(widest_mm, height_mm))
+    rule = Rule(ROUNDS, MOST_WIDTH / SPLIT * spacing, spacing, 0.0, LEAST_GAP * line_width_mm, spacing_mm(widest_mm, height_mm))
     courses = [wall.course for wall in variable_walls(places, rule)]
     courses = [course for course in courses if length_mm(course.points) > SHORTEST * line_width_mm]
     covered_mm2 = sum(course.width_mm * length_mm(course.points) for course in courses)

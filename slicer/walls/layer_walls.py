@@ -58,7 +58,7 @@ def layer_walls(section: Polygons, count: int, process: Process, height_mm: floa
         return even
     varying = tuple(chain.from_iterable(variable_walls(island, rule) for island in narrow))
     inside = _enclosed(Polygons.compose(narrow), varying, rule)
-    return Walls(even.loops, even.inside + inside, varying)
+    return Walls(even.loops, even.inside + inside, even.narrow, varying)
 
 
 def _wall_mm(rule: Rule) -> float:

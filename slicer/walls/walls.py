@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import PATH_RESOLUTION_MM, Bead, bulge_flow, outer_wall_width_mm, spacing_mm
-from slicer.geometry.polygons import Polygons, contours, offset
+from slicer.geometry.polygons import Polygons, contours, offset, opening
 from slicer.paths import Kind
-from slicer.walls.variable.rule import ROOM
 from slicer.walls.variable.variable import Wall
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner
@@ -24,11 +23,13 @@ SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original 
 class Walls:
     """loops[k]: centrelines of wall k from outside; varying: walls as wide as the place.
 
-    inside: what the walls enclose, bounded half a spacing inside the innermost centreline.
+    inside: what the walls enclose, bounded half a spacing inside the innermost centreline; narrow: what of it walls of one width
+    leave that is narrower than two lines, across which those of a fill would only go to and fro.
     """
 
     loops: tuple[tuple[Floats, ...], ...]
     inside: Polygons
+    narrow: Polygons
     varying: tuple[Wall, ...] = ()
 
 
@@ -45,9 +46,9 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
         area = core.simplify(PATH_RESOLUTION_MM)
         if core.is_empty():
             break
-    core = offset(area, -0.5 * ROOM * spacing)
-    inside = _backed(area, area, core, half_mm=SLACK_MM, behind_mm=0.5 * ROOM * spacing, least_mm=least_mm)
-    return Walls(tuple(levels), inside)
+    core = offset(area, -spacing)
+    inside = _backed(area, area, core, half_mm=SLACK_MM, behind_mm=spacing, least_mm=least_mm)
+    return Walls(tuple(levels), inside, opening(area - inside, 0.5 * least_mm))
 
 
 def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, behind_mm: float, least_mm: float) -> Polygons:

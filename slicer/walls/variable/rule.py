@@ -10,7 +10,7 @@ from typing import NamedTuple
 from mdp.kernels.kernel import part
 
 ADD = 0.7  # of a spacing: from this on what two beads leave between them gets a bead of its own
-ROOM = 2.0  # spacings: a narrower place between all walls gets one bead, for lines of a fill would only go to and fro across it
+ROOM = 1.5  # spacings: narrower places between all walls get one bead
 SPLIT = 1.5  # spacings: from this on one bead becomes two
 FEATURE = 0.5  # of the least width: places so narrow get a bead that is wider than they are, narrower ones none
 
