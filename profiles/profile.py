@@ -22,6 +22,7 @@ __all__ = ["DEFAULTS", "KINDS", "OF_KIND", "SECTIONS", "Profile", "kind_of", "kn
 
 DEFAULTS = {"machine": "generic_ac", "material": "pla", "process": "standard"}
 SECTIONS: dict[str, type[Frozen]] = {"machine": Machine, "material": Material, "process": Process, "search": Search}
+GONE = {"process": {"wall_generator"}}  # keys of earlier versions: what a G-code file or a journal tells of them is passed over
 LIMITS = {"machine", "machine.nozzle_limit_c", "machine.bed_limit_c", "machine.head", "machine.head.nozzle_mm"}
 
 
@@ -99,8 +100,8 @@ def section(name: str, table: Any) -> Frozen:
 
 
 def profile_of_tables(tables: dict[str, Any]) -> Profile:
-    """A profile made of plain tables, as one that was dumped to JSON. Raises ProfileError."""
-    sections = {name: section(name, tables.get(name)) for name in SECTIONS}
+    """A profile made of plain tables, as one that was dumped to JSON, be it by an earlier version. Raises ProfileError."""
+    sections = {name: section(name, _without_gone(name, tables.get(name))) for name in SECTIONS}
     try:
         return Profile.model_validate(sections | {"parts": tables.get("parts", [])})
     except ValidationError as error:
@@ -108,11 +109,15 @@ def profile_of_tables(tables: dict[str, Any]) -> Profile:
 
 
 def sound_section(name: str, table: Any) -> Frozen | None:
-    """The same; None where the table makes no valid section."""
+    """The same of a table that was recorded, be it by an earlier version; None where it makes no valid section."""
     try:
-        return SECTIONS[name].model_validate(table)
+        return SECTIONS[name].model_validate(_without_gone(name, table))
     except ValidationError:
         return None
+
+
+def _without_gone(name: str, table: Any) -> Any:
+    return {key: value for key, value in table.items() if key not in GONE.get(name, ())} if isinstance(table, dict) else table
 
 
 def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:

@@ -13,7 +13,20 @@ from hypothesis import strategies as st
 from profiles.check import check_file
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
-from profiles.profile import DEFAULTS, KINDS, OF_KIND, SECTIONS, kind_of, load, load_one, rows, shipped
+from profiles.process import Process
+from profiles.profile import (
+    DEFAULTS,
+    KINDS,
+    OF_KIND,
+    SECTIONS,
+    kind_of,
+    load,
+    load_one,
+    profile_of_tables,
+    rows,
+    shipped,
+    sound_section,
+)
 from profiles.wording import allowed, keys
 
 ALL_KEYS = [(name, field) for section, model in SECTIONS.items() for name, field in keys(model, f"{section}.")]
@@ -406,3 +419,15 @@ def test_what_means_nothing_beside_other_settings_of_a_search_is_nothing(
     assert search.effective.model_dump().items() >= nothing.items()
     assert search.effective.effective == search.effective
     assert not given or search.effective != search
+
+
+def test_what_an_earlier_version_has_recorded_is_read_without_the_keys_that_are_gone() -> None:
+    recorded = load().model_dump(mode="json")
+    recorded["process"] |= {"wall_generator": "classic", "walls": 5}
+    assert profile_of_tables(recorded).process.walls == 5
+    process = sound_section("process", recorded["process"])
+    assert isinstance(process, Process)
+    assert process.walls == 5
+    assert sound_section("process", recorded["process"] | {"wall_colour": "red"}) is None
+    with pytest.raises(ProfileError, match="wall_generator"):
+        load(settings=["process.wall_generator=classic"])

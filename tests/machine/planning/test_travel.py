@@ -64,13 +64,14 @@ def test_a_wipe_goes_over_the_path_just_printed_at_the_pace_of_the_filament() ->
 
 
 def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
-    layer, checked = BeginLayer(1, 1, 0.0, 0.2, 0.0), 0
+    layer, checked, pulled = BeginLayer(1, 1, 0.0, 0.2, 0.0), 0, False
     moves = _towers("process.lift_mm=0.4")[0].moves
     last = max(place for place, move in enumerate(moves) if isinstance(move, Stroke))  # then the tip goes aside
     for before, move in pairwise(moves[:last]):
         layer = move if isinstance(move, BeginLayer) else layer
+        pulled = isinstance(move, Wipe) or (pulled and not isinstance(move, Stroke))
         crosses = isinstance(move, Travel) and np.hypot(*(move.points_mm[-1] - move.points_mm[0])[:2]) > 4
-        if layer.z_mm and crosses and isinstance(before, Travel):
+        if layer.z_mm and pulled and crosses and isinstance(before, Travel):
             assert move.points_mm[:, 2] == pytest.approx(layer.z_mm + 0.4)
             checked += 1
     assert checked >= 14

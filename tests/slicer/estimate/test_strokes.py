@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import spacing_mm
-from slicer.estimate.hanging import NONE, ThickSupport
+from slicer.estimate.hanging import ThickSupport
 from slicer.estimate.shell import NOTHING, Extent, extent_of
 from slicer.estimate.strokes import LayerSpeeds, Strokes, line_strokes, loop_strokes, support_strokes
 from slicer.geometry.polygons import Polygons
@@ -115,4 +115,4 @@ def test_the_thick_layer_at_a_height(z_mm: float, layer: int | None) -> None:
     support = thick(Polygons.square((10.0, 10.0)), Polygons())
     assert support.at(z_mm) == layer
     assert (support_strokes(support, z_mm, PROCESS, SPEEDS, False) == []) == (layer is None)
-    assert NONE.at(z_mm) is None
+    assert ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons()).at(z_mm) is None
