@@ -105,14 +105,16 @@ def _new_path(name: str) -> Path:
 
 
 def _thin(folder: Path) -> None:
-    """Leave room for one more: delete all but the newest and those being printed; a program that is not new goes when no journal
-    beside it is left that names it."""
-    for old in _newest_first(folder)[KEPT - 1 :]:
-        if not is_being_printed(old):
-            old.unlink(missing_ok=True)
+    """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is left
+    that names it, a new one only with its journal."""
+    gone = [old for old in _newest_first(folder)[KEPT - 1 :] if not is_being_printed(old)]
+    ended = b"".join(map(_first_line, gone))
+    for old in gone:
+        old.unlink(missing_ok=True)
     headings = b"".join(map(_first_line, _newest_first(folder)))
     for program in folder.glob(f"*{PROGRAM}"):
-        if program.name.encode() not in headings and not _is_new(program):
+        name = program.name.encode()
+        if name not in headings and (name in ended or not _is_new(program)):
             program.unlink(missing_ok=True)
 
 
