@@ -105,8 +105,8 @@ def _new_path(name: str) -> Path:
 
 
 def _thin(folder: Path) -> None:
-    """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is left
-    that names it, a new one only with its journal."""
+    """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is
+    left that names it, a new one only with its journal."""
     gone = [old for old in _newest_first(folder)[KEPT - 1 :] if not is_being_printed(old)]
     ended = b"".join(map(_first_line, gone))
     for old in gone:
