@@ -11,7 +11,7 @@ import numpy as np
 from mdp.mesh import parse_colour
 from mdp.plans.plan_file import KEYS, PART_KEYS, ROW_KEYS, VERSION, ZONE_KEYS, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
 from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, Painted, Zone, Zones
-from profiles.errors import PlanError
+from profiles.errors import PlanError, reason
 from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
 from profiles.toml_text import read_toml
@@ -29,7 +29,7 @@ def read_plan(path: Path) -> PlanFile:
             raise PlanError(f"plan {path} has more than {MOST_BYTES} bytes: it is no plan")
         table = read_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise PlanError(f"plan {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise PlanError(f"plan {path} cannot be read: {reason(error)}") from None
     except UnicodeDecodeError as error:
         raise PlanError(f"plan {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
     except ValueError as error:

@@ -24,7 +24,7 @@ from machine.app.workbench.web.uploads import Uploads
 from machine.app.workbench.work.processes import hear_the_ends
 from machine.app.workbench.work.received import files_in, tidy_left
 from machine.app.workbench.work.worker_pool import WorkerPools
-from profiles.errors import OutputError
+from profiles.errors import OutputError, reason
 
 GRACE_S = 1  # for answers under way when it ends, and for its processes
 SWITCH_S = 0.0005  # between threads: usual are 5 ms, and a stop is waited for several times
@@ -57,8 +57,8 @@ def listen(port: int) -> socket.socket:
         own.listen()  # at once: of two that are bound so, the second is refused here
     except (OSError, OverflowError) as error:
         own.close()
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise OutputError(f"--port {port} cannot be used: {reason.lower()}; without it any free one is taken") from None
+        why = reason(error) if isinstance(error, OSError) else str(error)
+        raise OutputError(f"--port {port} cannot be used: {why}; without it any free one is taken") from None
     return own
 
 
@@ -74,8 +74,9 @@ def serve_workbench(
     own = listen(port)
     with own:
         folders = tidy_left()
-        for folder in folders:
-            left = f"a workbench that was killed has left the files of its benches in {folder}"
+        if folders:
+            told = f"{folders[0]} and {len(folders) - 1} more" if folders[1:] else str(folders[0])
+            left = f"workbenches that were killed have left the files of their benches in {told}"
             say(f"{left}: the page offers them, and they go with a start in a day")
         asyncio.run(_serve(make, begin, announce, own, Uploads(upload_mib, files_in(*folders))))
 

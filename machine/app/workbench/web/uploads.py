@@ -13,7 +13,7 @@ from starlette.responses import JSONResponse, Response
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.profile_files import ProfileFiles
 from machine.app.workbench.work.received import remove_file
-from profiles.errors import PlanError
+from profiles.errors import PlanError, reason
 
 TEXT_SUFFIX = ".toml"  # of plans and profiles
 MIB = 2**20
@@ -52,8 +52,7 @@ class Uploads:
             try:
                 await asyncio.to_thread(shutil.copyfile, path, copy)
             except OSError as error:
-                why = (error.strerror or str(error)).lower()
-                raise PlanError(f"{path.name}, left by a workbench that was killed, cannot be read: {why}") from None
+                raise PlanError(f"{path.name}, left by a workbench that was killed, cannot be read: {reason(error)}") from None
 
         return await self._open(session, path.name, copy_to)
 
