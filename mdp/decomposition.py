@@ -53,8 +53,8 @@ class Part:
 class FrontRow:
     """A decomposition: its planes in the order of the cuts, and what it costs.
 
-    seam_mm: length of the rims of all cuts; time_s, filament_mm: estimates, None where there is none; reason: why it is chosen.
-    """
+    seam_mm: length of the rims of all cuts; stairs_mm2: what the stairs of all parts count in the cost; time_s, filament_mm:
+    estimates, None where there is none; reason: why it is chosen."""
 
     planes: tuple[Plane, ...]
     support_area_mm2: float
@@ -64,6 +64,7 @@ class FrontRow:
     time_s: float | None = None
     filament_mm: float | None = None
     reason: str = ""
+    stairs_mm2: float = 0.0
 
     @property
     def parts(self) -> int:

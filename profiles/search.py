@@ -8,7 +8,7 @@ from profiles.frozen import Frozen
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
 OF_SCARS = {"seam_mm": 0.0, "nozzle_load_n": 0.0}  # what the paper's terms do not know
-OF_SEAMS = {"cut_mm2": 0.0, "second_mm2": 0.0, "hidden_seam_share": 1.0}
+OF_SEAMS = {"cut_mm2": 0.0, "second_mm2": 0.0, "hidden_seam_share": 1.0, "stair_weight": 0.0, "feature_weight": 1.0}
 
 
 class Search(Frozen):
@@ -47,6 +47,14 @@ class Search(Frozen):
         description="what a cut costs beside its seam: one more turn, one more joint that can fail, mm2; a cut that saves less "
         "than its seam and this is not made",
     )
+    stair_weight: float = Field(
+        0.15,
+        ge=0,
+        le=10,
+        description="how much an area counts that shows stairs as high as a layer of 0.2 mm, beside 1 where support scars it; "
+        "less where the layers or the angle make them lower: walls and level faces show none, so parts are printed along their "
+        "faces; 0: stairs do not count",
+    )
     second_mm2: float = Field(
         0.5,
         ge=0,
@@ -60,6 +68,12 @@ class Search(Frozen):
         le=1,
         description="how much a seam counts deep in a crease or neck or out of sight, as a share of what it counts across a "
         "smooth surface in plain sight; 1: the same everywhere",
+    )
+    feature_weight: float = Field(
+        4.0,
+        ge=1,
+        le=1000,
+        description="how many times a seam counts across a bore or pin, where a ridge spoils a fit; 1: as elsewhere",
     )
     unsupportable_weight: float = Field(
         5.0,

@@ -1,20 +1,22 @@
 """Cost: what a person pays for a decomposition, in mm2 of blemished surface.
 
-Area that needs support is scarred where support touches it, and every cut leaves a seam, a scar along its rim that is
-search.seam_mm wide, less of one where it is hidden. The paper's J is the special case of a seam without width.
-"""
+Area that needs support is scarred where support touches it, every cut leaves a seam, a scar along its rim that is search.seam_mm
+wide, less of one where it is hidden, and faces that neither stand nor lie along their part's direction show stairs. The paper's
+J is the special case of a seam without width, stairs not looked at."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from mdp.cost.cylinders import Cylinder, find_cylinders
 from mdp.cost.hidden import hidden_shares
 from mdp.cost.model_need import MADE_BY_A_CUT, ModelNeed, ModelSurface, Piece
 from mdp.cut import Solid
 from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import standing
 from mdp.plane import Plane
-from mdp.sweep.rims import Rim, measure_rim
+from mdp.sweep.rims import ROUNDING_MM, Rim, measure_rim
 from mdp.zone import NOWHERE, ZonesOnModel
 
 NO_SEAM_WEIGHT = 100.0  # of a rim where a person wants no seam
@@ -23,19 +25,32 @@ NO_SEAM_WEIGHT = 100.0  # of a rim where a person wants no seam
 @dataclass(frozen=True, eq=False)
 class SeamPlaces:
     """Where on a model seams cost how much. by_source: (m,) how much a mm of rim counts on each of the model's faces; zones: of
-    the search; where they want no seam it counts NO_SEAM_WEIGHT times."""
+    the search; where they want no seam it counts NO_SEAM_WEIGHT times; cylinders: its bores and pins."""
 
     surface: ModelSurface
     by_source: Floats
     zones: ZonesOnModel
+    cylinders: tuple[Cylinder, ...] = ()
 
     @classmethod
-    def of(cls, surface: ModelSurface, solid: Solid, hidden_share: float, zones: ZonesOnModel = NOWHERE) -> "SeamPlaces":
-        """The places of an uncut model; hidden_share: how much a rim counts where it is hidden altogether."""
+    def of(
+        cls, surface: ModelSurface, solid: Solid, hidden_share: float, zones: ZonesOnModel = NOWHERE, feature_weight: float = 1.0
+    ) -> "SeamPlaces":
+        """The places of an uncut model; hidden_share: how much a rim counts where it is hidden altogether, feature_weight: on a
+        bore or pin, hidden or not, 1: they are not looked for."""
         whole = surface.piece(solid)
         hidden = hidden_shares(whole.mesh) if hidden_share < 1.0 else np.zeros(len(whole.sources))
         by_source = 1.0 - (1.0 - hidden_share) * surface.by_source(whole, hidden)
-        return cls(surface, by_source, zones)
+        cylinders = tuple(find_cylinders(surface.mesh)) if feature_weight != 1.0 else ()
+        for cylinder in cylinders:
+            by_source[cylinder.faces] = feature_weight
+        return cls(surface, by_source, zones, cylinders)
+
+    def crossed(self, piece: Piece, plane: Plane) -> list[Cylinder]:
+        """The bores and pins that a plane cuts of what cuts have left of the model."""
+        heights = plane.heights_mm(piece.mesh.vertices)[piece.mesh.faces]
+        cut = piece.sources[(heights.min(axis=1) < -ROUNDING_MM) & (heights.max(axis=1) > ROUNDING_MM)]
+        return [cylinder for cylinder in self.cylinders if np.isin(cut, cylinder.faces).any()]
 
     def weights(self, piece: Piece) -> Floats:
         """(m,) how much a mm of rim counts on each face of what cuts have left of the model: 0 on faces that they laid open,
@@ -47,16 +62,34 @@ class SeamPlaces:
 
 @dataclass(frozen=True)
 class CostTerms:
-    """What a search counts, as it holds. seam_mm: width of the scar along a rim, 0: seams cost nothing; feather: by how much more
-    a rim counts where face and plane meet at a small angle; cut_mm2: what a cut costs beside its seam; need: what needs support,
-    None: every face that overhangs, the paper's terms."""
+    """What a search counts, as it holds. seam_mm: width of the scar along a rim, 0: seams cost nothing; feather: by how much
+    more a rim counts where face and plane meet at a small angle; cut_mm2: what a cut costs beside its seam; stair_weight: how
+    much an area counts whose steps are as high as a layer; need: what needs support, None: every face that overhangs, the
+    paper's terms."""
 
     angle_deg: float
     count_platform_faces: bool
     seam_mm: float = 0.0
     feather: float = 0.0
     cut_mm2: float = 0.0
+    stair_weight: float = 0.0
     need: ModelNeed | None = None
+
+
+class CutCost(NamedTuple):
+    """What a cut costs for ever: the area that stays risky on its part, the part's stairs, the scar of its seam, and that it is
+    made; lost_mm2: what of it the cut has made worse, all but the stairs that the part had before, too; stairs_mm2: what of it
+    are stairs."""
+
+    residual_mm2: float
+    lost_mm2: float
+    stairs_mm2: float = 0.0
+
+
+def stair_weights(piece: Piece, weight: float) -> Floats | None:
+    """(m,) how much an area on each face of what was cut from a model counts whose steps are as high as a layer: nothing on faces
+    that cuts laid open; None where stairs do not count."""
+    return None if weight <= 0.0 else np.where(piece.sources == MADE_BY_A_CUT, 0.0, weight)
 
 
 def measure_seam(mesh: Mesh, weights: Floats, plane: Plane, feather: float) -> Rim:

@@ -21,6 +21,7 @@ from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
 from mdp.sweep.rims import ROUNDING_MM, weigh_chord
+from mdp.sweep.stairs import step_share
 from mdp.sweep.sweep import Remainder
 
 LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own
@@ -43,7 +44,7 @@ class Faces(NamedTuple):
     """Faces of a solid: (m, 3, 3) corners, (m, 3) normals, (m,) areas, which are risky upright, the cosine of normal and
     direction below which a face is risky along that direction; (m,) how much a mm of rim counts on each, by how much more on a
     feather edge; of which faces of the model they are pieces, see integrals.Needs, how many times what is unsupportable counts,
-    and (m,) how many times an area on each that needs support."""
+    and (m,) how many times an area on each that needs support, and one whose steps are as high as a layer."""
 
     corners: Floats
     normals: Floats
@@ -55,6 +56,7 @@ class Faces(NamedTuple):
     sources: Ints
     weight: float
     counts: Floats
+    stair_weights: Floats
 
 
 def faces_of(remainder: Remainder, terms: CostTerms, rim_weights: Floats, chosen: Mask) -> Faces:
@@ -71,6 +73,7 @@ def faces_of(remainder: Remainder, terms: CostTerms, rim_weights: Floats, chosen
         sources=remainder.sources[chosen],
         weight=remainder.weight,
         counts=remainder.counts[chosen],
+        stair_weights=(np.zeros(len(chosen)) if remainder.stair_weights is None else remainder.stair_weights)[chosen],
     )
 
 
@@ -98,7 +101,8 @@ class Surface:
         return self.remainder.classes(planes_of(planes).directions)
 
     def left_mm2(self, planes: Sequence[Plane], classes: Classes | None = None) -> float:
-        """What cuts along the planes, in this order, would cost: the area left that needs support, the seams, and each cut.
+        """What cuts along the planes, in this order, would cost: the area left that needs support, the seams, the
+        stairs, and each cut.
 
         classes: those of planes that lean a little otherwise; absent: the planes' own.
         """
@@ -108,7 +112,7 @@ class Surface:
 
 @kernel
 def _sum_left(surface: Faces, planes: Planes, classes: Classes) -> float:
-    """Risky area and seams of the planes, cut in their order."""
+    """Risky area, seams and stairs of the planes, cut in their order."""
     corners, normals, areas, risky = surface.corners, surface.normals, surface.areas_mm2, surface.risky
     directions, most = planes.directions, len(planes.directions) + 4
     polygon, spare, heights, ends = table(most, 3), table(most, 3), floats(most, 0.0), table(2, 3)
@@ -132,11 +136,13 @@ def _sum_left(surface: Faces, planes: Planes, classes: Classes) -> float:
                 below = flat_area_mm2(polygon, size, normals, face)
             if cosine < surface.risky_below:
                 total += (area - below) * weight_along(surface, classes, cut, face) * surface.counts[face]
+            total += (area - below) * surface.stair_weights[face] * step_share(cosine)
             area = below
             if lowest >= 0.0:
                 break
         if risky[face]:
             total += area * surface.counts[face]
+        total += area * surface.stair_weights[face] * step_share(normals[face, 2])
     return total
 
 

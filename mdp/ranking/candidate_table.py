@@ -41,12 +41,14 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """What the cuts before have made of a model: what they saved and cost for ever, the area that is risky now and how much of
-    it no cut can save (0: not asked for), the volume that remains, how many they were, and (3,) the last one's direction."""
+    """What the cuts before have made of a model: what they saved, cost for ever and lost (CutCost), the area that is risky now
+    and how much of it no cut can save (0: not asked for), the volume that remains, how many they were, and (3,) the last one's
+    direction."""
 
     model: Model
     saved_mm2: float
     residual_mm2: float
+    lost_mm2: float
     risky_mm2: float
     hopeless_mm2: float
     volume_mm3: float
@@ -75,6 +77,7 @@ class CandidateTable:
         self.situation: Situation = situation
         self.saved_mm2: float = situation.saved_mm2
         self.residual_mm2: float = situation.residual_mm2
+        self.lost_mm2: float = situation.lost_mm2
         self._check, self._is_weak, self._strong = check, is_weak, set[int]()
         count = len(scored.gain_mm2)
         self.reason = np.full(count, UNKNOWN, np.int32)
@@ -93,13 +96,13 @@ class CandidateTable:
     def rows_of_round(self, number: int, risky_mm2: float) -> Ints:
         """The rows that come below the residual threshold in this round first; risky_mm2: what the threshold is a share of."""
         if not self._rounds:
-            rounds = relaxation_rounds(self.scored.residual_mm2 / risky_mm2)
+            rounds = relaxation_rounds(self.scored.lost_mm2 / risky_mm2)
             order = np.argsort(rounds, kind="stable")
             self._rounds = np.split(order, np.searchsorted(rounds[order], np.arange(1, ROUNDS + 1)))
         return self._rounds[number]
 
     def rows_by_trade_off(self, trade_off: float) -> Iterator[int]:
-        """Feasible rows by gain less trade_off times residual, best first; of near-equal planes only the first."""
+        """Feasible rows by gain less trade_off times what is lost, best first; of near-equal planes only the first."""
         if trade_off not in self._rankings:
             self._rankings[trade_off] = _TradeOffRanking(self, trade_off)
         ranking, position = self._rankings[trade_off], 0
@@ -142,7 +145,7 @@ class CandidateTable:
 
     def rounds(self, rows: Ints) -> Ints:
         """(n,) the rounds whose residual thresholds let the rows in."""
-        return relaxation_rounds(self.scored.residual_mm2[rows] / self.model.risky_mm2)
+        return relaxation_rounds(self.scored.lost_mm2[rows] / self.model.risky_mm2)
 
 
 class _TradeOffRanking:
@@ -151,7 +154,7 @@ class _TradeOffRanking:
     def __init__(self, table: CandidateTable, trade_off: float) -> None:
         self._table = table
         enough = table.scored.gain_mm2 >= table.least_gain_mm2
-        self._cost = np.where(enough, trade_off * table.scored.residual_mm2 - table.scored.gain_mm2, np.inf)
+        self._cost = np.where(enough, trade_off * table.scored.lost_mm2 - table.scored.gain_mm2, np.inf)
         self._count = int(enough.sum())
         self._order: Ints = np.zeros(0, np.int64)
         self._next, self._ahead = 0, FIRST_LOOK

@@ -12,7 +12,7 @@ from math import radians, sin, sqrt
 import numpy as np
 
 from mdp.clearance import least_height_mm
-from mdp.cost.cost import CostTerms
+from mdp.cost.cost import CostTerms, CutCost
 from mdp.directions.spread import spread
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
@@ -121,20 +121,28 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 
 @dataclass(frozen=True, eq=False)
 class ScoredCandidates:
-    """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be
-    cut is not known yet. direction is a row of Bounds.directions; seam_mm2: what of the residual is the cut's seam; hopeless_mm2:
-    what of it no cut can save, 0 where that was not asked for; end_mm: offset of the last plane along the direction; evaluated
-    counts all planes looked at."""
+    """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
+    not known yet. direction is a row of Bounds.directions; above_mm2: what is risky above the plane printed straight up;
+    residual_mm2, lost_mm2, stairs_mm2: see CutCost; seam_mm2: what of both is the cut's seam; hopeless_mm2: what of both no cut
+    can save, 0 where that was not asked for; end_mm: offset of the last plane along the direction; evaluated counts all planes
+    looked at."""
 
     remainder: Remainder
     direction: Ints
     offset_mm: Floats
+    above_mm2: Floats
     gain_mm2: Floats
     residual_mm2: Floats
+    lost_mm2: Floats
+    stairs_mm2: Floats
     seam_mm2: Floats
     hopeless_mm2: Floats
     end_mm: Floats
     evaluated: int
+
+    def cost(self, row: int) -> CutCost:
+        """What the cut of a row costs."""
+        return CutCost(float(self.residual_mm2[row]), float(self.lost_mm2[row]), float(self.stairs_mm2[row]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,11 +164,11 @@ class Feasibility:
 def score_candidates(
     remainder: Remainder, limits: Bounds, terms: CostTerms, *, step_mm: float, least_gain_mm2: float, hopeless: Mask | None = None
 ) -> ScoredCandidates:
-    """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe, less its seam.
-    hopeless: the faces that no cut can save, see sweep.gains."""
+    """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe and the stairs that
+    it takes away, less those that it brings and its seam. hopeless: the faces that no cut can save, see sweep.gains."""
     swept = gains(remainder, limits.directions, step_mm, threshold(terms.angle_deg), hopeless)
     residual, offset = residual_mm2(swept, terms), swept.offsets_mm(step_mm)
-    gain = swept.up_mm2 - residual
+    gain = gain_mm2(swept, residual)
     above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
     scored = swept.used & above & (gain >= least_gain_mm2)
     for low, high in np.moveaxis(limits.keep_mm, 0, 2):
@@ -171,9 +179,12 @@ def score_candidates(
         remainder=remainder,
         direction=direction,
         offset_mm=offset[scored],
+        above_mm2=swept.up_mm2[scored],
         gain_mm2=gain[scored],
         residual_mm2=residual[scored],
-        seam_mm2=(residual - swept.residual_mm2)[scored],
+        lost_mm2=lost_mm2(swept, residual)[scored],
+        stairs_mm2=swept.stairs_mm2[scored],
+        seam_mm2=_seam_mm2(swept, terms)[scored],
         hopeless_mm2=swept.hopeless_mm2[scored],
         end_mm=end,
         evaluated=int(swept.columns.sum()),
@@ -181,8 +192,24 @@ def score_candidates(
 
 
 def residual_mm2(swept: Gains, terms: CostTerms) -> Floats:
-    """What each cut costs for ever: what stays risky on its part, the scar of its seam, and that it is made."""
-    return swept.residual_mm2 + terms.seam_mm * swept.rim_mm + terms.cut_mm2
+    """What each cut costs for ever, see CutCost."""
+    return swept.residual_mm2 + swept.stairs_mm2 + _seam_mm2(swept, terms)
+
+
+def lost_mm2(swept: Gains, residual_mm2: Floats) -> Floats:
+    """What of that each cut has made worse. Every surface has stairs whichever way it is printed, so large parts would be
+    shunned for those that they had before."""
+    return residual_mm2 - np.minimum(swept.stairs_mm2, swept.stairs_up_mm2)
+
+
+def gain_mm2(swept: Gains, residual_mm2: Floats) -> Floats:
+    """What each cut saves on the whole."""
+    return swept.up_mm2 + swept.stairs_up_mm2 - residual_mm2
+
+
+def _seam_mm2(swept: Gains, terms: CostTerms) -> Floats:
+    """The scar of each cut's seam, and that it is made."""
+    return terms.seam_mm * swept.rim_mm + terms.cut_mm2
 
 
 def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Feasibility:
@@ -221,7 +248,7 @@ def refusals(
     swept = gains(remainder, limits.directions, search.offset_step_mm, threshold(terms.angle_deg))
     direction, offset = np.nonzero(swept.used)[0], swept.offsets_mm(search.offset_step_mm)[swept.used]
     reason = check(remainder, limits, search, direction.astype(np.int32), offset).reason
-    gain = (swept.up_mm2 - residual_mm2(swept, terms))[swept.used]
+    gain = gain_mm2(swept, residual_mm2(swept, terms))[swept.used]
     reason[(reason == Reason.FEASIBLE) & (gain < least_gain_mm2)] = Reason.GAIN
     for row in np.flatnonzero(reason == Reason.FEASIBLE):
         if is_weak(Plane(limits.directions[direction[row]], float(offset[row]))):

@@ -2,8 +2,9 @@
 
 M1..M6 are the metrics of the 2020 paper: M1 reduced risky area, M2 the same accumulated over the cuts so far, M3 volume of the
 part, M4 distance of the plane from the platform, M5 distance to fragile regions (what the plane would cut into slivers, thin
-walls and rods, on either side of it), M6 accumulated residual risky area. Areas are shares of the model's risky area, volumes
-of the model's, distances of the radius of its bounding sphere, cut to 0..1. Where seams cost something, M1, M2 and M6 count them.
+walls and rods, on either side of it), M6 accumulated residual risky area. Areas are shares of the model's risky area, volumes of
+the model's, distances of the radius of its bounding sphere, cut to 0..1. Where seams and stairs cost something, M1, M2 and M6
+count them, M6 stairs only where a cut brings them.
 
 The others come from the same sweep: wasted, what of the residual another cut could have saved; hopeless, what of it none could,
 and hopeless_left, the same of what remains, a part of every later cost; risky_left, the area at risk that remains; seam; tilt and
@@ -32,12 +33,11 @@ def _share(value: Floats) -> Floats:
 
 def _wasted(table: CandidateTable, rows: Ints) -> Floats:
     scored = table.scored
-    return (scored.residual_mm2 - scored.seam_mm2 - scored.hopeless_mm2)[rows] / table.model.risky_mm2
+    return (scored.lost_mm2 - scored.seam_mm2 - scored.hopeless_mm2)[rows] / table.model.risky_mm2
 
 
 def _risky_left(table: CandidateTable, rows: Ints) -> Floats:
-    saved = table.scored.gain_mm2[rows] + table.scored.residual_mm2[rows]
-    return (table.situation.risky_mm2 - saved) / table.model.risky_mm2
+    return (table.situation.risky_mm2 - table.scored.above_mm2[rows]) / table.model.risky_mm2
 
 
 def _hopeless_left(table: CandidateTable, rows: Ints) -> Floats:
@@ -64,7 +64,7 @@ FEATURES: dict[str, Column] = {
     "M3": lambda table, rows: table.volume_mm3[rows] / table.model.volume_mm3,
     "M4": _above_platform,
     "M5": _fragile,
-    "M6": lambda table, rows: (table.residual_mm2 + table.scored.residual_mm2[rows]) / table.model.risky_mm2,
+    "M6": lambda table, rows: (table.lost_mm2 + table.scored.lost_mm2[rows]) / table.model.risky_mm2,
     "wasted": _wasted,
     "hopeless": lambda table, rows: table.scored.hopeless_mm2[rows] / table.model.risky_mm2,
     "hopeless_left": _hopeless_left,

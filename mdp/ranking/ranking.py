@@ -33,15 +33,14 @@ class RankedCandidate:
 
 
 def rank_by_trade_off(tables: Sequence[CandidateTable], trade_off: float, bound_mm2: float) -> Iterator[RankedCandidate]:
-    """Feasible candidates by reduction less trade_off times residual, both accumulated, best first; those that would leave
+    """Feasible candidates by reduction less trade_off times what is lost, both accumulated, best first; those that would leave
     bound_mm2 or more for ever are left out."""
 
     def rank(index: int, table: CandidateTable) -> Iterator[tuple[float, int, int]]:
-        start = table.saved_mm2 - trade_off * table.residual_mm2
+        start = table.saved_mm2 - trade_off * table.lost_mm2
         for row in table.rows_by_trade_off(trade_off):
-            gain, residual = float(table.scored.gain_mm2[row]), float(table.scored.residual_mm2[row])
-            if table.residual_mm2 + residual < bound_mm2:
-                yield trade_off * residual - gain - start, index, row
+            if table.residual_mm2 + float(table.scored.residual_mm2[row]) < bound_mm2:
+                yield trade_off * float(table.scored.lost_mm2[row]) - float(table.scored.gain_mm2[row]) - start, index, row
 
     for _, index, row in merge(*(rank(index, table) for index, table in enumerate(tables))):
         yield RankedCandidate(index, row, 0)

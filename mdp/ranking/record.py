@@ -47,7 +47,7 @@ def offer(parent: Hashable, table: CandidateTable, candidate: RankedCandidate) -
 @dataclass(frozen=True)
 class Child:
     """What an offer led to. row: the offer's number; signature: equal for equal solids, so that a twin is known again;
-    cost_mm2: the risky area when the search stops there."""
+    cost_mm2: what it costs when the search stops there."""
 
     row: int
     signature: Hashable
@@ -75,11 +75,13 @@ class _Node:
 class Trace:
     """Collects a search: `begin_stage`, then `add` for every ranking of that stage, at the end `arrays` or `to_bytes`."""
 
-    def __init__(self, name: str, model: Model, root: Hashable) -> None:
-        """root: signature of the uncut model, whose risky area is the measure of all shares."""
+    def __init__(self, name: str, model: Model, root: Hashable, cost_mm2: float | None = None) -> None:
+        """root: signature of the uncut model, whose risky area is the measure of all shares; cost_mm2: what it costs uncut,
+        absent: that area."""
         self.name, self.model = name, model
         self._number: dict[Hashable, int] = {root: 0}
-        self._nodes = [_Node(1.0 if model.risky_mm2 > 0 else 0.0, 0, NO_NODE)]
+        whole_mm2 = model.risky_mm2 if cost_mm2 is None else cost_mm2
+        self._nodes = [_Node(whole_mm2 / model.risky_mm2 if model.risky_mm2 > 0 else 0.0, 0, NO_NODE)]
         self._candidates: list[_Candidate] = []
         self._stage = 0
         self._known: dict[tuple[int, bytes, float], _Candidate] = {}

@@ -145,8 +145,7 @@ class Beam:
     def _child(self, branch: Branch, candidate: RankedCandidate) -> Node | None:
         key, row = (candidate.table, candidate.row), candidate.row
         if key not in self._children:
-            residual_mm2 = float(branch.table.scored.residual_mm2[row])
-            self._children[key] = self.problem.cut(branch.node, branch.table.plane(row), residual_mm2)
+            self._children[key] = self.problem.cut(branch.node, branch.table.plane(row), branch.table.scored.cost(row))
         return self._children[key]
 
     def _record(self, trace: Trace, branches: Sequence[Branch], picks: Sequence[Pick | None]) -> None:
@@ -164,8 +163,8 @@ class Beam:
             table, row = pick.candidate.table, pick.candidate.row
             if (table, row) not in number_of:
                 number_of[table, row] = len(offered)
-                residual_mm2 = float(tables[table].scored.residual_mm2[row])
-                offered.append(RankedCandidate(table, row, relaxation_round(residual_mm2 / risky_mm2)))
+                lost_mm2 = float(tables[table].scored.lost_mm2[row])
+                offered.append(RankedCandidate(table, row, relaxation_round(lost_mm2 / risky_mm2)))
             children.append(Child(number_of[table, row], pick.node.signature, pick.node.cost_mm2))
         signatures = [branch.node.signature for branch in branches]
         trace.add([offer(signatures[ranked.table], tables[ranked.table], ranked) for ranked in offered], children)

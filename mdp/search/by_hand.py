@@ -16,7 +16,7 @@ from mdp.overhang import threshold
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
 from mdp.pose import poses
-from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, residual_mm2
+from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, gain_mm2, residual_mm2
 from mdp.search.node import Node
 from mdp.search.problem import FINEST, Problem
 from mdp.sweep.sweep import gains
@@ -189,10 +189,10 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
     missing = "normal" if planned.normal is None else "offset_mm"
     if len(direction) == 0:
         raise PlanError(f"{label}: no {missing} can be found for it, every such plane misses what is left of the model")
-    offset_mm, gain_mm2 = swept.offsets_mm(step_mm)[wanted], (swept.up_mm2 - residual_mm2(swept, problem.terms))[wanted]
+    offset_mm, gains_mm2 = swept.offsets_mm(step_mm)[wanted], gain_mm2(swept, residual_mm2(swept, problem.terms))[wanted]
     own = problem.settings.model_copy(update={"offset_step_mm": step_mm})
     reason = check(node.remainder, limits, own, direction.astype(np.int32), offset_mm).reason
-    for row in np.lexsort((offset_mm, -directions[direction, 2], -np.round(gain_mm2 / EQUAL_MM2))):
+    for row in np.lexsort((offset_mm, -directions[direction, 2], -np.round(gains_mm2 / EQUAL_MM2))):
         if reason[row] == Reason.FEASIBLE:
             offset = float(offset_mm[row]) if planned.offset_mm is None else planned.offset_mm
             plane = Plane(directions[direction[row]], offset)

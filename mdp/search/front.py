@@ -72,7 +72,8 @@ def front_row(node: Node) -> FrontRow:
     seam_mm = sum((seam.length_mm for seam in seams), 0.0)
     planes = tuple(cut.base for cut in node.cuts)
     over_mm2 = 0.0 if terms.need is None else _excess_mm2(node) + (node.remainder.risky_mm2 - _plain_mm2(node))
-    return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2, seam_mm, node.cost_mm2)
+    stairs_mm2 = node.stairs_mm2 + sum(cut.cost.stairs_mm2 for cut in node.cuts)
+    return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2 - stairs_mm2, seam_mm, node.cost_mm2, stairs_mm2=stairs_mm2)
 
 
 def _excess_mm2(node: Node) -> float:

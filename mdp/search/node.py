@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from mdp.cost.cost import CostTerms, SeamPlaces, measure_seam
+from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, measure_seam, stair_weights
 from mdp.cost.model_need import Piece
 from mdp.cut import Solid, above
 from mdp.mesh import Floats
@@ -15,12 +15,11 @@ from mdp.sweep.sweep import Remainder
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """A part cut off: its base plane, the solid it is cut off, and what it costs for ever: the area that stays risky on it and
-    the scar of its seam."""
+    """A part cut off: its base plane, the solid it is cut off, and what that costs for ever."""
 
     base: Plane
     whole: Solid
-    residual_mm2: float
+    cost: CutCost
 
     @cached_property
     def solid(self) -> Solid:
@@ -52,7 +51,7 @@ class Node:
         pieces = None if terms.need is None else terms.need.pieces(self.piece)
         if pieces is not None:
             risky = risky & pieces.upright
-        return Remainder(mesh, risky, weights, terms.feather, pieces)
+        return Remainder(mesh, risky, weights, terms.feather, pieces, stair_weights(self.piece, terms.stair_weight))
 
     @cached_property
     def seam_weights(self) -> Floats:
@@ -76,17 +75,27 @@ class Node:
     @cached_property
     def residual_mm2(self) -> float:
         """What the parts cut off so far cost for ever: a lower bound of the cost of every descendant."""
-        return sum(c.residual_mm2 for c in self.cuts)
+        return sum(cut.cost.residual_mm2 for cut in self.cuts)
+
+    @cached_property
+    def lost_mm2(self) -> float:
+        """What the cuts so far have made worse."""
+        return sum(cut.cost.lost_mm2 for cut in self.cuts)
+
+    @cached_property
+    def stairs_mm2(self) -> float:
+        """What the stairs of what remains count when it is printed straight up."""
+        return self.remainder.stairs_mm2
 
     @property
     def cost_mm2(self) -> float:
         """What it costs when the search stops here; the paper's J where seams cost nothing."""
-        return self.risky_mm2 + self.residual_mm2
+        return self.risky_mm2 + self.stairs_mm2 + self.residual_mm2
 
     @cached_property
     def signature(self) -> tuple[float, ...]:
         """Equal for two orders of the same cuts."""
-        return (round(self.solid.volume(), 3), round(self.risky_mm2, 3), round(self.residual_mm2, 3))
+        return (round(self.solid.volume(), 3), round(self.risky_mm2 + self.stairs_mm2, 3), round(self.residual_mm2, 3))
 
     def let_go(self) -> None:
         """Forget what is large and made again when it is asked for: a search keeps all its nodes and comes back to few."""

@@ -136,7 +136,7 @@ def _add_cuts(problem: Problem, chain: Chain) -> Chain:
     while not problem.full(nodes[-1]) and not problem.late():
         node, table = nodes[-1], problem.table(nodes[-1])
         cuts = (
-            problem.cut(node, table.plane(candidate.row), float(table.scored.residual_mm2[candidate.row]))
+            problem.cut(node, table.plane(candidate.row), table.scored.cost(candidate.row))
             for candidate in rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
         )
         child = next((child for child in cuts if child is not None), None)

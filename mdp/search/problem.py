@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from functools import cached_property, partial
-from math import sqrt
+from math import radians, sin, sqrt
 from time import perf_counter
 
 import numpy as np
 
 from mdp.clearance import allowed_poses
-from mdp.cost.cost import CostTerms, SeamPlaces
+from mdp.cost.cost import CostTerms, CutCost, SeamPlaces
 from mdp.cost.model_need import ModelNeed, ModelSurface
 from mdp.cut import below, solid_of
+from mdp.directions.flats import flat_directions
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
@@ -22,6 +23,7 @@ from mdp.ranking.candidates import (
     bounds_of,
     check,
     directions,
+    lost_mm2,
     platform_disc,
     refusals,
     residual_mm2,
@@ -37,6 +39,7 @@ from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
 from profiles.profile import Profile
 
+STEPS_OF_MM = 0.2  # search.stair_weight is that of layers so high
 FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
 
 
@@ -61,9 +64,10 @@ class Problem:
             seam_mm=settings.seam_mm,
             feather=settings.feather_weight,
             cut_mm2=settings.cut_mm2,
+            stair_weight=settings.stair_weight * profile.process.layer_height_mm / STEPS_OF_MM,
             need=need,
         )
-        places = SeamPlaces.of(surface, solid, settings.hidden_seam_share, self.zones)
+        places = SeamPlaces.of(surface, solid, settings.hidden_seam_share, self.zones, settings.feature_weight)
         self.root = self.start = Node(solid, (), self.terms, places)
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
@@ -80,8 +84,13 @@ class Problem:
 
     @cached_property
     def limits(self) -> Bounds:
-        """The bounds of the sampled directions; a plane by hand needs but those of its own."""
-        return self.bounds_along(directions(self.settings))
+        """The bounds of the sampled directions, where stairs count also of those along the model's flats; a plane by hand needs
+        but those of its own."""
+        sampled = directions(self.settings)
+        if self.terms.stair_weight > 0.0:
+            least_z = sin(radians(self.settings.least_elevation_deg))
+            sampled = np.concatenate([sampled, flat_directions(self.mesh, least_z)])
+        return self.bounds_along(sampled)
 
     def begin(self) -> None:
         """Have the time limit count from now on."""
@@ -145,8 +154,9 @@ class Problem:
     def _situation(self, node: Node, hopeless_mm2: float) -> Situation:
         return Situation(
             model=self.model,
-            saved_mm2=self.model.risky_mm2 - node.cost_mm2,
+            saved_mm2=self.root.cost_mm2 - node.cost_mm2,
             residual_mm2=node.residual_mm2,
+            lost_mm2=node.lost_mm2,
             risky_mm2=node.risky_mm2,
             hopeless_mm2=hopeless_mm2,
             volume_mm3=float(node.solid.volume()),
@@ -195,18 +205,16 @@ class Problem:
             node.remainder.mesh, plane, sqrt(self.settings.least_interface_mm2)
         )
 
-    def cut(self, node: Node, plane: Plane, residual_mm2: float | None = None) -> Node | None:
+    def cut(self, node: Node, plane: Plane, cost: CutCost | None = None) -> Node | None:
         """The node after a cut; None when nothing is cut off or no pose serves the part.
 
-        residual_mm2: what the cut costs for ever, where that is known.
+        cost: what the cut costs for ever, where that is known.
         """
         vertices = node.remainder.mesh.vertices
         upper, rest = vertices[plane.heights_mm(vertices) > 0.0], below(node.solid, plane)
         if len(upper) == 0 or rest.is_empty():
             return None
-        if residual_mm2 is None:
-            residual_mm2 = self._residual_mm2(node, plane)
-        cuts = (*node.cuts, Cut(plane, node.solid, residual_mm2))
+        cuts = (*node.cuts, Cut(plane, node.solid, self._cost(node, plane) if cost is None else cost))
         child = Node(rest, cuts, self.terms, node.places, node)
         if self.settings.clearance:
             lower = child.remainder.mesh.vertices
@@ -215,12 +223,13 @@ class Problem:
                 return None
         return child
 
-    def _residual_mm2(self, node: Node, plane: Plane) -> float:
-        """What a cut costs for ever, see candidates.residual_mm2."""
+    def _cost(self, node: Node, plane: Plane) -> CutCost:
+        """What a cut costs for ever."""
         step_mm = self.step_mm(plane.offset_mm)
         swept = gains(node.remainder, plane.normal[None], step_mm, threshold(self.terms.angle_deg))
         column = round(plane.offset_mm / step_mm) - int(swept.first[0])
-        return float(residual_mm2(swept, self.terms)[0, column])
+        residual = residual_mm2(swept, self.terms)
+        return CutCost(*(float(cost[0, column]) for cost in (residual, lost_mm2(swept, residual), swept.stairs_mm2)))
 
     def step_mm(self, offset_mm: float) -> float:
         """Step of a grid of offsets that an offset lies on, near that of the candidates' grid."""

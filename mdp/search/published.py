@@ -54,7 +54,7 @@ def _fill(
 
     def follow(candidate: RankedCandidate) -> None:
         table, row = tables[candidate.table], candidate.row
-        child = problem.cut(beam[candidate.table], table.plane(row), float(table.scored.residual_mm2[row]))
+        child = problem.cut(beam[candidate.table], table.plane(row), table.scored.cost(row))
         if child is not None:
             chosen.append(candidate)
             children.append(child)

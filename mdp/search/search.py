@@ -78,7 +78,7 @@ def decompose(
     problem.start = cut_by_hand(problem, planned)
     if parts is not None and parts <= len(problem.start.cuts):
         raise PlanError(f"--parts {parts}: the planes by hand of {planned.name} alone make {len(problem.start.cuts) + 1} parts")
-    trace = None if on_record is None else Trace(name, problem.model, problem.start.signature)
+    trace = None if on_record is None else Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
     report = on_stage or (lambda progress: None)
     if parts == 1 and price is None and trace is None:  # nobody looks at the front
         best, front, rounds = problem.root, Front(problem.root), 0
@@ -124,7 +124,7 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
     if price is not None and row.time_s is None:
         row = price_row(row, parts_of(node), price)
     rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
-    return Taken(parts_of(node), tuple(rows), choice.note)
+    return Taken(parts_of(node), tuple(rows), (*_feature_notes(node), *choice.note))
 
 
 @dataclass(frozen=True)
@@ -189,6 +189,18 @@ def _feather_notes(parts: Sequence[Part]) -> tuple[str, ...]:
     )
 
 
+def _feature_notes(node: Node) -> tuple[str, ...]:
+    """The bores and pins that the seams of parts cross."""
+    notes, step = [], node
+    while step.parent is not None:
+        crossed = step.places.crossed(step.parent.piece, step.cuts[-1].base)
+        if crossed:
+            names = ", ".join(dict.fromkeys(cylinder.in_words for cylinder in crossed))
+            notes.append(f"part {len(node.cuts) - len(step.cuts) + 2}: its seam crosses {names}")
+        step = step.parent
+    return tuple(notes)
+
+
 def _search_beam(
     problem: Problem, ranker: Ranker, trace: Trace | None, report: Callable[[Progress], None]
 ) -> tuple[Node, Front, int]:
@@ -242,7 +254,7 @@ def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:
 
 
 def _report(problem: Problem, report: Callable[[Progress], None], stage: int, held: int, best: Node) -> None:
-    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2, partial(front_row, best)))
+    report(Progress(stage, held, best.cost_mm2 / problem.root.cost_mm2, partial(front_row, best)))
 
 
 def _continues(problem: Problem, stage: int) -> bool:

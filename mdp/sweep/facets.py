@@ -16,6 +16,7 @@ from mdp.kernels.kernel import kernel, part
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
+from mdp.sweep.stairs import step_shares
 
 LEAST_ALTITUDE = 1e-8  # of a triangle, as a share of the largest coordinate: below, rounding may decide which corner is higher
 COSINE_MARGIN = 1e-6
@@ -52,13 +53,15 @@ class Rows(NamedTuple):
 class Facets:
     """Made once a solid. mesh has its vertices and faces in spatial order; risky (m,) tells which faces are risky upright,
     seam_weights (m,) how much a mm of rim counts on each, (0,): not at all; sources (m,) of which face of the model each is a
-    piece, below 0: of none; counted_mm2 (m,) what each counts where it needs support."""
+    piece, below 0: of none; counted_mm2 (m,) what each counts where it needs support; stair_areas_mm2 (m,) what each counts where
+    its steps are as high as a layer, (0,): stairs do not count."""
 
     mesh: Mesh
     risky: Mask
     seam_weights: Floats
     sources: Ints
     counted_mm2: Floats
+    stair_areas_mm2: Floats
 
     @cached_property
     def points(self) -> Floats:
@@ -74,6 +77,11 @@ class Facets:
     def normals(self) -> Floats:
         """(3, m) unit normals."""
         return np.ascontiguousarray(self.mesh.normals.T)
+
+    @cached_property
+    def stairs_up_mm2(self) -> Floats:
+        """(m,) what the stairs of each face count printed straight up, (0,): stairs do not count."""
+        return self.stair_areas_mm2 * step_shares(self.mesh.normals[: len(self.stair_areas_mm2), 2])
 
     @property
     def rings(self) -> Rings:
@@ -138,9 +146,10 @@ def lay_out(
     seam_weights: Floats | None,
     sources: Ints,
     counts: Floats,
+    stair_weights: Floats | None = None,
 ) -> Facets:
     """The surface of a solid along a space-filling curve; its values as in Facets, counts: how many times an area on each face
-    counts."""
+    counts, stair_weights: how much each does where its steps are as high as a layer."""
     low = mesh.bounds_mm[0]
     scale = (2**GRID_BITS - 1) / max(float((mesh.bounds_mm[1] - low).max()), 1e-12)
     order = np.argsort(_morton(mesh.vertices, low, scale), kind="stable")
@@ -149,7 +158,8 @@ def lay_out(
     turn = np.argsort(_morton(mesh.vertices[mesh.faces].mean(axis=1), low, scale), kind="stable")
     weights = np.zeros(0) if seam_weights is None else np.ascontiguousarray(seam_weights[turn])
     laid = Mesh(mesh.vertices[order], number[mesh.faces[turn]])
-    return Facets(laid, risky[turn], weights, np.ascontiguousarray(sources[turn]), laid.areas_mm2 * counts[turn])
+    stairs_mm2 = np.zeros(0) if stair_weights is None else laid.areas_mm2 * stair_weights[turn]
+    return Facets(laid, risky[turn], weights, np.ascontiguousarray(sources[turn]), laid.areas_mm2 * counts[turn], stairs_mm2)
 
 
 @kernel

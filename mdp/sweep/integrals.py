@@ -145,7 +145,7 @@ def find_ramps(block: Block) -> None:
 
 
 @inlined
-def _share(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
+def share_above(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
     """Share of a face above an offset that it crosses."""
     return 1.0 - (c - low) * (c - low) * rise if c < middle else (high - c) * (high - c) * fall
 
@@ -164,7 +164,7 @@ def _weigh(ahead: float, block: Block, area: Floats, moment: Floats) -> None:
     for k in range(len(low)):
         c = max(np.ceil(low[k]), 0.0) + ahead
         inside = weight[k] if c < high[k] else 0.0
-        area[k] = inside * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+        area[k] = inside * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
         moment[k] = inside * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
@@ -184,7 +184,7 @@ def _add_volumes(block: Block, shares: Floats, integrals: Floats) -> None:
         integrals[b + 2, 3] += shares[5, k]
         for ahead in range(AHEAD, crossed[k]):
             c = float(b) + ahead
-            integrals[b + ahead, 2] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+            integrals[b + ahead, 2] += weight[k] * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
             integrals[b + ahead, 3] += weight[k] * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
@@ -257,7 +257,7 @@ def _cover(ahead: float, block: Block, area: Floats) -> None:
     for k in range(len(low)):
         c = max(np.ceil(low[k]), 0.0) + ahead
         inside = weight[k] if c < high[k] else 0.0
-        area[k] = inside * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+        area[k] = inside * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
 @vector_part
@@ -272,7 +272,7 @@ def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> N
         integrals[b + 2, which + 1] += shares[2, k]
         for ahead in range(AHEAD, crossed[k]):
             c = float(b) + ahead
-            integrals[b + ahead, which + 1] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+            integrals[b + ahead, which + 1] += weight[k] * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
 @part

@@ -1,4 +1,5 @@
-"""Rims: the length of the seam that a cut at each offset leaves, feather edges weighted (numba kernels of the sweep).
+"""Rims: the length of the seam that a cut at each offset leaves, feather edges weighted (numba kernels of the sweep). The stairs
+above it are summed up in the same pass, for both look at every face of the surface.
 
 A face that a plane crosses gives its chord. The chord grows linearly with the offset up to the face's middle corner and falls
 linearly beyond; its integral over the extent across the planes is the area times the sine of the angle between face and plane.
@@ -13,7 +14,8 @@ from mdp.kernels.arrays import dot, floats, int_table, table
 from mdp.kernels.kernel import inlined, kernel, part, vector_part
 from mdp.mesh import Floats, Ints
 from mdp.sweep.facets import Indices
-from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, cut_block, find_ramps, sort_heights
+from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, cut_block, find_ramps, share_above, sort_heights
+from mdp.sweep.stairs import step_share
 
 COT_30 = 3.0**0.5
 FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is so thin that it is reported
@@ -21,14 +23,25 @@ ROUNDING_MM = 1e-9  # a corner that a cut has made lies in its plane
 
 
 class Rims(NamedTuple):
-    """What the rims of cuts need of a surface: corners (3, m), unit normals (3, m), areas (m,), how much a mm of rim counts on
-    each face (m,), and by how much more on a feather edge."""
+    """What the rims of cuts and the stairs need of a surface: corners (3, m), unit normals (3, m), areas (m,), how much a mm of
+    rim counts on each face (m,), and by how much more on a feather edge; (m,) the area of each face as its steps count when they
+    are as high as a layer, and its stairs printed straight up, mm2, both (0,): stairs do not count."""
 
     corners: Indices
     normals: Floats
     areas_mm2: Floats
     weights: Floats
     feather: float
+    stair_areas_mm2: Floats
+    stairs_up_mm2: Floats
+
+
+class ScarsAbove(NamedTuple):
+    """Where the scars of cuts at each offset of one direction go, (n,) each, see sweep.Gains."""
+
+    rim: Floats
+    stairs_up: Floats
+    stairs: Floats
 
 
 @inlined
@@ -79,12 +92,44 @@ def _add_rims(block: Block, lengths: Floats, rim: Floats) -> None:
             rim[b + ahead] += weight[k] * _chord(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
 
 
+@vector_part
+def _weigh_stairs(cosines: Floats, areas: Floats, out: Floats) -> None:
+    for k in range(len(out)):
+        out[k] = areas[k] * step_share(cosines[k])
+
+
+@vector_part
+def _share_columns(ahead: float, block: Block, share: Floats) -> None:
+    """Share of each face above the column that lies `ahead` columns after its first."""
+    low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
+    for k in range(len(low)):
+        c = max(np.ceil(low[k]), 0.0) + ahead
+        share[k] = share_above(c, low[k], middle[k], high[k], rise[k], fall[k]) if c < high[k] else 0.0
+
+
+@vector_part
+def _add_stairs(block: Block, shares: Floats, up: Floats, along: Floats, sums: Floats) -> None:
+    """Add stairs printed straight up and along the direction: those of faces wholly above, and of the shares of those crossed."""
+    low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
+    for k in range(len(low)):
+        b = np.uint32(block.column[k])
+        sums[b, 0] += up[k]
+        sums[b, 1] += along[k]
+        for ahead in range(min(AHEAD, block.crossed[k])):
+            sums[b + ahead, 2] += up[k] * shares[ahead, k]
+            sums[b + ahead, 3] += along[k] * shares[ahead, k]
+        for ahead in range(AHEAD, block.crossed[k]):
+            share = share_above(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
+            sums[b + ahead, 2] += up[k] * share
+            sums[b + ahead, 3] += along[k] * share
+
+
 @part
-def integrate_rim(surface: Rims, grid: OffsetGrid, rim: Floats) -> None:
-    """Weighted length of the rim that a cut at each offset leaves on the surface, mm."""
-    corners, normals, n = surface.corners, surface.normals, grid.columns
-    sums, cosines = floats(n + AHEAD + 1, 0.0), floats(BLOCK, 0.0)
-    values, lengths, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
+def integrate_scars(surface: Rims, grid: OffsetGrid, out: ScarsAbove) -> None:
+    """Weighted length of the rim that a cut at each offset leaves on the surface, mm, and the stairs above it, mm2."""
+    corners, normals, n, counted = surface.corners, surface.normals, grid.columns, len(surface.stair_areas_mm2) > 0
+    rims, stairs, cosines = floats(n + AHEAD + 1, 0.0), table(n + AHEAD + 1, 4), floats(BLOCK, 0.0)
+    values, shares, places, along = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK), floats(BLOCK, 0.0)
     for begin in range(0, corners.shape[1], BLOCK):
         end = min(begin + BLOCK, corners.shape[1])
         size = end - begin
@@ -94,10 +139,20 @@ def integrate_rim(surface: Rims, grid: OffsetGrid, rim: Floats) -> None:
         _weigh_rims(cosines[:size], surface.areas_mm2[begin:end], surface.weights[begin:end], surface.feather, block.weight)
         find_ramps(block)
         for ahead in range(AHEAD):
-            _measure_chords(float(ahead), block, lengths[ahead, :size])
-        _add_rims(block, lengths, sums)
-    for column in range(n):
-        rim[column] = sums[column] / grid.step_mm
+            _measure_chords(float(ahead), block, shares[ahead, :size])
+        _add_rims(block, shares, rims)
+        if counted:
+            _weigh_stairs(cosines[:size], surface.stair_areas_mm2[begin:end], along[:size])
+            for ahead in range(AHEAD):
+                _share_columns(float(ahead), block, shares[ahead, :size])
+            _add_stairs(block, shares, surface.stairs_up_mm2[begin:end], along, stairs)
+    up_mm2, along_mm2 = 0.0, 0.0
+    for column in range(n - 1, -1, -1):
+        up_mm2 += stairs[column + 1, 0]
+        along_mm2 += stairs[column + 1, 1]
+        out.rim[column] = rims[column] / grid.step_mm
+        out.stairs_up[column] = stairs[column, 2] + up_mm2
+        out.stairs[column] = stairs[column, 3] + along_mm2
 
 
 class Rim(NamedTuple):

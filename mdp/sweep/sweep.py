@@ -54,8 +54,9 @@ from mdp.sweep.integrals import (
     integrate_volume,
 )
 from mdp.sweep.rays import TriangleTree, triangle_tree
-from mdp.sweep.rims import Rims, integrate_rim
+from mdp.sweep.rims import Rims, ScarsAbove, integrate_scars
 from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
+from mdp.sweep.stairs import step_shares
 
 
 class Gains(NamedTuple):
@@ -63,7 +64,9 @@ class Gains(NamedTuple):
 
     up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
     direction, weighted by what support each face needs; rim_mm: weighted length of the rim that a cut leaves, 0 where the
-    remainder counts no seams; hopeless_mm2: risky area above it that no cut can save, 0 where that was not asked for.
+    remainder counts no seams; hopeless_mm2: risky area above it that no cut can save, 0 where that was not asked for;
+    stairs_up_mm2, stairs_mm2: what the stairs above it count printed straight up and along the direction, 0 where the remainder
+    counts none.
     """
 
     first: Ints
@@ -72,6 +75,8 @@ class Gains(NamedTuple):
     residual_mm2: Floats
     rim_mm: Floats
     hopeless_mm2: Floats
+    stairs_up_mm2: Floats
+    stairs_mm2: Floats
 
     @property
     def used(self) -> Mask:
@@ -117,13 +122,15 @@ class NeedsTable(NamedTuple):
 class Remainder:
     """What the sweep needs to know of a solid, made once for all directions: its mesh, which faces are risky upright, and how
     much a mm of a seam's rim counts on each face (m,), feather edges more; None: seams do not count. pieces: of which faces of
-    the model its own are pieces; None: every risky face needs support."""
+    the model its own are pieces; None: every risky face needs support. stair_weights: (m,) how much an area on each face counts
+    whose steps are as high as a layer; None: stairs do not count, nor do they where seams do not."""
 
     mesh: Mesh
     risky: Mask
     seam_weights: Floats | None = None
     feather: float = 0.0
     pieces: ModelPieces | None = None
+    stair_weights: Floats | None = None
 
     @property
     def sources(self) -> Ints:
@@ -147,12 +154,21 @@ class Remainder:
     @cached_property
     def facets(self) -> Facets:
         """The surface laid out for sweeping."""
-        return lay_out(self.mesh, self.risky, self.seam_weights, self.sources, self.counts)
+        return lay_out(self.mesh, self.risky, self.seam_weights, self.sources, self.counts, self.stair_weights)
 
     @cached_property
     def risky_mm2(self) -> float:
         """What is risky upright, as it counts."""
         return float((self.mesh.areas_mm2 * self.counts)[self.risky].sum())
+
+    @cached_property
+    def stairs_mm2(self) -> float:
+        """What its stairs count printed straight up."""
+        return (
+            0.0
+            if self.stair_weights is None
+            else float((self.mesh.areas_mm2 * self.stair_weights) @ step_shares(self.mesh.normals[:, 2]))
+        )
 
     @cached_property
     def triangles(self) -> TriangleTree:
@@ -187,7 +203,7 @@ class Remainder:
 
 
 class Scars(NamedTuple):
-    """What blemishes a surface: areas that need support, and the rims of cuts."""
+    """What blemishes a surface: areas that need support, the rims of cuts and stairs."""
 
     overhangs: Overhangs
     needs: NeedsTable
@@ -220,8 +236,16 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     surface = Overhangs(facets.points, facets.corners, facets.normals, facets.counted_mm2, facets.risky, risky_below, lost)
     shape = (len(directions), remainder.most_columns(step_mm))
     columns = np.zeros((2, shape[0]), np.int32)
-    swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(4)))
-    rims = Rims(facets.corners, facets.normals, facets.mesh.areas_mm2, facets.seam_weights, remainder.feather)
+    swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(6)))
+    rims = Rims(
+        corners=facets.corners,
+        normals=facets.normals,
+        areas_mm2=facets.mesh.areas_mm2,
+        weights=facets.seam_weights,
+        feather=remainder.feather,
+        stair_areas_mm2=facets.stair_areas_mm2,
+        stairs_up_mm2=facets.stairs_up_mm2,
+    )
     needs = NeedsTable(facets.sources, remainder.classes(directions), remainder.weight)
     in_threads(_gains, shape[0], Scars(surface, needs, rims), np.ascontiguousarray(directions), step_mm, swept)
     return swept
@@ -272,7 +296,7 @@ def _gains(begin_row: int, end_row: int, scars: Scars, directions: Floats, step_
             areas = Areas(out.up_mm2[row], out.residual_mm2[row], out.hopeless_mm2[row])
             integrate_risky_area(surface, needs, grid, scratch, areas)
             if len(rims.weights) > 0:
-                integrate_rim(rims, grid, out.rim_mm[row])
+                integrate_scars(rims, grid, ScarsAbove(out.rim_mm[row], out.stairs_up_mm2[row], out.stairs_mm2[row]))
 
 
 @kernel

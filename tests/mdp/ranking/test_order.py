@@ -37,12 +37,14 @@ class Drawn(NamedTuple):
     offset: Floats
     gain: Floats
     residual: Floats
+    lost: Floats
     same: Ints
     can_be_cut: np.ndarray
     weak: np.ndarray
     volume: Floats
     saved: float
     left: float
+    lost_before: float
 
     def plane(self, row: int) -> Plane:
         return Plane(DIRECTIONS[self.direction[row]], float(self.offset[row]))
@@ -62,11 +64,12 @@ def drawn(seed: int, most: int = 400) -> Drawn:
         offset,
         gain,
         residual,
+        residual * rng.uniform(0.3, 1.0, n),
         np.array(same, np.int64),
         rng.random(n) < 0.5,
         rng.random(n) < 0.1,
         rng.uniform(0, 10, n),
-        *rng.uniform(0, 30, 2),
+        *rng.uniform(0, 30, 3),
     )
 
 
@@ -84,9 +87,11 @@ def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
         return bool(own.weak[rows[int(direction), plane.offset_mm]])
 
     n = len(own.gain)
-    scored = ScoredCandidates(None, own.direction, own.offset, own.gain, own.residual, *np.zeros((3, n)), n)  # type: ignore[arg-type]
+    costs = {"gain_mm2": own.gain, "residual_mm2": own.residual, "lost_mm2": own.lost}
+    unused = dict.fromkeys(("above_mm2", "stairs_mm2", "seam_mm2", "hopeless_mm2", "end_mm"), np.zeros(n))
+    scored = ScoredCandidates(None, own.direction, own.offset, **costs, **unused, evaluated=n)  # type: ignore[arg-type]
     limits = Bounds(DIRECTIONS, np.zeros(40), np.zeros(40), 0.0, 0.0, np.zeros((40, 0, 2)), 0.0)
-    situation = Situation(Model(RISKY_MM2, 1.0, 1.0), own.saved, own.left, 0.0, 0.0, 1.0, 0, DIRECTIONS[0])
+    situation = Situation(Model(RISKY_MM2, 1.0, 1.0), own.saved, own.left, own.lost_before, 0.0, 0.0, 1.0, 0, DIRECTIONS[0])
     return CandidateTable(scored, limits, situation, check=check, least_gain_mm2=least_gain_mm2, is_weak=is_weak)
 
 
@@ -114,13 +119,13 @@ def by_trade_off(tables: Sequence[Drawn], weight: float, least_gain: float = 0.0
     kept = []
     for index, own in enumerate(tables):
         rows = [row for row in range(len(own.gain)) if own.gain[row] >= least_gain]
-        rows.sort(key=lambda row: (weight * own.residual[row] - own.gain[row], row))
+        rows.sort(key=lambda row: (weight * own.lost[row] - own.gain[row], row))
         kept += without_alike(tables, [(index, row) for row in rows])
     kept = [(index, row) for index, row in kept if tables[index].left + tables[index].residual[row] < BOUND_MM2]
 
     def cost(place: tuple[int, int]) -> float:
         own, row = tables[place[0]], place[1]
-        return float(weight * own.residual[row] - own.gain[row] - (own.saved - weight * own.left))
+        return float(weight * own.lost[row] - own.gain[row] - (own.saved - weight * own.lost_before))
 
     return sorted(kept, key=lambda place: (cost(place), *place))
 
@@ -151,7 +156,7 @@ def classic(tables: Sequence[Drawn], preferred: float, least_reduction: float) -
     for low, high in spans:
         taken: list[Place] = []
         for number in range(len(RESIDUAL_THRESHOLDS)):
-            rows = [(i, r) for i, own in enumerate(tables) for r in range(len(own.gain)) if _round(own.residual[r]) == number]
+            rows = [(i, r) for i, own in enumerate(tables) for r in range(len(own.gain)) if _round(own.lost[r]) == number]
             best = max((_reduction(tables, *place) for place in taken), default=-np.inf)
             rows = [place for place in rows if _reduction(tables, *place) >= best - 1e-10]
             rows = [(i, r) for i, r in rows if _reduction(tables, i, r) > least_reduction + 1e-10]
@@ -185,7 +190,7 @@ def test_the_order_of_the_paper_is_the_one_worked_out_round_by_round(
     own = [drawn(seed + k, 120) for k in range(count)]
     ranked = list(rank_classic([table_of(one) for one in own], RISKY_MM2, BOUND_MM2, least, preferred))
     assert places(ranked) == classic(own, preferred, least)
-    assert [c.round for c in ranked] == [_round(own[c.table].residual[c.row]) for c in ranked]
+    assert [c.round for c in ranked] == [_round(own[c.table].lost[c.row]) for c in ranked]
 
 
 @pytest.mark.parametrize(("share", "number"), [(0.0, 0), (0.99e-4, 0), (1e-4, 1), (4.9e-4, 1), (5e-4, 2), (1.0, 6), (1e6, 11)])

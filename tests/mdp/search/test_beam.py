@@ -61,7 +61,7 @@ def _sorted_plainly(table: CandidateTable, trade_off: float) -> list[int]:
     """Feasible rows by falling score, each unless it is too like one before."""
     everything = np.arange(len(table.reason), dtype=np.int32)
     table.check_rows(everything)
-    cost = trade_off * table.scored.residual_mm2 - table.scored.gain_mm2
+    cost = trade_off * table.scored.lost_mm2 - table.scored.gain_mm2
     rows: list[int] = []
     for row in everything[np.lexsort((everything, cost))]:
         if table.reason[row] == 0 and not any(nearly_equal(table.plane(row), table.plane(other)) for other in rows):
@@ -87,8 +87,8 @@ def test_the_round_is_the_one_whose_residual_threshold_lets_a_candidate_in() -> 
     problem = _problem(1, "ball")
     table = problem.table(problem.root)
     for candidate in rank_classic([table], problem.model.risky_mm2, np.inf):
-        residual = float(table.scored.residual_mm2[candidate.row]) / problem.model.risky_mm2
-        assert relaxation_round(residual) == candidate.round
+        lost = float(table.scored.lost_mm2[candidate.row]) / problem.model.risky_mm2
+        assert relaxation_round(lost) == candidate.round
 
 
 def test_parts_of_the_preferred_volume_come_first_and_all_others_after_them() -> None:

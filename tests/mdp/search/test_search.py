@@ -34,12 +34,12 @@ def test_a_leaning_arm_becomes_a_part_of_its_own_without_risk() -> None:
     decomposition = _decompose(shapes.branch())
     assert len(decomposition.parts) == 2
     assert decomposition.parts[1].direction[0] > 0.2
-    assert decomposition.reduction > 0.95
+    assert decomposition.reduction > 0.85
 
 
 def test_voids_forbid_no_cut() -> None:
-    """Arms with a void in each are cut as solid ones are; the ceilings of 4 mm are bridged."""
-    solid, hollow = _decompose(shapes.tee()), _decompose(shapes.hollow_tee())
+    """Arms with a void in each are cut as solid ones are, but for the stairs inside; the ceilings of 4 mm are bridged."""
+    solid, hollow = (_decompose(mesh, "search.stair_weight=0") for mesh in (shapes.tee(), shapes.hollow_tee()))
     assert [tuple(part.direction) for part in hollow.parts] == [tuple(part.direction) for part in solid.parts]
     assert len(hollow.parts) == 2
     assert hollow.risky_area_mm2 == pytest.approx(solid.risky_area_mm2) == pytest.approx(2 * 15 * 10)
@@ -139,7 +139,7 @@ def test_a_pedestal_makes_low_cuts_printable() -> None:
 
 
 def test_a_record_holds_the_search_and_changes_nothing() -> None:
-    profile = load(settings=["search.directions=200", "search.beam_width=2"])
+    profile = load(settings=["search.directions=200", "search.beam_width=2", "search.polish=false"])
     records: list[bytes] = []
     decomposition = decompose(shapes.tee(), "tee", profile, on_record=records.append)
     record = np.load(io.BytesIO(records[0]))

@@ -119,7 +119,7 @@ def _table(mesh: Mesh, fragile_mm: float = 1.0) -> CandidateTable:
     )
     step_mm, terms = profile.search.offset_step_mm, CostTerms(45.0, False)
     scored = score_candidates(_remainder(mesh), limits, terms, step_mm=step_mm, least_gain_mm2=-np.inf)
-    situation = Situation(Model(1.0, mesh.volume_mm3, 1.0), 0.0, 0.0, 1.0, 0.0, mesh.volume_mm3, 0, UP)
+    situation = Situation(Model(1.0, mesh.volume_mm3, 1.0), 0.0, 0.0, 0.0, 1.0, 0.0, mesh.volume_mm3, 0, UP)
     return CandidateTable(
         scored, limits, situation, check=lambda *planes: check(scored.remainder, limits, profile.search, *planes)
     )

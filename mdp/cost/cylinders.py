@@ -1,0 +1,137 @@
+"""Cylinders: bores, pins and rounded corners of a model, fitted to its faces.
+
+A cylinder in a mesh is a row of flat strips. Every edge between two strips runs along the axis, and from its fold and the widths
+of the strips follows the radius: strips of the same width w that fold by an angle t lie on a circle of radius w / (2 sin(t /
+2)).
+
+        strip     edge
+      ________ . ________           edges of one strip that are parallel and tell of the same
+     /    w     t        \\          radius belong to one cylinder; a least-squares circle through
+    /                     \\         all of them (Kasa 1976) tells whether it is one
+"""
+
+from dataclasses import dataclass
+from math import cos, radians
+
+import numpy as np
+
+from mdp.directions.frame import frame_across
+from mdp.mesh import Floats, Indices, Ints, Mesh
+from mdp.topology.components import connected_components
+from mdp.topology.linked_faces import opposites
+
+# Cosines of the angles by which two strips fold: a cylinder of eight sides does by 45 degrees, one of 900 by 0.4.
+LEAST_FOLD, MOST_FOLD = cos(radians(0.4)), cos(radians(46.0))
+PARALLEL = cos(radians(1.0))
+SAME_RADIUS = 1.25  # greatest ratio of two radii told by edges of one strip: strips are as wide as each other to a quarter
+FEWEST = 4  # edges between strips: fewer are a chamfer or a fillet of three facets
+OFF_CIRCLE = 0.02  # of the radius: the corners of a cylinder lie on it up to the rounding of a file
+LEAST_TURN_DEG = 100.0  # that the strips go around: a quarter is a rounded edge, which needs no fit
+LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = (
+    0.7,
+    25.0,
+    6.0,
+)  # radii of screws, bearings, pegs; what is larger is the model's shape
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder:
+    """A bore or a pin: unit axis (3,), a point on it (3,), radius, whether the material lies around it, and (k,) its faces."""
+
+    axis: Floats
+    point: Floats
+    radius_mm: float
+    is_bore: bool
+    faces: Ints
+
+    @property
+    def in_words(self) -> str:
+        """What it is and how wide.
+
+        >>> Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, True, np.zeros(0, np.int32)).in_words
+        'a bore of 8 mm'
+        """
+        return f"a {'bore' if self.is_bore else 'pin'} of {round(2.0 * self.radius_mm, 1):g} mm"
+
+
+@dataclass(frozen=True, eq=False)
+class _Folds:
+    """Edges between strips, one row each: the strips on both sides (e, 2), a face of each (e, 2), unit direction (e, 3), middle
+    (e, 3) and the radius that each tells."""
+
+    strips: Indices
+    faces: Indices
+    along: Floats
+    middle: Floats
+    radius_mm: Floats
+
+
+def find_cylinders(mesh: Mesh) -> list[Cylinder]:
+    """The cylinders of a closed mesh, the first faces first."""
+    strips, folds = _folds(mesh)
+    label = connected_components(len(folds.radius_mm), *_alike(folds))
+    order = np.argsort(label, kind="stable")
+    rows = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    fitted = [_fit(mesh, strips, folds, row) for row in rows if len(row) >= FEWEST]
+    return sorted((cylinder for cylinder in fitted if cylinder is not None), key=lambda cylinder: int(cylinder.faces.min()))
+
+
+def _folds(mesh: Mesh) -> tuple[Indices, _Folds]:
+    """(m,) the strip that each face belongs to, and the edges at which a surface folds as between the strips of a cylinder."""
+    neighbours = opposites(mesh.faces).reshape(-1, 3) // 3
+    face, corner = np.nonzero(neighbours >= 0)
+    across = neighbours[face, corner]
+    once = face < across
+    face, corner, across = face[once], corner[once], across[once]
+    cosines = (mesh.normals[face] * mesh.normals[across]).sum(axis=1)
+    strips = connected_components(len(mesh.faces), face[cosines >= LEAST_FOLD], across[cosines >= LEAST_FOLD])
+    folded = (cosines < LEAST_FOLD) & (cosines > MOST_FOLD)
+    face, corner, across, cosines = face[folded], corner[folded], across[folded], cosines[folded]
+    start = mesh.vertices[mesh.faces[face, corner]]
+    edge = mesh.vertices[mesh.faces[face, (corner + 1) % 3]] - start
+    lengths = np.maximum(np.linalg.norm(edge, axis=1), 1e-9)
+    widths = np.stack([mesh.areas_mm2[face], mesh.areas_mm2[across]]) * 2.0 / lengths
+    radius_mm = widths.mean(axis=0) / (2.0 * np.sqrt(0.5 * (1.0 - cosines)))
+    even = (widths.max(axis=0) < SAME_RADIUS * widths.min(axis=0)) & (radius_mm < 2.0 * MOST_BORE_MM)
+    pairs = np.stack([face, across], axis=1)[even]
+    return strips, _Folds(strips[pairs], pairs, (edge / lengths[:, None])[even], (start + 0.5 * edge)[even], radius_mm[even])
+
+
+def _alike(folds: _Folds) -> tuple[Indices, Indices]:
+    """Pairs of edges that tell of one cylinder: of one strip, parallel, with the same radius."""
+    strip, fold = folds.strips.ravel(), np.repeat(np.arange(len(folds.strips)), 2)
+    order = np.argsort(strip, kind="stable")
+    strip, fold = strip[order], fold[order]
+    first, second = [], []
+    for apart in range(1, 4):  # of a strip that has more edges than four most are no strip's
+        same = np.flatnonzero(strip[:-apart] == strip[apart:])
+        a, b = fold[same], fold[same + apart]
+        parallel = np.abs(np.einsum("ij,ij->i", folds.along[a], folds.along[b])) > PARALLEL
+        ratio = folds.radius_mm[a] / folds.radius_mm[b]
+        alike = parallel & (ratio < SAME_RADIUS) & (ratio > 1.0 / SAME_RADIUS)
+        first.append(a[alike])
+        second.append(b[alike])
+    return np.concatenate(first), np.concatenate(second)
+
+
+def _fit(mesh: Mesh, strips: Indices, folds: _Folds, rows: Indices) -> Cylinder | None:
+    """The cylinder through some edges; None where they lie on none."""
+    signs = np.sign(folds.along[rows] @ folds.along[rows[0]])
+    axis = (folds.along[rows] * signs[:, None]).mean(axis=0)
+    axis /= np.linalg.norm(axis)
+    across = frame_across(axis)
+    points = folds.middle[rows] @ across.T
+    # Kasa: |p|^2 = 2 c.p + (r^2 - |c|^2) is linear in the middle c
+    solved = np.linalg.lstsq(np.column_stack([2.0 * points, np.ones(len(points))]), (points**2).sum(axis=1), rcond=None)[0]
+    centre = solved[:2]
+    radius_mm = float(np.sqrt(max(solved[2] + centre @ centre, 0.0)))
+    off_mm = np.abs(np.linalg.norm(points - centre, axis=1) - radius_mm)
+    is_bore = bool((mesh.normals[folds.faces[rows, 0]] @ across.T * (points - centre)).sum() < 0.0)
+    if not LEAST_RADIUS_MM <= radius_mm <= (MOST_BORE_MM if is_bore else MOST_PIN_MM) or off_mm.max() > OFF_CIRCLE * radius_mm:
+        return None
+    angles = np.sort(np.unique(np.round(np.degrees(np.arctan2(*(points - centre).T)), 3)))
+    gaps = np.diff(np.append(angles, angles[0] + 360.0))
+    if len(angles) < FEWEST or 360.0 - gaps.max() + np.median(gaps) < LEAST_TURN_DEG:
+        return None
+    faces = np.flatnonzero(np.isin(strips, np.unique(folds.strips[rows])))
+    return Cylinder(axis, centre @ across, radius_mm, is_bore, faces.astype(np.int32))
