@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from mdp.directions.turns import turned_by
 from mdp.formats.readers import READERS
 from mdp.formats.surface import Surface
 from mdp.mesh import Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
-from mdp.pose import about
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
 from mdp.topology.components import vertex_components
@@ -137,8 +137,7 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
 def _place_on_platform(solid: Surface, rotate_deg: tuple[float, float, float]) -> Mesh:
     vertices = solid.vertices
     if any(rotate_deg):
-        about_x, about_y, about_z = (about(axis, np.radians(angle)) for axis, angle in zip(np.eye(3), rotate_deg, strict=True))
-        vertices = vertices @ np.round(about_z @ about_y @ about_x, 15).T  # rounded so that quarter turns are exact
+        vertices = vertices @ np.round(turned_by(rotate_deg), 15).T  # rounded so that quarter turns are exact
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
     return Mesh(

@@ -62,6 +62,12 @@ class Search(Frozen):
         description="what a second of printing counts in the choice between numbers of parts and orientations: so much surface "
         "that a seam or support blemishes, mm2 (1 cm2 is worth 200 s); 0: time is free, as it is without support",
     )
+    turning_mm2: float = Field(
+        50.0,
+        ge=0,
+        le=1e6,
+        description="what a model must save in blemished surface and time to be laid down otherwise than its file says, mm2",
+    )
     hidden_seam_share: float = Field(
         0.5,
         gt=0,

@@ -2,9 +2,8 @@
 
     python tools/bench_orient.py MODEL [MODEL ...] [--set KEY=VALUE ...]
 
-One row a model: scars in mm2 and minutes in one piece as it stands, as the search cuts it there, and with --orient; in brackets
-the time and the filament over those of one piece as it stands. Then whether the program tells of a better orientation unasked,
-what that costs and what --orient costs, in processor time over the search alone.
+One row a model: scars in mm2 and minutes in one piece as it stands, as the search cuts it there, and laid down; in brackets
+the time and the filament over those of one piece as it stands. Then processor time of the search alone, and of laying down over it.
 """
 
 import argparse
@@ -17,7 +16,7 @@ from machine.app.pipeline.pricing import pricing
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words
 from mdp.read import locate, read_mesh
-from mdp.search.laying import find_better_way, lay_down
+from mdp.search.laying import lay_down
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
 
@@ -28,11 +27,9 @@ HEAD = (
     "cut as it stands",
     "orientation",
     "parts",
-    "with --orient",
-    "told",
+    "laid down",
     "core s",
-    "hint",
-    "orient",
+    "laying",
 )
 
 Result = TypeVar("Result")
@@ -55,13 +52,11 @@ def row(model: str, profile: Profile) -> str:
     mesh, _ = read_mesh(locate(model), profile.process.scale, profile.process.rotate_deg)
     search = partial(decompose, name=model, profile=profile, price=pricing(profile))
     upright, search_s = timed(lambda: search(mesh))
-    better, hint_s = timed(lambda: find_better_way(mesh, upright, profile, pricing))
     lying, lay_s = timed(lambda: lay_down(mesh, profile, pricing, search))
     whole, laid = upright.front[0], lying.decomposition
     cells = [model.rsplit("/", 1)[-1], f"{whole.cost_mm2:.0f}, {(whole.time_s or 0.0) / 60:.0f}"]
     cells += [str(len(upright.parts)), figures(upright, whole), "-" if lying.orientation is None else in_words(lying.orientation)]
-    cells += [str(len(laid.parts)), figures(laid, whole), "" if better is None else "yes"]
-    cells += [f"{search_s:.1f}", f"{hint_s / search_s:.2f}", f"{lay_s / search_s:.1f}"]
+    cells += [str(len(laid.parts)), figures(laid, whole), f"{search_s:.1f}", f"{lay_s / search_s:.1f}"]
     return "| " + " | ".join(cells) + " |"
 
 

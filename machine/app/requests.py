@@ -54,16 +54,15 @@ class ModelRequest:
     """A model or a G-code file and what is to be made of it.
 
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
-    model down the best way first. compare: with the same model in one part. force: go on although the dry run found errors.
-    profile_names: of machine, material and process as the user has given them, names or files.
-    stops: where the print waits for a person. copies: how many of the model on the plate.
-    """
+    model down the way that costs least; None: where nothing says how it lies. compare: with the same model in one part. force:
+    go on although the dry run found errors. profile_names: of machine, material and process as the user has given them, names or
+    files. stops: where the print waits for a person. copies: how many of the model on the plate."""
 
     model: str
     profile: "Profile"
     chosen_sections: frozenset[str] = frozenset()
     ranker: str = "classic"
-    orient: bool = False
+    orient: bool | None = None
     outputs: Outputs = Outputs()
     compare: bool = False
     force: bool = False

@@ -18,8 +18,10 @@ from mdp.overhang import standing
 from mdp.plane import Plane
 from mdp.sweep.rims import ROUNDING_MM, Rim, measure_rim
 from mdp.zone import NOWHERE, ZonesOnModel
+from profiles.profile import Profile
 
 NO_SEAM_WEIGHT = 100.0  # of a rim where a person wants no seam
+STEPS_OF_MM = 0.2  # search.stair_weight is that of layers so high
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,11 @@ class CutCost(NamedTuple):
     residual_mm2: float
     lost_mm2: float
     stairs_mm2: float = 0.0
+
+
+def weight_of_stairs(profile: Profile) -> float:
+    """How much an area counts whose steps are as high as a layer of the profile."""
+    return profile.search.effective.stair_weight * profile.process.layer_height_mm / STEPS_OF_MM
 
 
 def stair_weights(piece: Piece, weight: float) -> Floats | None:

@@ -19,9 +19,9 @@ from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
+from mdp.stairs import step_share
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
 from mdp.sweep.rims import ROUNDING_MM, weigh_chord
-from mdp.sweep.stairs import step_share
 from mdp.sweep.sweep import Remainder
 
 LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own

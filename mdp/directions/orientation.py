@@ -20,6 +20,7 @@ from mdp.cut import convex_hull
 from mdp.directions.spread import spread
 from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
+from mdp.stairs import step_shares
 
 LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips over
 SAME_FACET_DEG = 0.5
@@ -32,13 +33,14 @@ SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 3
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, and how high it
-    stands."""
+    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, how high it stands,
+    and the area of its stairs, each face times the height of its steps in layers."""
 
     rotation: Floats
     risky_mm2: float
     stable: bool
     height_mm: float
+    stairs_mm2: float
 
     @property
     def turns_deg(self) -> tuple[float, float]:
@@ -127,7 +129,13 @@ def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientati
     risky = risky_areas(mesh, directions, angle_deg)
     rests, corners = _rests(mesh, directions), convex_hull(mesh.vertices).vertices
     return [
-        Orientation(_rotation(direction), float(risky[k]), bool(rests[k]), float(np.ptp(dot(corners, direction))))
+        Orientation(
+            rotation=_rotation(direction),
+            risky_mm2=float(risky[k]),
+            stable=bool(rests[k]),
+            height_mm=float(np.ptp(dot(corners, direction))),
+            stairs_mm2=float(step_shares(dot(mesh.normals, direction)) @ mesh.areas_mm2),
+        )
         for k, direction in enumerate(directions)
     ]
 

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, inf
 
+from mdp.cost.cost import weight_of_stairs
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.mesh import Mesh
-from mdp.search.front import EQUAL, Pricing, front_row, price_of_second_mm2, price_row
+from mdp.search.front import EQUAL, Pricing, price_of_second_mm2
 from mdp.search.parts import one_piece
-from mdp.search.problem import Problem
 from mdp.search.search import decompose
 from profiles.profile import Profile
 
@@ -21,8 +21,6 @@ RESTING = 20  # orientations that are ranked, those that a symmetry makes alike 
 PRICED, SEARCHED = 6, 2  # of them whose bare time is looked at, and that a narrow search cuts
 COARSER = 3  # fewer directions in the narrow search
 CLEARLY = 0.95  # of the cost: estimates are not good enough to turn a model over for less
-WORTH_TELLING = 0.8  # of the cost: an orientation that costs no more than this is told unasked
-ROUGH = 0.9  # of the cost: guessed to be worth a closer look
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
 PricingBy = Callable[[Profile], Pricing]
@@ -31,35 +29,29 @@ PricingBy = Callable[[Profile], Pricing]
 @dataclass(frozen=True, eq=False)
 class Lying:
     """A model laid down and cut: turned whole by the orientation, None where it stays as it stands; total_mm2: what it costs
-    with its time."""
+    with its time; standing: the row that is taken of the model as it stands."""
 
     orientation: Orientation | None
     decomposition: Decomposition
     total_mm2: float
-
-
-@dataclass(frozen=True, eq=False)
-class OtherWay:
-    """Another way to lay a model down, in one piece: what it costs, in all with its time."""
-
-    orientation: Orientation
-    row: FrontRow
-    total_mm2: float
+    standing: FrontRow | None
 
 
 def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[[Mesh], Decomposition]) -> Lying:
-    """The orientation whose decomposition costs least with its time; as it stands unless another one costs clearly less.
+    """The orientation whose decomposition costs least with its time; as it stands unless another one saves search.turning_mm2 and
+    more than estimates are wrong.
 
     search: the whole search of a mesh; pricing: what parts take to print by a profile.
     """
     second_mm2, upright = price_of_second_mm2(profile), search(mesh)
-    best = Lying(None, upright, total_mm2(upright.chosen, second_mm2))
-    orientation = _most_promising(mesh, profile, pricing, CLEARLY * best.total_mm2)
+    best = Lying(None, upright, total_mm2(upright.chosen, second_mm2), upright.chosen)
+    limit_mm2 = min(CLEARLY * best.total_mm2, best.total_mm2 - profile.search.turning_mm2)
+    orientation = _most_promising(mesh, profile, pricing, limit_mm2)
     if orientation is None:
         return best
     decomposition = search(standing_still(mesh, orientation.rotation))
-    lying = Lying(orientation, decomposition, total_mm2(decomposition.chosen, second_mm2))
-    return lying if lying.total_mm2 < CLEARLY * best.total_mm2 else best
+    lying = Lying(orientation, decomposition, total_mm2(decomposition.chosen, second_mm2), upright.chosen)
+    return lying if lying.total_mm2 < limit_mm2 else best
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +69,13 @@ def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2:
     """The orientation that is likely to cost least when it is cut; None where none is likely to cost less than the limit."""
     second_mm2 = price_of_second_mm2(profile)
     scar_mm2 = 1.0 + second_mm2 * SUPPORT_S_MM2  # of a mm2 that needs support, with the time that this takes
+    stair_mm2 = weight_of_stairs(profile)
     glimpses = []
     for orientation in distinct_orientations(mesh, profile)[:PRICED]:
         turned = standing_still(mesh, orientation.rotation)
         bare_s = _bare_s(turned, profile, pricing)
         if bare_s is not None:
-            whole_mm2 = second_mm2 * bare_s + scar_mm2 * orientation.risky_mm2
+            whole_mm2 = second_mm2 * bare_s + scar_mm2 * orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2
             glimpses.append(_Glimpse(orientation, turned, second_mm2 * bare_s, whole_mm2))
     best = min(glimpses, key=lambda glimpse: glimpse.whole_mm2, default=None)
     if best is None:
@@ -102,38 +95,13 @@ def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2:
     return chosen
 
 
-def find_better_way(mesh: Mesh, decomposition: Decomposition, profile: Profile, pricing: PricingBy) -> OtherWay | None:
-    """An orientation in which the model in one piece costs so much less than the decomposition that a person is told; None: there
-    is none, or times are not known that count."""
-    second_mm2, whole = price_of_second_mm2(profile), decomposition.front[0]
-    if (
-        decomposition.chosen is None
-        or whole.parts > 1
-        or (second_mm2 > 0.0 and None in (whole.time_s, decomposition.chosen.time_s))
-    ):
-        return None
-    chosen_mm2, whole_mm2 = total_mm2(decomposition.chosen, second_mm2), total_mm2(whole, second_mm2)
-    guess = _guess(profile)
-    upright_mm2 = guess(measure_upright(mesh, profile.process.self_supporting_angle_deg))
-    ways = []
-    for orientation in distinct_orientations(mesh, profile)[:SEARCHED]:
-        if whole_mm2 - upright_mm2 + guess(orientation) > ROUGH * chosen_mm2:
-            continue
-        turned = standing_still(mesh, orientation.rotation)
-        row = _row_of_one_piece(turned, profile, pricing)
-        if row.time_s is not None:
-            ways.append(OtherWay(orientation, row, total_mm2(row, second_mm2)))
-    best = min(ways, key=lambda way: way.total_mm2, default=None)
-    return best if best is not None and best.total_mm2 <= WORTH_TELLING * chosen_mm2 else None
-
-
 def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
     """Up to RESTING orientations in which the model rests, the one that is guessed to cost least first; without as it stands and
-    without those that cannot be told from another one by what needs support and by their height."""
+    without those that cannot be told from another one by what needs support, their stairs and their height."""
     angle_deg = profile.process.self_supporting_angle_deg
     upright = measure_upright(mesh, angle_deg)
     resting = resting_orientations(mesh, angle_deg)
-    worst_mm2 = max(orientation.risky_mm2 for orientation in [upright, *resting])
+    worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *resting])
     distinct = [upright]
     for orientation in sorted(resting, key=_guess(profile)):
         if not any(_alike(orientation, known, worst_mm2) for known in distinct):
@@ -142,7 +110,7 @@ def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
 
 
 def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:
-    same_area = abs(first.risky_mm2 - second.risky_mm2) <= EQUAL * worst_mm2
+    same_area = abs(first.risky_mm2 - second.risky_mm2) + abs(first.stairs_mm2 - second.stairs_mm2) <= EQUAL * worst_mm2
     return same_area and abs(first.height_mm - second.height_mm) <= EQUAL * second.height_mm
 
 
@@ -155,19 +123,13 @@ def total_mm2(row: FrontRow | None, second_mm2: float) -> float:
 
 def _guess(profile: Profile) -> Callable[[Orientation], float]:
     """What orientations cost in one piece, roughly and but for what is the same in all of them, mm2."""
-    second_mm2, layer_mm = price_of_second_mm2(profile), profile.process.layer_height_mm
+    second_mm2, layer_mm, stair_mm2 = price_of_second_mm2(profile), profile.process.layer_height_mm, weight_of_stairs(profile)
 
     def cost_mm2(orientation: Orientation) -> float:
-        layers = ceil(orientation.height_mm / layer_mm)
-        return orientation.risky_mm2 + second_mm2 * (SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * layers)
+        seconds = SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * ceil(orientation.height_mm / layer_mm)
+        return orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2 + second_mm2 * seconds
 
     return cost_mm2
-
-
-def _row_of_one_piece(mesh: Mesh, profile: Profile, pricing: PricingBy) -> FrontRow:
-    """What a mesh costs uncut. Where seams may hide and how the head may come near matters to cuts only, so it is left out."""
-    problem = Problem(mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))
-    return price_row(front_row(problem.root), (one_piece(mesh, profile.machine),), pricing(profile))
 
 
 def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float | None:

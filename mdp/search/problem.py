@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from mdp.clearance import allowed_poses
-from mdp.cost.cost import CostTerms, CutCost, SeamPlaces
+from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
 from mdp.cost.model_need import ModelNeed, ModelSurface
 from mdp.cut import below, solid_of
 from mdp.directions.flats import flat_directions
@@ -39,7 +39,6 @@ from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
 from profiles.profile import Profile
 
-STEPS_OF_MM = 0.2  # search.stair_weight is that of layers so high
 FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
 
 
@@ -64,7 +63,7 @@ class Problem:
             seam_mm=settings.seam_mm,
             feather=settings.feather_weight,
             cut_mm2=settings.cut_mm2,
-            stair_weight=settings.stair_weight * profile.process.layer_height_mm / STEPS_OF_MM,
+            stair_weight=weight_of_stairs(profile),
             need=need,
         )
         places = SeamPlaces.of(surface, solid, settings.hidden_seam_share, self.zones, settings.feature_weight)

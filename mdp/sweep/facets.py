@@ -16,7 +16,7 @@ from mdp.kernels.kernel import kernel, part
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
-from mdp.sweep.stairs import step_shares
+from mdp.stairs import step_shares
 
 LEAST_ALTITUDE = 1e-8  # of a triangle, as a share of the largest coordinate: below, rounding may decide which corner is higher
 COSINE_MARGIN = 1e-6

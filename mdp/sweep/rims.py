@@ -13,9 +13,9 @@ import numpy as np
 from mdp.kernels.arrays import dot, floats, int_table, table
 from mdp.kernels.kernel import inlined, kernel, part, vector_part
 from mdp.mesh import Floats, Ints
+from mdp.stairs import step_share
 from mdp.sweep.facets import Indices
 from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, cut_block, find_ramps, share_above, sort_heights
-from mdp.sweep.stairs import step_share
 
 COT_30 = 3.0**0.5
 FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is so thin that it is reported

@@ -38,6 +38,7 @@ from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
+from mdp.stairs import step_shares
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import Classes
 from mdp.sweep.components import UNKNOWN, Topology, View, count_pieces, find_critical
@@ -56,7 +57,6 @@ from mdp.sweep.integrals import (
 from mdp.sweep.rays import TriangleTree, triangle_tree
 from mdp.sweep.rims import Rims, ScarsAbove, integrate_scars
 from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
-from mdp.sweep.stairs import step_shares
 
 
 class Gains(NamedTuple):

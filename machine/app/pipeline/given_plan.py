@@ -24,6 +24,14 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     return None if file is None else read_plan(file)
 
 
+def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:
+    """Whether it is searched how the model lies: where the user asks for it, or says nothing of it. A plan, turns in the profile
+    and the paper's terms mean the model as it is."""
+    if request.orient is not None or given is not None:
+        return bool(request.orient) and given is None
+    return profile.search.effective.objective == "scar" and not any(profile.process.rotate_deg)
+
+
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
     """The profile with the settings that a plan has for single parts, under those of --part. Raises PlanError."""
     if given is None or not given.settings:

@@ -12,10 +12,10 @@ from machine.app.output import write_bytes
 from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
-from machine.app.pipeline.given_plan import check_parts_named, read_given_plan, with_plan_settings
+from machine.app.pipeline.given_plan import check_parts_named, lays_down, read_given_plan, with_plan_settings
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
-from machine.app.terminal.advice import better_in_words, laid_in_words
+from machine.app.terminal.advice import laid_in_words
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
@@ -35,7 +35,7 @@ from mdp.ranking.ranker import ranker_named
 from mdp.read import locate, read_mesh
 from mdp.search.by_plan import cut_by_plan
 from mdp.search.front import price_of_second_mm2
-from mdp.search.laying import OtherWay, find_better_way, lay_down
+from mdp.search.laying import lay_down
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
@@ -45,7 +45,7 @@ from slicer.paths import SlicedPart
 
 @dataclass(frozen=True, eq=False)
 class Decomposed:
-    """A decomposition, the plan that cuts it again, how long its steps took, and what a person should rather do.
+    """A decomposition, the plan that cuts it again, and how long its steps took.
 
     profile: what it is printed with, the plan's settings of single parts included.
     """
@@ -55,7 +55,6 @@ class Decomposed:
     plan: PlanFile
     read_s: float
     total_s: float
-    better: OtherWay | None = None
 
 
 def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed:
@@ -80,21 +79,18 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     orientation = None if given is None or given.orientation is None else np.array(given.orientation)
     if orientation is not None:
         mesh = standing_still(mesh, orientation)
-    if to_build and not request.orient:
+    laying = lays_down(request, given, profile)
+    if to_build and not laying:
         check_standing(mesh, profile)  # a search may take minutes
-    better: OtherWay | None = None
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     with reporting() as report:
-        asked = _Search(request, given, to_build, report)
-        if request.orient and given is None:
+        asked = _Search(request, given, to_build and not laying, report)
+        if laying:
             lying = lay_down(mesh, profile, pricing, asked.search)
-            decomposition, chosen = lying.decomposition, lying.orientation
-            orientation = None if chosen is None else chosen.rotation
-            notes = (laid_in_words(chosen),)
+            decomposition, notes = lying.decomposition, laid_in_words(lying)
+            orientation = None if lying.orientation is None else lying.orientation.rotation
         else:
             decomposition = asked.search(mesh)
-            better = find_better_way(mesh, decomposition, profile, pricing) if given is None else None
-            notes = tuple(f"{advice}: try --orient" for advice in [better_in_words(decomposition, better)] if advice)
     if record_file is not None:
         write_bytes(record_file, asked.record_of(decomposition))
     check_parts_named(profile, len(decomposition.parts))
@@ -102,17 +98,17 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
         say(f"{request.name}: {note}")
     plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
     decomposition, profile = in_copies(decomposition, request.copies, profile)
-    return Decomposed(decomposition, profile, plan, read_s, perf_counter() - began, better)
+    return Decomposed(decomposition, profile, plan, read_s, perf_counter() - began)
 
 
 class _Search:
     """The search of one request, for a mesh that lies one way or another, or the plan that takes its place."""
 
-    def __init__(self, request: ModelRequest, given: PlanFile | None, to_build: bool, report: Report) -> None:
+    def __init__(self, request: ModelRequest, given: PlanFile | None, prices_unused: bool, report: Report) -> None:
         self._request, self._given, self._report = request, given, report
         cuts, profile = request.cuts, request.profile.of_all_parts
         free = cuts.plan is not None or cuts.parts is not None or price_of_second_mm2(profile) <= 0.0
-        self._price = None if to_build and free and not request.orient else pricing(profile)
+        self._price = None if prices_unused and free else pricing(profile)
         self._records: list[tuple[Decomposition, list[bytes]]] = []
 
     def search(self, mesh: Mesh) -> Decomposition:

@@ -70,8 +70,9 @@ class SearchOptions:
         ),
     ] = "classic"
     orient: Annotated[
-        bool, typer.Option("--orient", help="lay the model down the way that costs least, chosen with its parts")
-    ] = False
+        bool | None,
+        typer.Option("--orient/--as-is", help="lay the model down the way that costs least, or print it as its file has it"),
+    ] = None
     parts: Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")] = None
     part: Annotated[
         list[str] | None,

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from mdp.decomposition import Part
-from mdp.directions.orientation import measure_upright, side_in_words
+from mdp.directions.orientation import measure_upright, side_in_words, standing_still
 from mdp.mesh import Mesh
+from mdp.pose import about
 from mdp.search.front import Price, Pricing
-from mdp.search.laying import Lying, distinct_orientations, find_better_way, lay_down, total_mm2
+from mdp.search.laying import Lying, distinct_orientations, lay_down, total_mm2
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
 from tests.shapes import box, branch, tee
@@ -53,13 +54,28 @@ def test_laid_down_it_costs_no_more_than_as_it_stands(mesh: Mesh) -> None:
     assert laid_down(mesh).total_mm2 <= total_mm2(upright.chosen, 0.5)
 
 
-def test_an_orientation_that_costs_a_fifth_less_is_told_and_one_that_costs_more_is_not() -> None:
-    standing = decompose(tee(), "tee", PROFILE, price=by_height(PROFILE))
-    better = find_better_way(tee(), standing, PROFILE, by_height)
-    assert better is not None
-    assert (better.row.parts, better.row.cost_mm2, better.row.time_s) == (1, 0.0, pytest.approx(100.0))
-    flat = box(40, 30, 10)
-    assert find_better_way(flat, decompose(flat, "box", PROFILE, price=by_height(PROFILE)), PROFILE, by_height) is None
+def test_a_model_stays_where_turning_it_saves_less_than_is_asked_for() -> None:
+    standing = laid_down(tee())
+    assert standing.standing is not None
+    saved_mm2 = total_mm2(standing.standing, 0.5) - standing.total_mm2
+    for turning_mm2, turned in ((saved_mm2 - 1.0, True), (saved_mm2 + 1.0, False)):
+        profile = load(settings=["search.directions=20", "search.polish=false", f"search.turning_mm2={turning_mm2}"])
+        search = partial(decompose, name="mesh", profile=profile, price=by_height(profile))
+        assert (lay_down(tee(), profile, by_height, search).orientation is not None) == turned
+
+
+def leaning_plate() -> Mesh:
+    """A plate of 40 x 30 x 4 mm that leans on one edge by 30 degrees, the edge cut level to stand on."""
+    turn = about(np.array([0.0, 1.0, 0.0]), np.radians(30.0))
+    return standing_still(box(40, 30, 4), turn)
+
+
+def test_of_two_ways_to_lie_that_need_no_support_the_one_without_stairs_is_taken() -> None:
+    ways = distinct_orientations(leaning_plate(), PROFILE)
+    assert ways[0].stairs_mm2 == pytest.approx(0.0, abs=1e-6)
+    assert measure_upright(leaning_plate(), 45.0).stairs_mm2 == pytest.approx(
+        2.0 * (40 * 30 * np.cos(np.radians(30.0)) + 4 * 30 * np.sin(np.radians(30.0)))
+    )
 
 
 def on_a_small_plate(profile: Profile) -> Pricing:
@@ -72,10 +88,8 @@ def on_a_small_plate(profile: Profile) -> Pricing:
     return price
 
 
-def test_no_orientation_is_told_or_taken_that_the_machine_has_no_room_for() -> None:
+def test_no_orientation_is_taken_that_the_machine_has_no_room_for() -> None:
     price = on_a_small_plate(PROFILE)
-    standing = decompose(tee(), "tee", PROFILE, price=price)
-    assert find_better_way(tee(), standing, PROFILE, on_a_small_plate) is None
     search = partial(decompose, name="mesh", profile=PROFILE, price=price)
     assert lay_down(tee(), PROFILE, on_a_small_plate, search).orientation is None
 

@@ -15,7 +15,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import UP, Plane
 from mdp.search.search import decompose
-from mdp.sweep.stairs import LEVEL_COSINE
+from mdp.stairs import LEVEL_COSINE
 from mdp.sweep.sweep import Remainder, gains
 from profiles.profile import load
 from tests import shapes

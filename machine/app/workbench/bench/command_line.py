@@ -1,6 +1,5 @@
 """Command line: what a person types to get the G-code of what lies on the bench."""
 
-from math import asin, atan2, degrees
 from pathlib import Path
 from shlex import join
 
@@ -8,11 +7,8 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.part_settings import option
-from mdp.mesh import Floats
-from mdp.pose import about
+from mdp.directions.turns import turned_by, turns_of
 from profiles.profile import DEFAULTS
-
-LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
 
 
 def file_stem(bench: Bench) -> str:
@@ -42,7 +38,7 @@ def export_command(bench: Bench) -> str:
     if bench.planned:
         words += ["--plan", f"{stem}-plan.toml"]
     else:
-        words += ["--parts", "1"]
+        words += ["--parts", "1", "--as-is"]
         for own in bench.profile.parts:
             words += ["--part", option(own)]
     if bench.copies != 1:
@@ -53,18 +49,4 @@ def export_command(bench: Bench) -> str:
 
 def turns_deg(bench: Bench) -> tuple[float, float, float]:
     """The turns about x, then y, then z that `process.rotate_deg` needs for the model to stand as it does on the bench."""
-    read = turned_by(bench.profile.process.rotate_deg)
-    rotation = np.array(bench.rotation) @ read
-    sine = min(max(-float(rotation[2, 0]), -1.0), 1.0)
-    if abs(sine) > LEVEL:
-        return 0.0, degrees(asin(sine)), degrees(atan2(-rotation[0, 1], rotation[1, 1])) + 0.0
-    x, z = atan2(rotation[2, 1], rotation[2, 2]), atan2(rotation[1, 0], rotation[0, 0])
-    return degrees(x) + 0.0, degrees(asin(sine)) + 0.0, degrees(z) + 0.0
-
-
-def turned_by(angles_deg: tuple[float, float, float]) -> Floats:
-    """(3, 3) the rotation of turns about x, then y, then z."""
-    whole = np.eye(3)
-    for axis, angle in zip(np.eye(3), np.radians(angles_deg), strict=True):
-        whole = about(axis, float(angle)) @ whole
-    return whole
+    return turns_of(np.array(bench.rotation) @ turned_by(bench.profile.process.rotate_deg))

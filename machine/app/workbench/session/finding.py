@@ -8,8 +8,7 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench, with_front, with_rotation
 from machine.app.workbench.session.base import WAITING, SessionBase
-from machine.app.workbench.work.cutting import LAY_TOO, Found, Searched, SearchWay
-from mdp.zone import NO_ZONES
+from machine.app.workbench.work.cutting import Found, Searched, SearchWay
 from profiles.errors import PlanError
 
 BY_DEFAULT = SearchWay()
@@ -43,14 +42,8 @@ class Finding:
         session.followers.append(self._follow)
 
     def begin(self, way: SearchWay = BY_DEFAULT) -> None:
-        """Search for the parts of the model on the bench, if no search is under way. Raises PlanError where it is to be laid down
-        although planes or marks belong to it as it lies."""
+        """Search for the parts of the model on the bench, if no search is under way."""
         bench = self._session.bench
-        if way.orient and (bench.locked or bench.zones != NO_ZONES):
-            raise PlanError(
-                f"{LAY_TOO}: locked planes and marks belong to the model as it lies; unlock them and take the marks away, or find"
-                " parts for it as it lies"
-            )
         if self.search is None:
             if self._pricing is not None:
                 self._pricing.cancel()

@@ -18,7 +18,6 @@ from machine.app.workbench.bench.bench import (
     with_profile,
     with_scaled_model,
 )
-from machine.app.workbench.bench.command_line import turned_by
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.settings import check_block, profile_as_given
@@ -33,6 +32,7 @@ from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
 from machine.app.workbench.work.models import Resting
 from machine.app.workbench.work.worker_pool import WorkerPools
+from mdp.directions.turns import turned_by
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import MANY_FACES, locate

@@ -10,7 +10,7 @@ import numpy as np
 
 from machine.app.pipeline import compilers
 from machine.app.pipeline.pricing import pricing
-from machine.app.terminal.advice import better_in_words, laid_in_words
+from machine.app.terminal.advice import laid_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.processes import Tell
 from mdp.decomposition import Decomposition, FrontRow
@@ -21,13 +21,12 @@ from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
 from mdp.search.by_plan import cut_by_plan
-from mdp.search.laying import find_better_way, lay_down
+from mdp.search.laying import lay_down
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
 
 PLAN_NAME = "plan.toml"
-LAY_TOO = "lay it down, too"  # as the page words it
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
 
 
@@ -41,10 +40,11 @@ class Searched:
 
 @dataclass(frozen=True)
 class SearchWay:
-    """How parts are sought, beside what the profile says. orient: laid down the way that costs least, chosen with them; ranker: a
+    """How parts are sought, beside what the profile says. orient: laid down the way that costs least, chosen with them, unless
+    a person has turned the model or locked or marked something on it as it lies; ranker: a
     name for `ranker_named`."""
 
-    orient: bool = False
+    orient: bool = True
     ranker: str = CLASSIC
 
 
@@ -58,7 +58,7 @@ class Found:
 
 
 def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
-    """What a search as `decompose` makes it has found, or one as `decompose --orient` does. Raises RankerError."""
+    """What a search as `decompose` makes it has found. Raises RankerError."""
     ranker_named(way.ranker)
     mesh, name, profile, locked = standing_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
@@ -78,15 +78,13 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
 
         return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, by_hand=locked, price=price)
 
-    if way.orient:
+    if way.orient and bench.turned is None and not locked.parts and locked.zones == NO_ZONES:
         lying = lay_down(mesh, profile, pricing, search)
         turn = None if lying.orientation is None else lying.orientation.rotation
         decomposition = lying.decomposition
-        return Found(decomposition.front, (*decomposition.notes, laid_in_words(lying.orientation)), turn)
+        return Found(decomposition.front, (*decomposition.notes, *laid_in_words(lying)), turn)
     decomposition = search(mesh)
-    better = None if locked.parts or locked.zones != NO_ZONES else find_better_way(mesh, decomposition, profile, pricing)
-    advice = better_in_words(decomposition, better)
-    return Found(decomposition.front, (*decomposition.notes, *([f"{advice}: find parts and {LAY_TOO}"] if advice else [])))
+    return Found(decomposition.front, decomposition.notes)
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:

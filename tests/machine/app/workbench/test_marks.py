@@ -14,9 +14,9 @@ from machine.app.workbench.bench.bench import (
     with_rotation,
     with_scaled_model,
 )
-from machine.app.workbench.bench.command_line import turned_by
 from machine.app.workbench.bench.marks import named_faces, standing_mesh
 from mdp.directions.orientation import standing_still
+from mdp.directions.turns import turned_by
 from mdp.plans.plan_file import PlannedPart
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text

@@ -11,9 +11,10 @@ import pytest
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, History, Step, with_cuts, with_model_turned_as_read
 from machine.app.workbench.bench.changes import reset_part, set_part, stand, turn
-from machine.app.workbench.bench.command_line import export_command, turned_by, turns_deg
+from machine.app.workbench.bench.command_line import export_command, turns_deg
 from machine.app.workbench.bench.settings import settings_list, with_setting
 from machine.planning.stops import parse_stops
+from mdp.directions.turns import turned_by
 from mdp.plans.plan_file import PlannedPart
 from mdp.pose import UP, about
 from profiles.errors import PlanError, ProfileError

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from machine.app.workbench.bench.bench import Bench, with_model
-from machine.app.workbench.bench.command_line import turned_by
 from machine.app.workbench.work import standing as work
 from machine.app.workbench.work.standing import Standing, stand
+from mdp.directions.turns import turned_by
 from mdp.mesh import Mesh
 from profiles.errors import MeshError
 from profiles.profile import load

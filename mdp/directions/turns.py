@@ -1,0 +1,31 @@
+"""Turns: a rotation as turns about x, then y, then z, as process.rotate_deg has it."""
+
+from math import asin, atan2, degrees
+
+import numpy as np
+
+from mdp.mesh import Floats
+from mdp.pose import about
+
+LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
+
+
+def turned_by(angles_deg: tuple[float, float, float]) -> Floats:
+    """(3, 3) the rotation of turns about x, then y, then z."""
+    whole = np.eye(3)
+    for axis, angle in zip(np.eye(3), np.radians(angles_deg), strict=True):
+        whole = about(axis, float(angle)) @ whole
+    return whole
+
+
+def turns_of(rotation: Floats) -> tuple[float, float, float]:
+    """The turns about x, then y, then z that a (3, 3) rotation is made of, degrees.
+
+    >>> turns_of(turned_by((0.0, 0.0, 90.0)))
+    (0.0, 0.0, 90.0)
+    """
+    sine = min(max(-float(rotation[2, 0]), -1.0), 1.0)
+    if abs(sine) > LEVEL:
+        return 0.0, degrees(asin(sine)), degrees(atan2(-rotation[0, 1], rotation[1, 1])) + 0.0
+    x, z = atan2(rotation[2, 1], rotation[2, 2]), atan2(rotation[1, 0], rotation[0, 0])
+    return degrees(x) + 0.0, degrees(asin(sine)) + 0.0, degrees(z) + 0.0
