@@ -30,8 +30,9 @@ class Program:
 @dataclass(frozen=True)
 class Alternative:
     """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
-    length of the seams between parts; interface_mm3: plastic that one piece would not have, by the part that stands
-    there; findings: how many its dry run has; message: why it cannot be printed so, or "". None: it cannot be printed so."""
+    length of the seams between parts; stairs_mm2: what stairs count; interface_mm3: plastic that one piece would not have, by
+    the part that stands there; findings: how many its dry run has; message: why it cannot be printed so, or "". None: it cannot
+    be printed so."""
 
     name: str
     orientation: str
@@ -44,5 +45,6 @@ class Alternative:
     message: str = ""
     unsupported_mm2: float | None = None
     seam_mm: float = 0.0
+    stairs_mm2: float = 0.0
     interface_mm3: Mapping[int, float] = field(default_factory=dict)
     findings: int = 0

@@ -119,6 +119,11 @@ class Decomposition:
         return 0.0 if self.chosen is None else self.chosen.seam_mm
 
     @property
+    def stairs_mm2(self) -> float:
+        """What the stairs of all parts count in the cost."""
+        return 0.0 if self.chosen is None else self.chosen.stairs_mm2
+
+    @property
     def volume_mm3(self) -> float:
         """What the parts add up to."""
         return sum(part.volume_mm3 for part in self.parts)

@@ -97,6 +97,7 @@ def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> 
         "reduction": decomposition.reduction,
         "cost_mm2": decomposition.cost_mm2,
         "seam_mm": decomposition.seam_mm,
+        "stairs_mm2": decomposition.stairs_mm2,
         "volume_mm3": decomposition.volume_mm3,
         "candidates_evaluated": decomposition.candidates_evaluated,
         "rounds": decomposition.rounds,
@@ -121,7 +122,7 @@ def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> 
 
 def front_values(row: FrontRow) -> dict[str, Any]:
     """What is told of a row of the front."""
-    names = ("parts", "support_area_mm2", "seam_mm", "cost_mm2", "time_s", "filament_mm", "chosen")
+    names = ("parts", "support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2", "time_s", "filament_mm", "chosen")
     return {name: getattr(row, name) for name in names}
 
 

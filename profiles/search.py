@@ -8,7 +8,14 @@ from profiles.frozen import Frozen
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
 OF_SCARS = {"seam_mm": 0.0, "nozzle_load_n": 0.0}  # what the paper's terms do not know
-OF_SEAMS = {"cut_mm2": 0.0, "second_mm2": 0.0, "hidden_seam_share": 1.0, "stair_weight": 0.0, "feature_weight": 1.0}
+OF_SEAMS = {
+    "cut_mm2": 0.0,
+    "second_mm2": 0.0,
+    "metre_mm2": 0.0,
+    "hidden_seam_share": 1.0,
+    "stair_weight": 0.0,
+    "feature_weight": 1.0,
+}
 
 
 class Search(Frozen):
@@ -61,6 +68,13 @@ class Search(Frozen):
         le=1000,
         description="what a second of printing counts in the choice between numbers of parts and orientations: so much surface "
         "that a seam or support blemishes, mm2 (1 cm2 is worth 200 s); 0: time is free, as it is without support",
+    )
+    metre_mm2: float = Field(
+        50.0,
+        ge=0,
+        le=1e5,
+        description="what a metre of filament counts there, mm2 (as 100 s do: 3 g cost about what a machine does in that time); "
+        "0: it is free, as it is without support",
     )
     turning_mm2: float = Field(
         50.0,

@@ -30,7 +30,7 @@ MOVES = {
 }  # fmt: skip
 UNTOLD = "not told"
 COMPARED = "Compared"
-COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "findings", "risky mm²")
+COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "stairs mm²", "findings", "risky mm²")
 STANDS_ON = "base cm³"
 CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
 RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
@@ -116,11 +116,13 @@ def _front(decomposition: Decomposition) -> list[Table]:
     for row in front:
         time = "–" if row.time_s is None else duration(row.time_s)
         filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
-        areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.cost_mm2:.1f}"]
+        areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
         rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
     notes = [f"taken: {row.reason}" for row in front if row.chosen]
     notes.append("--parts takes another row; time and filament are estimates")
-    return [_table("In how many parts", ["parts", "support mm²", "seams mm", "costs mm²", "about", "m"], rows, notes)]
+    return [
+        _table("In how many parts", ["parts", "support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "m"], rows, notes)
+    ]
 
 
 def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
@@ -165,11 +167,11 @@ def _alternatives(alternatives: Sequence[Alternative]) -> Table:
     """This print beside the model in one part, a row for each cost: a row for each way would be broader than a phone."""
     columns = []
     for way in alternatives:
-        costs = ["-"] * 7
+        costs = ["-"] * 8
         if way.time_s is not None:
             filament_mm, mass_g, support_mm3 = (value or 0.0 for value in (way.filament_mm, way.filament_g, way.support_mm3))
             volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(way.interface_mm3.values()) / 1000:.2f}"]
-            scars = [f"{way.seam_mm:.0f}", str(way.findings)]
+            scars = [f"{way.seam_mm:.0f}", f"{way.stairs_mm2:.0f}", str(way.findings)]
             costs = [duration(way.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
         columns.append([*costs, f"{max(way.risky_mm2, 0.0):.1f}"])
     notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]

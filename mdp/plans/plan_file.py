@@ -52,7 +52,8 @@ ZONE_KINDS = ("keep", "no_seam", "no_support")  # as mdp.zone.Zones has them
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "front")
 PART_KEYS = ("normal", "offset_mm", "process")
 ZONE_KEYS = ("min_mm", "max_mm", "axes", "colour", "point_mm", "angle_deg")
-ROW_KEYS = ("planes", "support_area_mm2", "seam_mm", "cost_mm2")
+ROW_FIGURES = ("support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2")
+ROW_KEYS = ("planes", *ROW_FIGURES)
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ class PlannedRow:
     parts: tuple[PlannedPart, ...]
     support_area_mm2: float = 0.0
     seam_mm: float = 0.0
+    stairs_mm2: float = 0.0
     cost_mm2: float = 0.0
 
     @property
@@ -139,7 +141,12 @@ def plan_of(
 
 def _row(row: FrontRow) -> PlannedRow:
     parts = tuple(PlannedPart(_vector(plane.normal), float(plane.offset_mm)) for plane in reversed(row.planes))
-    return PlannedRow(parts, float(row.support_area_mm2), float(row.seam_mm), float(row.cost_mm2))
+    return planned_row(parts, row)
+
+
+def planned_row(parts: tuple[PlannedPart, ...], row: FrontRow) -> PlannedRow:
+    """A row of a front with its parts from the second on, in print order."""
+    return PlannedRow(parts, **{figure: float(getattr(row, figure)) for figure in ROW_FIGURES})
 
 
 def _vector(values: Floats) -> Vector:

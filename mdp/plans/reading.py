@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 
 from mdp.mesh import parse_colour
-from mdp.plans.plan_file import KEYS, PART_KEYS, ROW_KEYS, VERSION, ZONE_KEYS, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.plans.plan_file import (
+    KEYS,
+    PART_KEYS,
+    ROW_FIGURES,
+    ROW_KEYS,
+    VERSION,
+    ZONE_KEYS,
+    ZONE_KINDS,
+    PlanFile,
+    PlannedPart,
+    PlannedRow,
+)
 from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, Painted, Zone, Zones
 from profiles.errors import PlanError, reason
 from profiles.frozen import Vector
@@ -83,8 +94,7 @@ class _Reader:
         for plane in planes:
             values = self._numbers(plane, f"{where}planes", 4)
             parts.append(PlannedPart(self._unit(values[:3], f"{where}planes"), self._number(values[3], f"{where}planes")))
-        support, seam, cost = (self._number(table.get(key, 0.0), where + key, 1e15) for key in ROW_KEYS[1:])
-        return PlannedRow(tuple(parts), support, seam, cost)
+        return PlannedRow(tuple(parts), **{key: self._number(table.get(key, 0.0), where + key, 1e15) for key in ROW_FIGURES})
 
     def _zones(self, table: dict[str, Any], key: str) -> tuple[AnyZone, ...]:
         zones: list[AnyZone] = []

@@ -6,7 +6,7 @@ from typing import Any
 import tomlkit
 
 from mdp.mesh import colour_text
-from mdp.plans.plan_file import ROW_KEYS, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.plans.plan_file import ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
 from mdp.zone import AnyZone, Grown, Painted
 
 
@@ -79,6 +79,5 @@ def _row_table(row: PlannedRow) -> tomlkit.items.Table:
     planes = tomlkit.array()
     planes.extend([[*plane.normal.tolist(), plane.offset_mm] for part in row.parts if (plane := part.plane) is not None])
     table["planes"] = planes.multiline(len(row.parts) > 1)
-    values = (row.support_area_mm2, row.seam_mm, row.cost_mm2)
-    table.update(dict(zip(ROW_KEYS[1:], values, strict=True)))
+    table.update({figure: getattr(row, figure) for figure in ROW_FIGURES})
     return table

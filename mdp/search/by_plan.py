@@ -8,7 +8,7 @@ from time import perf_counter
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.plans.plan_file import PlanFile, PlannedRow
+from mdp.plans.plan_file import PlanFile, PlannedRow, planned_row
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.front import BY_PLAN, Pricing, front_row, pays, price_row
 from mdp.search.parts import make_parts
@@ -49,7 +49,7 @@ def cut_by_plan(
     node = cut_by_hand(problem, plan)
     if own.parts != plan.parts:
         plan = replace(plan, front=_with_own_row(problem, own))
-    rows = {len(row.parts): FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2) for row in plan.front}
+    rows = {len(row.parts): _front_row(row) for row in plan.front}
     rows[len(node.cuts)] = replace(front_row(node), chosen=True, reason=BY_PLAN)
     cut_parts, front = make_parts(problem, node), [rows[count] for count in sorted(rows)]
     if price is not None:
@@ -66,9 +66,12 @@ def _with_own_row(problem: Problem, plan: PlanFile) -> tuple[PlannedRow, ...]:
     known = rows.get(len(plan.parts))
     if all(part.plane is not None for part in plan.parts) and (known is None or known.parts != plan.parts):
         with suppress(PlanError):
-            row = front_row(cut_by_hand(problem, plan))
-            rows[len(plan.parts)] = PlannedRow(plan.parts, row.support_area_mm2, row.seam_mm, row.cost_mm2)
+            rows[len(plan.parts)] = planned_row(plan.parts, front_row(cut_by_hand(problem, plan)))
     return tuple(rows.values())
+
+
+def _front_row(row: PlannedRow) -> FrontRow:
+    return FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2, stairs_mm2=row.stairs_mm2)
 
 
 def _priced(

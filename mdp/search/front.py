@@ -101,9 +101,32 @@ def pays(rows: Sequence[FrontRow]) -> list[bool]:
     return [all(row.cost_mm2 < fewer.cost_mm2 for fewer in rows[:place]) for place, row in enumerate(rows)]
 
 
-def price_of_second_mm2(profile: Profile) -> float:
-    """What a second of printing counts; without support nothing, for then time is no reason to leave a model whole."""
-    return profile.search.effective.second_mm2 if profile.process.support != "none" else 0.0
+@dataclass(frozen=True)
+class Worth:
+    """What a second of printing and a mm of filament count beside surface that is blemished, mm2."""
+
+    second_mm2: float = 0.0
+    filament_mm2: float = 0.0
+
+    @classmethod
+    def of(cls, profile: Profile) -> "Worth":
+        """What they count by a profile; without support nothing, for then they are no reason to leave a model whole."""
+        search = profile.search.effective
+        return cls() if profile.process.support == "none" else cls(search.second_mm2, 1e-3 * search.metre_mm2)
+
+    def of_print(self, time_s: float, filament_mm: float) -> float:
+        """What a print counts by its time and filament."""
+        return self.second_mm2 * time_s + self.filament_mm2 * filament_mm
+
+    def of_row(self, row: FrontRow) -> float | None:
+        """The same of a row of a front; None where its time counts and is not known."""
+        if not self:
+            return 0.0
+        return None if row.time_s is None else self.of_print(row.time_s, row.filament_mm or 0.0)
+
+    def __bool__(self) -> bool:
+        """Whether anything of it counts."""
+        return self.second_mm2 > 0.0 or self.filament_mm2 > 0.0
 
 
 @dataclass(frozen=True)
@@ -115,22 +138,21 @@ class Choice:
     note: tuple[str, ...] = ()
 
 
-def choose(rows: Sequence[FrontRow], second_mm2: float, most_longer: float = inf) -> Choice:
+def choose(rows: Sequence[FrontRow], worth: Worth, most_longer: float = inf) -> Choice:
     """The row of the fewest parts among those whose cost is alike to the least. rows: by their number of parts.
 
-    second_mm2: every second that a row takes longer than the fastest one counts so much. Where any row has a time, those that may
-    be taken and have none cannot be printed; where none has, seconds do not count. most_longer: share by which a row may take
-    more time, or filament, than the first.
+    worth: what their time and filament count. Where any row has a time, those that may be taken and have none cannot be printed;
+    where none has, neither counts. most_longer: share by which a row may take more time, or filament, than the first.
     """
     places = [place for place, good in enumerate(pays(rows)) if good]
     places = [place for place in places if rows[place].time_s is not None] or places
     scars = _first_alike([rows[place].cost_mm2 for place in places])
     reason = "the least cost" if rows[places[scars]].cost_mm2 <= min(row.cost_mm2 for row in rows) else LEAST_PARTS
-    times_s = [time_s for place in places if (time_s := rows[place].time_s) is not None]
-    if second_mm2 <= 0.0 or not times_s:
+    if not worth or all(rows[place].time_s is None for place in places):
         return Choice(places[scars], reason)
     allowed = [place for place in places if _is_quick(rows[place], rows[0], most_longer)]
-    totals = [rows[place].cost_mm2 + second_mm2 * ((rows[place].time_s or 0.0) - min(times_s)) for place in allowed]
+    prices = [worth.of_row(rows[place]) or 0.0 for place in allowed]
+    totals = [rows[place].cost_mm2 + price - min(prices) for place, price in zip(allowed, prices, strict=True)]
     taken = _first_alike(totals)
     if allowed[taken] == places[scars]:
         return Choice(places[scars], reason)

@@ -12,7 +12,7 @@ from mdp.cost.cost import weight_of_stairs
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.mesh import Mesh
-from mdp.search.front import EQUAL, Pricing, price_of_second_mm2
+from mdp.search.front import EQUAL, Price, Pricing, Worth
 from mdp.search.parts import one_piece
 from mdp.search.search import decompose
 from profiles.profile import Profile
@@ -43,21 +43,21 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
 
     search: the whole search of a mesh; pricing: what parts take to print by a profile.
     """
-    second_mm2, upright = price_of_second_mm2(profile), search(mesh)
-    best = Lying(None, upright, total_mm2(upright.chosen, second_mm2), upright.chosen)
+    worth, upright = Worth.of(profile), search(mesh)
+    best = Lying(None, upright, total_mm2(upright.chosen, worth), upright.chosen)
     limit_mm2 = min(CLEARLY * best.total_mm2, best.total_mm2 - profile.search.turning_mm2)
     orientation = _most_promising(mesh, profile, pricing, limit_mm2)
     if orientation is None:
         return best
     decomposition = search(standing_still(mesh, orientation.rotation))
-    lying = Lying(orientation, decomposition, total_mm2(decomposition.chosen, second_mm2), upright.chosen)
+    lying = Lying(orientation, decomposition, total_mm2(decomposition.chosen, worth), upright.chosen)
     return lying if lying.total_mm2 < limit_mm2 else best
 
 
 @dataclass(frozen=True, eq=False)
 class _Glimpse:
-    """A model in some orientation: what its time costs without any support, hardly any decomposition less, and what it costs in
-    one piece, roughly."""
+    """A model in some orientation: what its time and filament cost without any support, hardly any decomposition less, and what
+    it costs in one piece, roughly."""
 
     orientation: Orientation
     mesh: Mesh
@@ -67,16 +67,17 @@ class _Glimpse:
 
 def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2: float) -> Orientation | None:
     """The orientation that is likely to cost least when it is cut; None where none is likely to cost less than the limit."""
-    second_mm2 = price_of_second_mm2(profile)
-    scar_mm2 = 1.0 + second_mm2 * SUPPORT_S_MM2  # of a mm2 that needs support, with the time that this takes
+    worth = Worth.of(profile)
+    scar_mm2 = 1.0 + worth.second_mm2 * SUPPORT_S_MM2  # of a mm2 that needs support, with the time that this takes
     stair_mm2 = weight_of_stairs(profile)
     glimpses = []
     for orientation in distinct_orientations(mesh, profile)[:PRICED]:
         turned = standing_still(mesh, orientation.rotation)
-        bare_s = _bare_s(turned, profile, pricing)
-        if bare_s is not None:
-            whole_mm2 = second_mm2 * bare_s + scar_mm2 * orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2
-            glimpses.append(_Glimpse(orientation, turned, second_mm2 * bare_s, whole_mm2))
+        bare = _price_bare(turned, profile, pricing)
+        if bare is not None:
+            bare_mm2 = worth.of_print(bare.time_s, bare.filament_mm)
+            whole_mm2 = bare_mm2 + scar_mm2 * orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2
+            glimpses.append(_Glimpse(orientation, turned, bare_mm2, whole_mm2))
     best = min(glimpses, key=lambda glimpse: glimpse.whole_mm2, default=None)
     if best is None:
         return None
@@ -114,16 +115,17 @@ def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:
     return same_area and abs(first.height_mm - second.height_mm) <= EQUAL * second.height_mm
 
 
-def total_mm2(row: FrontRow | None, second_mm2: float) -> float:
-    """What a row costs with its time; infinite where time counts and the row has none, for it cannot be printed."""
-    if row is None or second_mm2 <= 0.0:
-        return 0.0 if row is None else row.cost_mm2
-    return inf if row.time_s is None else row.cost_mm2 + second_mm2 * row.time_s
+def total_mm2(row: FrontRow | None, worth: Worth) -> float:
+    """What a row costs with its time and filament; infinite where they count and the row has none, for it cannot be printed."""
+    if row is None:
+        return 0.0
+    price_mm2 = worth.of_row(row)
+    return inf if price_mm2 is None else row.cost_mm2 + price_mm2
 
 
 def _guess(profile: Profile) -> Callable[[Orientation], float]:
     """What orientations cost in one piece, roughly and but for what is the same in all of them, mm2."""
-    second_mm2, layer_mm, stair_mm2 = price_of_second_mm2(profile), profile.process.layer_height_mm, weight_of_stairs(profile)
+    second_mm2, layer_mm, stair_mm2 = Worth.of(profile).second_mm2, profile.process.layer_height_mm, weight_of_stairs(profile)
 
     def cost_mm2(orientation: Orientation) -> float:
         seconds = SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * ceil(orientation.height_mm / layer_mm)
@@ -132,12 +134,11 @@ def _guess(profile: Profile) -> Callable[[Orientation], float]:
     return cost_mm2
 
 
-def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float | None:
-    """Seconds that a mesh in one piece takes without any support, which hardly any decomposition goes below; None where it cannot
-    be printed so."""
+def _price_bare(mesh: Mesh, profile: Profile, pricing: PricingBy) -> Price | None:
+    """What a mesh in one piece takes without any support, which hardly any decomposition goes below; None where it cannot be
+    printed so."""
     bare = profile.model_copy(update={"process": profile.process.model_copy(update={"support": "none"})})
-    price = pricing(bare)((one_piece(mesh, profile.machine),))
-    return None if price is None else price.time_s
+    return pricing(bare)((one_piece(mesh, profile.machine),))
 
 
 def _with_search(profile: Profile, **settings: object) -> Profile:

@@ -29,7 +29,7 @@ from mdp.ranking.candidates import (
     residual_mm2,
     score_candidates,
 )
-from mdp.search.front import price_of_second_mm2
+from mdp.search.front import Worth
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
@@ -71,7 +71,7 @@ class Problem:
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.platform_disc = platform_disc(mesh, settings)
-        self.second_mm2 = price_of_second_mm2(profile)
+        self.worth = Worth.of(profile)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         savable_mm2 = self._savable_mm2()
         self.least_gain_mm2 = settings.least_gain * savable_mm2

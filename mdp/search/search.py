@@ -114,7 +114,7 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
     if price is not None:
         pairs = zip(rows, nodes, pays(rows), strict=True)
         rows = [price_row(row, parts_of(node), price) if good else row for row, node, good in pairs]
-    choice = choose(rows, problem.second_mm2, problem.settings.most_longer)
+    choice = choose(rows, problem.worth, problem.settings.most_longer)
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:

@@ -10,12 +10,14 @@ from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
 from machine.program import Alternative, Program
 from machine.quantities import duration, filament_g
+from mdp.cost.cost import weight_of_stairs
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level, rotation
+from mdp.stairs import step_shares
 from profiles.errors import UserError
 from profiles.profile import Profile
 from slicer.paths import Kind
@@ -94,7 +96,9 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
     filament_mm = float(np.max(run.program.filament_mm, initial=0.0))
     supports = [place for place, kind in enumerate(run.program.types) if kind in SUPPORT]
     support_mm3 = float(run.segment_mm3[np.isin(run.program.type[run.segment_row], supports)].sum())
-    seam_mm = 0.0 if program.decomposition is None else program.decomposition.seam_mm
+    seam_mm, stairs_mm2 = 0.0, 0.0
+    if program.decomposition is not None:
+        seam_mm, stairs_mm2 = program.decomposition.seam_mm, _stairs_mm2(program.decomposition, profile)
     return replace(
         way,
         time_s=run.time_s,
@@ -105,9 +109,18 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
         message=run.errors[0].message if run.errors else "",
         unsupported_mm2=sum(place.mm2 for place in run.program.unsupported),
         seam_mm=seam_mm,
+        stairs_mm2=stairs_mm2,
         interface_mm3=program.interface_mm3,
         findings=len(run.findings),
     )
+
+
+def _stairs_mm2(decomposition: Decomposition, profile: Profile) -> float:
+    """What the stairs of a decomposition count; of one that comes from no search, which is in one piece, those of its surface."""
+    if decomposition.chosen is not None:
+        return decomposition.stairs_mm2
+    mesh, direction = decomposition.mesh, decomposition.parts[0].direction
+    return weight_of_stairs(profile) * float(mesh.areas_mm2 @ step_shares(mesh.normals @ direction))
 
 
 def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, Any]]:
@@ -123,6 +136,7 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
             "support_area_mm2": alternative.risky_mm2,
             "unsupported_area_mm2": alternative.unsupported_mm2,
             "seam_mm": alternative.seam_mm,
+            "stairs_mm2": alternative.stairs_mm2,
             "findings": alternative.findings,
             "interfaces": [{"part": part, "plastic_mm3": mm3} for part, mm3 in alternative.interface_mm3.items()],
             "message": alternative.message,

@@ -34,7 +34,7 @@ from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
 from mdp.read import locate, read_mesh
 from mdp.search.by_plan import cut_by_plan
-from mdp.search.front import price_of_second_mm2
+from mdp.search.front import Worth
 from mdp.search.laying import lay_down
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
@@ -107,7 +107,7 @@ class _Search:
     def __init__(self, request: ModelRequest, given: PlanFile | None, prices_unused: bool, report: Report) -> None:
         self._request, self._given, self._report = request, given, report
         cuts, profile = request.cuts, request.profile.of_all_parts
-        free = cuts.plan is not None or cuts.parts is not None or price_of_second_mm2(profile) <= 0.0
+        free = cuts.plan is not None or cuts.parts is not None or not Worth.of(profile)
         self._price = None if prices_unused and free else pricing(profile)
         self._records: list[tuple[Decomposition, list[bytes]]] = []
 

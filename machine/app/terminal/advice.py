@@ -6,7 +6,7 @@ from machine.app.terminal.report import estimates, table
 from machine.quantities import minutes
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words, side_in_words
-from mdp.search.front import ASKED, BY_PLAN, choose, price_of_second_mm2
+from mdp.search.front import ASKED, BY_PLAN, Worth, choose
 from mdp.search.laying import Lying
 from profiles.profile import Profile
 
@@ -50,7 +50,7 @@ def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
     chosen, front = decomposition.chosen, decomposition.front
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen
-    return front[choose(front, price_of_second_mm2(profile), profile.search.most_longer).place]
+    return front[choose(front, Worth.of(profile), profile.search.most_longer).place]
 
 
 def _without_front(decomposition: Decomposition) -> list[FrontRow]:
@@ -64,9 +64,11 @@ def _without_front(decomposition: Decomposition) -> list[FrontRow]:
 def _ways_table(ways: Sequence[tuple[str, FrontRow]]) -> str:
     """Each way with what needs support then, how much less that is than in the first one, its seams, time and filament."""
     first_mm2 = ways[0][1].support_area_mm2
-    rows = [["print it", "support mm2", "less", "seams mm", "about", "filament m"]]
+    rows = [["print it", "support mm2", "less", "seams mm", "stairs mm2", "about", "filament m"]]
     for place, (name, row) in enumerate(ways):
         less = 1.0 - row.support_area_mm2 / first_mm2 if first_mm2 > 0.0 else 0.0
         share = f"{round(100 * less, 1) + 0.0:.1f} %" if place else ""
-        rows.append([name, f"{max(row.support_area_mm2, 0.0):.1f}", share, f"{row.seam_mm:.0f}", *estimates(row)])
+        rows.append(
+            [name, f"{max(row.support_area_mm2, 0.0):.1f}", share, f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", *estimates(row)]
+        )
     return table(rows)

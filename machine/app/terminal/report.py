@@ -45,9 +45,16 @@ def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_pla
 
 def front_table(front: Sequence[FrontRow]) -> str:
     """The best decomposition for every number of parts, the one taken marked and why."""
-    rows = [["in parts", "needs support mm2", "seams mm", "costs mm2", "about", "filament m"]]
+    rows = [["in parts", "needs support mm2", "seams mm", "stairs mm2", "costs mm2", "about", "filament m"]]
     rows += [
-        [str(row.parts), _number(row.support_area_mm2), f"{row.seam_mm:.0f}", _number(row.cost_mm2), *estimates(row)]
+        [
+            str(row.parts),
+            _number(row.support_area_mm2),
+            f"{row.seam_mm:.0f}",
+            f"{row.stairs_mm2:.0f}",
+            _number(row.cost_mm2),
+            *estimates(row),
+        ]
         for row in front
     ]
     head, *lines = table(rows).splitlines()

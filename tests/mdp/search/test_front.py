@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
-from mdp.search.front import choose, pays, price_of_second_mm2
+from mdp.search.front import Worth, choose, pays
 from profiles.profile import load
 
 PLANE = Plane(np.array([0.0, 0.0, 1.0]), 5.0)
@@ -27,7 +27,7 @@ BUNNY = front((1885.0, 10529.0), (1771.0, 10751.0), (1495.0, 11350.0), (1384.0, 
 
 @pytest.mark.parametrize(("second_mm2", "parts"), [(0.0, 4), (0.1, 4), (0.3, 3), (0.45, 2), (0.6, 1), (100.0, 1)])
 def test_the_dearer_a_second_the_fewer_the_parts_that_take_long(second_mm2: float, parts: int) -> None:
-    assert choose(BUNNY, second_mm2).place + 1 == parts
+    assert choose(BUNNY, Worth(second_mm2)).place + 1 == parts
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
@@ -37,23 +37,23 @@ def test_where_time_is_free_the_fewest_parts_are_taken_that_are_within_one_perce
     rows = front(*values)
     least_mm2 = min(row.cost_mm2 for row in rows)
     limit_mm2 = least_mm2 + 0.01 * rows[0].cost_mm2
-    assert choose(rows, 0.0).place == next(place for place, row in enumerate(rows) if row.cost_mm2 <= limit_mm2)
+    assert choose(rows, Worth(0.0)).place == next(place for place, row in enumerate(rows) if row.cost_mm2 <= limit_mm2)
 
 
 def test_a_small_part_that_saves_next_to_nothing_is_not_cut_off() -> None:
-    assert choose(front((640.0, None), (336.0, None), (331.0, None)), 0.0).place == 1
+    assert choose(front((640.0, None), (336.0, None), (331.0, None)), Worth(0.0)).place == 1
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
 def test_where_only_time_counts_the_fastest_row_that_saves_scars_is_taken(values: list[tuple[float, float]]) -> None:
     rows = front(*values)
     fastest_s = min(row.time_s or 0.0 for row, good in zip(rows, pays(rows), strict=True) if good)
-    assert (rows[choose(rows, 1e9).place].time_s or 0.0) - fastest_s <= 1e-3
+    assert (rows[choose(rows, Worth(1e9)).place].time_s or 0.0) - fastest_s <= 1e-3
 
 
 @pytest.mark.parametrize(("most_longer", "parts"), [(0.0, 1), (0.05, 2), (0.1, 3), (0.2, 4)])
 def test_what_takes_much_longer_than_one_piece_is_told_and_not_taken(most_longer: float, parts: int) -> None:
-    choice = choose(BUNNY, 0.1, most_longer)
+    choice = choose(BUNNY, Worth(0.1), most_longer)
     assert choice.place + 1 == parts
     assert bool(choice.note) == (parts < 4)
 
@@ -61,26 +61,26 @@ def test_what_takes_much_longer_than_one_piece_is_told_and_not_taken(most_longer
 def test_what_takes_much_more_filament_is_told_and_not_taken_however_fast() -> None:
     rows = front((1000.0, 900.0), (500.0, 800.0))
     rows = [replace(row, filament_mm=filament_mm) for row, filament_mm in zip(rows, (10_000.0, 12_000.0), strict=True)]
-    choice = choose(rows, 0.5, 0.05)
+    choice = choose(rows, Worth(0.5), 0.05)
     assert choice.place == 0
     assert choice.note == ("2 parts would save 500 mm2 of scars but take 2.0 m more filament: --parts 2",)
 
 
 def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fast() -> None:
-    assert choose(front((100.0, 900.0), (120.0, 1.0)), 1.0).place == 0
+    assert choose(front((100.0, 900.0), (120.0, 1.0)), Worth(1.0)).place == 0
 
 
 def test_a_row_that_cannot_be_printed_is_not_taken_while_another_one_can() -> None:
     rows = front((200.0, 900.0), (100.0, None))
-    assert [choose(rows, second_mm2).place for second_mm2 in (0.0, 1.0)] == [0, 0]
-    assert choose(front((200.0, None), (100.0, None)), 1.0).place == 1
+    assert [choose(rows, Worth(second_mm2)).place for second_mm2 in (0.0, 1.0)] == [0, 0]
+    assert choose(front((200.0, None), (100.0, None)), Worth(1.0)).place == 1
 
 
 def test_what_is_given_up_for_time_is_told_with_figures() -> None:
-    choice = choose(BUNNY, 1.0)
+    choice = choose(BUNNY, Worth(1.0))
     assert choice.reason == "the least cost with its time"
     assert choice.note == ("4 parts would save 501 mm2 of scars but take 24 min longer: --parts 4",)
-    assert choose(BUNNY, 0.0).note == ()
+    assert choose(BUNNY, Worth(0.0)).note == ()
 
 
 @pytest.mark.parametrize(
@@ -93,5 +93,14 @@ def test_what_is_given_up_for_time_is_told_with_figures() -> None:
         ("search.seam_mm=0", 0.0),
     ],
 )
-def test_seconds_count_where_scars_do_and_support_is_printed(setting: str, price: float) -> None:
-    assert price_of_second_mm2(load(settings=["search.second_mm2=0.3", setting])) == price
+def test_seconds_and_filament_count_where_scars_do_and_support_is_printed(setting: str, price: float) -> None:
+    worth = Worth.of(load(settings=["search.second_mm2=0.3", "search.metre_mm2=40", setting]))
+    assert worth == Worth(price, 0.04 * (price > 0.0))
+
+
+def test_of_two_rows_that_take_as_long_the_one_with_less_filament_is_taken_where_filament_is_dear() -> None:
+    rows = [
+        replace(row, filament_mm=filament_mm)
+        for row, filament_mm in zip(front((100.0, 60.0), (90.0, 60.0)), (4e3, 5e3), strict=True)
+    ]
+    assert [choose(rows, Worth(0.5, filament_mm2)).place for filament_mm2 in (0.0, 0.05)] == [1, 0]

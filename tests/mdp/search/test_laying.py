@@ -10,7 +10,7 @@ from mdp.decomposition import Part
 from mdp.directions.orientation import measure_upright, side_in_words, standing_still
 from mdp.mesh import Mesh
 from mdp.pose import about
-from mdp.search.front import Price, Pricing
+from mdp.search.front import Price, Pricing, Worth
 from mdp.search.laying import Lying, distinct_orientations, lay_down, total_mm2
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
@@ -41,7 +41,7 @@ def test_a_tee_is_laid_on_its_side_where_nothing_needs_support() -> None:
     found = laid_down(tee())
     assert found.orientation is not None
     assert (len(found.decomposition.parts), found.decomposition.cost_mm2) == (1, 0.0)
-    assert found.total_mm2 == pytest.approx(0.5 * 10.0 * 10.0)
+    assert found.total_mm2 == pytest.approx(0.5 * 10.0 * 10.0 + 50.0)  # 100 s and a metre
 
 
 def test_what_lies_best_stays_as_it_stands() -> None:
@@ -51,13 +51,13 @@ def test_what_lies_best_stays_as_it_stands() -> None:
 @pytest.mark.parametrize("mesh", [tee(), branch(), box(10, 20, 60)], ids=["tee", "branch", "box"])
 def test_laid_down_it_costs_no_more_than_as_it_stands(mesh: Mesh) -> None:
     upright = decompose(mesh, "mesh", PROFILE, price=by_height(PROFILE))
-    assert laid_down(mesh).total_mm2 <= total_mm2(upright.chosen, 0.5)
+    assert laid_down(mesh).total_mm2 <= total_mm2(upright.chosen, Worth.of(PROFILE))
 
 
 def test_a_model_stays_where_turning_it_saves_less_than_is_asked_for() -> None:
     standing = laid_down(tee())
     assert standing.standing is not None
-    saved_mm2 = total_mm2(standing.standing, 0.5) - standing.total_mm2
+    saved_mm2 = total_mm2(standing.standing, Worth.of(PROFILE)) - standing.total_mm2
     for turning_mm2, turned in ((saved_mm2 - 1.0, True), (saved_mm2 + 1.0, False)):
         profile = load(settings=["search.directions=20", "search.polish=false", f"search.turning_mm2={turning_mm2}"])
         search = partial(decompose, name="mesh", profile=profile, price=by_height(profile))

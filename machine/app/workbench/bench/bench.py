@@ -17,8 +17,8 @@ from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
 from mdp.overhang import UP
-from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow
-from mdp.search.front import choose, pays, price_of_second_mm2
+from mdp.plans.plan_file import PlanFile, PlannedPart, planned_row
+from mdp.search.front import Worth, choose, pays
 from mdp.zone import NO_ZONES, Zones
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
@@ -260,7 +260,7 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
     ]
     if not bench.recommended:
         return replace(bench, rows=tuple(rows), priced=True)
-    choice = choose(rows, price_of_second_mm2(bench.profile), bench.profile.search.most_longer)
+    choice = choose(rows, Worth.of(bench.profile), bench.profile.search.most_longer)
     marked = [
         replace(row, chosen=place == choice.place, reason=choice.reason if place == choice.place else "")
         for place, row in enumerate(rows)
@@ -288,7 +288,7 @@ def parts_of(row: FrontRow) -> tuple[PlannedPart, ...]:
 
 def plan_of_bench(bench: Bench, name: str) -> PlanFile:
     """What is to be cut, as a plan's file says it. The model is the one on the bench, so it needs no sha256."""
-    rows = tuple(PlannedRow(parts_of(row), row.support_area_mm2, row.seam_mm, row.cost_mm2) for row in bench.rows)
+    rows = tuple(planned_row(parts_of(row), row) for row in bench.rows)
     orientation = None if bench.rotation == STANDING else bench.rotation
     model = "" if bench.model is None else bench.model.name
     return PlanFile(name, model, "", orientation, bench.cuts or (), bench.zones, rows, tuple(bench.profile.parts))

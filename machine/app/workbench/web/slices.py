@@ -24,6 +24,7 @@ def slices_state(session: Session) -> dict[str, Any]:
                 "support_mm3": alternative.support_mm3,
                 "support_area_mm2": alternative.risky_mm2,
                 "seam_mm": alternative.seam_mm,
+                "stairs_mm2": alternative.stairs_mm2,
                 "findings": alternative.findings,
             }
             for alternative in session.comparing.rows()

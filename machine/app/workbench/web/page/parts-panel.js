@@ -84,7 +84,7 @@ function tellRow(row, { recommended, parts, cuts, priced }) {
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
     ["parts", `${row.parts}${byHand ? ", changed by hand since; this is how they were found" : best ? ` (recommended: ${row.why})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
-    ["seams", `${row.seam_mm.toFixed(0)} mm`], ["takes about", orDash(row.time_s, roughly)],
+    ["seams", `${row.seam_mm.toFixed(0)} mm`], ["stairs", mm2(row.stairs_mm2)], ["takes about", orDash(row.time_s, roughly)],
     ["plastic", orDash(row.filament_mm, (long) => `${(long / 1000).toFixed(1)} m`)],
   ]);
 }

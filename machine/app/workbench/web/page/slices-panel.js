@@ -83,6 +83,7 @@ const COSTS = [
   ["of it support", ({ support_mm3: volume }) => `${(volume / 1000).toFixed(2)} cm³`],
   ["scars of support", ({ support_area_mm2: area }) => mm2(area)],
   ["seams between parts", ({ seam_mm: long }) => `${long.toFixed(0)} mm`],
+  ["stairs", ({ stairs_mm2: area }) => mm2(area)],
   ["findings", ({ findings }) => `${findings}`],
 ];
 
