@@ -15,6 +15,7 @@ OF_SEAMS = {
     "hidden_seam_share": 1.0,
     "stair_weight": 0.0,
     "feature_weight": 1.0,
+    "feature_mm2": 0.0,
 }
 
 
@@ -94,6 +95,13 @@ class Search(Frozen):
         ge=1,
         le=1000,
         description="how many times a seam counts across a bore or pin, where a ridge spoils a fit; 1: as elsewhere",
+    )
+    feature_mm2: float = Field(
+        500.0,
+        ge=0,
+        le=1e5,
+        description="what it costs beside its seam that a cut passes askew through a bore or pin, which then holds and guides "
+        "nothing, mm2; one across its axis leaves it round and costs nothing",
     )
     unsupportable_weight: float = Field(
         5.0,

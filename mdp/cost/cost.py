@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.cost.cylinders import Cylinder, find_cylinders
 from mdp.cost.hidden import hidden_shares
 from mdp.cost.model_need import MADE_BY_A_CUT, ModelNeed, ModelSurface, Piece
 from mdp.cut import Solid
 from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import standing
 from mdp.plane import Plane
-from mdp.sweep.rims import ROUNDING_MM, Rim, measure_rim
+from mdp.sweep.cylinders import Cylinder
+from mdp.sweep.rims import Rim, measure_rim
 from mdp.zone import NOWHERE, ZonesOnModel
 from profiles.profile import Profile
 
@@ -36,23 +36,28 @@ class SeamPlaces:
 
     @classmethod
     def of(
-        cls, surface: ModelSurface, solid: Solid, hidden_share: float, zones: ZonesOnModel = NOWHERE, feature_weight: float = 1.0
+        cls,
+        surface: ModelSurface,
+        solid: Solid,
+        hidden_share: float,
+        zones: ZonesOnModel = NOWHERE,
+        *,
+        cylinders: tuple[Cylinder, ...] = (),
+        feature_weight: float = 1.0,
     ) -> "SeamPlaces":
         """The places of an uncut model; hidden_share: how much a rim counts where it is hidden altogether, feature_weight: on a
         bore or pin, hidden or not, 1: they are not looked for."""
         whole = surface.piece(solid)
         hidden = hidden_shares(whole.mesh) if hidden_share < 1.0 else np.zeros(len(whole.sources))
         by_source = 1.0 - (1.0 - hidden_share) * surface.by_source(whole, hidden)
-        cylinders = tuple(find_cylinders(surface.mesh)) if feature_weight != 1.0 else ()
         for cylinder in cylinders:
             by_source[cylinder.faces] = feature_weight
         return cls(surface, by_source, zones, cylinders)
 
-    def crossed(self, piece: Piece, plane: Plane) -> list[Cylinder]:
-        """The bores and pins that a plane cuts of what cuts have left of the model."""
-        heights = plane.heights_mm(piece.mesh.vertices)[piece.mesh.faces]
-        cut = piece.sources[(heights.min(axis=1) < -ROUNDING_MM) & (heights.max(axis=1) > ROUNDING_MM)]
-        return [cylinder for cylinder in self.cylinders if np.isin(cut, cylinder.faces).any()]
+    def cylinders_of(self, piece: Piece) -> tuple[Cylinder, ...]:
+        """The bores and pins of which cuts have left something."""
+        left = np.unique(piece.sources) if self.cylinders else piece.sources[:0]
+        return tuple(cylinder for cylinder in self.cylinders if np.isin(cylinder.faces, left, assume_unique=True).any())
 
     def weights(self, piece: Piece) -> Floats:
         """(m,) how much a mm of rim counts on each face of what cuts have left of the model: 0 on faces that they laid open,
@@ -66,8 +71,8 @@ class SeamPlaces:
 class CostTerms:
     """What a search counts, as it holds. seam_mm: width of the scar along a rim, 0: seams cost nothing; feather: by how much
     more a rim counts where face and plane meet at a small angle; cut_mm2: what a cut costs beside its seam; stair_weight: how
-    much an area counts whose steps are as high as a layer; need: what needs support, None: every face that overhangs, the
-    paper's terms."""
+    much an area counts whose steps are as high as a layer; feature_mm2: what it costs to cut a bore or pin askew; need: what
+    needs support, None: every face that overhangs, the paper's terms."""
 
     angle_deg: float
     count_platform_faces: bool
@@ -75,17 +80,19 @@ class CostTerms:
     feather: float = 0.0
     cut_mm2: float = 0.0
     stair_weight: float = 0.0
+    feature_mm2: float = 0.0
     need: ModelNeed | None = None
 
 
 class CutCost(NamedTuple):
     """What a cut costs for ever: the area that stays risky on its part, the part's stairs, the scar of its seam, and that it is
     made; lost_mm2: what of it the cut has made worse, all but the stairs that the part had before, too; stairs_mm2: what of it
-    are stairs."""
+    are stairs, seam_mm2: the scar of its seam, with the bores that it crosses, and that it is made."""
 
     residual_mm2: float
     lost_mm2: float
     stairs_mm2: float = 0.0
+    seam_mm2: float = 0.0
 
 
 def weight_of_stairs(profile: Profile) -> float:

@@ -21,6 +21,7 @@ from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
 from mdp.stairs import step_share
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
+from mdp.sweep.cylinders import crossings
 from mdp.sweep.rims import ROUNDING_MM, weigh_chord
 from mdp.sweep.sweep import Remainder
 
@@ -83,7 +84,7 @@ class Surface:
 
     remainder: Remainder
     faces: Faces
-    cut_mm2: float
+    terms: CostTerms
 
     @classmethod
     def of(cls, remainder: Remainder, terms: CostTerms) -> "Surface":
@@ -94,7 +95,7 @@ class Surface:
         if weights is not None:
             chosen = np.ones(count, dtype=np.bool_)
         seam_mm2 = np.zeros(count) if weights is None else terms.seam_mm * weights
-        return cls(remainder, faces_of(remainder, terms, seam_mm2, chosen), terms.cut_mm2)
+        return cls(remainder, faces_of(remainder, terms, seam_mm2, chosen), terms)
 
     def classes(self, planes: Sequence[Plane]) -> Classes:
         """(k, n) what the faces of the model need along the planes' normals."""
@@ -107,7 +108,16 @@ class Surface:
         classes: those of planes that lean a little otherwise; absent: the planes' own.
         """
         needs = self.classes(planes) if classes is None else classes
-        return _sum_left(self.faces, planes_of(planes), needs) + self.cut_mm2 * len(planes)
+        cuts_mm2 = self.terms.cut_mm2 * len(planes) + self._crossed_mm2(planes)
+        return _sum_left(self.faces, planes_of(planes), needs) + cuts_mm2
+
+    def _crossed_mm2(self, planes: Sequence[Plane]) -> float:
+        """What it costs that bores and pins are cut askew, each as long as something of it is left."""
+        left, crossed = self.remainder.cylinders if self.terms.feature_mm2 > 0.0 else (), 0.0
+        for plane in planes:
+            crossed += float(crossings(left, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])
+            left = tuple(cylinder for cylinder in left if cylinder.reaches_below(plane))
+        return self.terms.feature_mm2 * crossed
 
 
 @kernel

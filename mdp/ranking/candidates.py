@@ -123,7 +123,7 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 class ScoredCandidates:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
     not known yet. direction is a row of Bounds.directions; above_mm2: what is risky above the plane printed straight up;
-    residual_mm2, lost_mm2, stairs_mm2: see CutCost; seam_mm2: what of both is the cut's seam; hopeless_mm2: what of both no cut
+    residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; hopeless_mm2: what of the first two no cut
     can save, 0 where that was not asked for; end_mm: offset of the last plane along the direction; evaluated counts all planes
     looked at."""
 
@@ -142,7 +142,8 @@ class ScoredCandidates:
 
     def cost(self, row: int) -> CutCost:
         """What the cut of a row costs."""
-        return CutCost(float(self.residual_mm2[row]), float(self.lost_mm2[row]), float(self.stairs_mm2[row]))
+        costs = (self.residual_mm2, self.lost_mm2, self.stairs_mm2, self.seam_mm2)
+        return CutCost(*(float(cost[row]) for cost in costs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +185,7 @@ def score_candidates(
         residual_mm2=residual[scored],
         lost_mm2=lost_mm2(swept, residual)[scored],
         stairs_mm2=swept.stairs_mm2[scored],
-        seam_mm2=_seam_mm2(swept, terms)[scored],
+        seam_mm2=seam_mm2(swept, terms)[scored],
         hopeless_mm2=swept.hopeless_mm2[scored],
         end_mm=end,
         evaluated=int(swept.columns.sum()),
@@ -193,7 +194,7 @@ def score_candidates(
 
 def residual_mm2(swept: Gains, terms: CostTerms) -> Floats:
     """What each cut costs for ever, see CutCost."""
-    return swept.residual_mm2 + swept.stairs_mm2 + _seam_mm2(swept, terms)
+    return swept.residual_mm2 + swept.stairs_mm2 + seam_mm2(swept, terms)
 
 
 def lost_mm2(swept: Gains, residual_mm2: Floats) -> Floats:
@@ -207,9 +208,9 @@ def gain_mm2(swept: Gains, residual_mm2: Floats) -> Floats:
     return swept.up_mm2 + swept.stairs_up_mm2 - residual_mm2
 
 
-def _seam_mm2(swept: Gains, terms: CostTerms) -> Floats:
-    """The scar of each cut's seam, and that it is made."""
-    return terms.seam_mm * swept.rim_mm + terms.cut_mm2
+def seam_mm2(swept: Gains, terms: CostTerms) -> Floats:
+    """The scar of each cut's seam, the bores that it cuts askew, and that it is made."""
+    return terms.seam_mm * swept.rim_mm + terms.feature_mm2 * swept.crossed + terms.cut_mm2
 
 
 def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Feasibility:

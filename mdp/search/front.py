@@ -68,7 +68,7 @@ class Front:
 def front_row(node: Node) -> FrontRow:
     """A node with what it costs, the cuts apart. Every area counts once in the area that needs support."""
     terms, seams = node.terms, node.seams
-    scars_mm2 = sum(terms.seam_mm * seam.weighted_mm + terms.cut_mm2 for seam in seams)
+    scars_mm2 = sum(cut.cost.seam_mm2 for cut in node.cuts)
     seam_mm = sum((seam.length_mm for seam in seams), 0.0)
     planes = tuple(cut.base for cut in node.cuts)
     over_mm2 = 0.0 if terms.need is None else _excess_mm2(node) + (node.remainder.risky_mm2 - _plain_mm2(node))

@@ -48,10 +48,11 @@ class Node:
         mesh, terms = self.piece.mesh, self.terms
         weights = self.seam_weights if terms.seam_mm > 0.0 else None
         risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
+        stairs = stair_weights(self.piece, terms.stair_weight)
         pieces = None if terms.need is None else terms.need.pieces(self.piece)
         if pieces is not None:
             risky = risky & pieces.upright
-        return Remainder(mesh, risky, weights, terms.feather, pieces, stair_weights(self.piece, terms.stair_weight))
+        return Remainder(mesh, risky, weights, terms.feather, pieces, stairs, self.places.cylinders_of(self.piece))
 
     @cached_property
     def seam_weights(self) -> Floats:

@@ -28,11 +28,13 @@ from mdp.ranking.candidates import (
     refusals,
     residual_mm2,
     score_candidates,
+    seam_mm2,
 )
 from mdp.search.front import Worth
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
+from mdp.sweep.cylinders import find_cylinders
 from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.sweep import gains
 from mdp.zone import NO_ZONES, Zones
@@ -64,9 +66,17 @@ class Problem:
             feather=settings.feather_weight,
             cut_mm2=settings.cut_mm2,
             stair_weight=weight_of_stairs(profile),
+            feature_mm2=settings.feature_mm2,
             need=need,
         )
-        places = SeamPlaces.of(surface, solid, settings.hidden_seam_share, self.zones, settings.feature_weight)
+        places = SeamPlaces.of(
+            surface,
+            solid,
+            settings.hidden_seam_share,
+            self.zones,
+            cylinders=find_cylinders(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else (),
+            feature_weight=settings.feature_weight,
+        )
         self.root = self.start = Node(solid, (), self.terms, places)
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
@@ -228,7 +238,8 @@ class Problem:
         swept = gains(node.remainder, plane.normal[None], step_mm, threshold(self.terms.angle_deg))
         column = round(plane.offset_mm / step_mm) - int(swept.first[0])
         residual = residual_mm2(swept, self.terms)
-        return CutCost(*(float(cost[0, column]) for cost in (residual, lost_mm2(swept, residual), swept.stairs_mm2)))
+        costs = (residual, lost_mm2(swept, residual), swept.stairs_mm2, seam_mm2(swept, self.terms))
+        return CutCost(*(float(cost[0, column]) for cost in costs))
 
     def step_mm(self, offset_mm: float) -> float:
         """Step of a grid of offsets that an offset lies on, near that of the candidates' grid."""

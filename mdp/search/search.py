@@ -193,10 +193,11 @@ def _feature_notes(node: Node) -> tuple[str, ...]:
     """The bores and pins that the seams of parts cross."""
     notes, step = [], node
     while step.parent is not None:
-        crossed = step.places.crossed(step.parent.piece, step.cuts[-1].base)
+        plane, before = step.cuts[-1].base, step.parent.remainder.cylinders
+        crossed = [cylinder for cylinder in before if cylinder.is_crossed(plane)]
         if crossed:
             names = ", ".join(dict.fromkeys(cylinder.in_words for cylinder in crossed))
-            notes.append(f"part {len(node.cuts) - len(step.cuts) + 2}: its seam crosses {names}")
+            notes.append(f"part {len(node.cuts) - len(step.cuts) + 2}: it is cut askew through {names}")
         step = step.parent
     return tuple(notes)
 

@@ -43,6 +43,7 @@ from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import Classes
 from mdp.sweep.components import UNKNOWN, Topology, View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
+from mdp.sweep.cylinders import Cylinder, crossings
 from mdp.sweep.facets import Facets, Rows, lay_out
 from mdp.sweep.integrals import (
     Areas,
@@ -65,8 +66,8 @@ class Gains(NamedTuple):
     up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
     direction, weighted by what support each face needs; rim_mm: weighted length of the rim that a cut leaves, 0 where the
     remainder counts no seams; hopeless_mm2: risky area above it that no cut can save, 0 where that was not asked for;
-    stairs_up_mm2, stairs_mm2: what the stairs above it count printed straight up and along the direction, 0 where the remainder
-    counts none.
+    stairs_up_mm2, stairs_mm2: what the stairs above it count printed straight up and along the direction, crossed: how many
+    cylinders it cuts askew; 0 where the remainder counts none.
     """
 
     first: Ints
@@ -77,6 +78,7 @@ class Gains(NamedTuple):
     hopeless_mm2: Floats
     stairs_up_mm2: Floats
     stairs_mm2: Floats
+    crossed: Floats
 
     @property
     def used(self) -> Mask:
@@ -123,7 +125,8 @@ class Remainder:
     """What the sweep needs to know of a solid, made once for all directions: its mesh, which faces are risky upright, and how
     much a mm of a seam's rim counts on each face (m,), feather edges more; None: seams do not count. pieces: of which faces of
     the model its own are pieces; None: every risky face needs support. stair_weights: (m,) how much an area on each face counts
-    whose steps are as high as a layer; None: stairs do not count, nor do they where seams do not."""
+    whose steps are as high as a layer; None: stairs do not count, nor do they where seams do not. cylinders: bores and pins that
+    are not to be cut askew."""
 
     mesh: Mesh
     risky: Mask
@@ -131,6 +134,7 @@ class Remainder:
     feather: float = 0.0
     pieces: ModelPieces | None = None
     stair_weights: Floats | None = None
+    cylinders: tuple[Cylinder, ...] = ()
 
     @property
     def sources(self) -> Ints:
@@ -236,7 +240,7 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     surface = Overhangs(facets.points, facets.corners, facets.normals, facets.counted_mm2, facets.risky, risky_below, lost)
     shape = (len(directions), remainder.most_columns(step_mm))
     columns = np.zeros((2, shape[0]), np.int32)
-    swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(6)))
+    swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(7)))
     rims = Rims(
         corners=facets.corners,
         normals=facets.normals,
@@ -248,6 +252,8 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     )
     needs = NeedsTable(facets.sources, remainder.classes(directions), remainder.weight)
     in_threads(_gains, shape[0], Scars(surface, needs, rims), np.ascontiguousarray(directions), step_mm, swept)
+    if remainder.cylinders:
+        swept.crossed[:] = crossings(remainder.cylinders, directions, swept.offsets_mm(step_mm))
     return swept
 
 

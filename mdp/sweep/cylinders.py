@@ -10,6 +10,7 @@ of the strips follows the radius: strips of the same width w that fold by an ang
     /                     \\         all of them (Kasa 1976) tells whether it is one
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, radians
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Indices, Ints, Mesh
+from mdp.plane import Plane
 from mdp.topology.components import connected_components
 from mdp.topology.linked_faces import opposites
 
@@ -24,6 +26,11 @@ from mdp.topology.linked_faces import opposites
 LEAST_FOLD, MOST_FOLD = cos(radians(0.4)), cos(radians(46.0))
 PARALLEL = cos(radians(1.0))
 SAME_RADIUS = 1.25  # greatest ratio of two radii told by edges of one strip: strips are as wide as each other to a quarter
+LEAST_ASKEW = 0.05  # sine of some 3 degrees
+TOUCHED_MM = 0.05  # a plane that reaches no further into a cylinder leaves it as it is
+MOST_FACES = 200  # of a strip; one that is cut by other bores has some, a wall or a plate many
+SMOOTH = cos(radians(20.0))  # of the folds between the pieces of a bent pipe, and beside a band of a round surface
+SHORT = 0.15  # of the radius: a hole in a thin sheet is shorter, too, but its rims are sharp
 FEWEST = 4  # edges between strips: fewer are a chamfer or a fillet of three facets
 OFF_CIRCLE = 0.02  # of the radius: the corners of a cylinder lie on it up to the rounding of a file
 LEAST_TURN_DEG = 100.0  # that the strips go around: a quarter is a rounded edge, which needs no fit
@@ -36,19 +43,31 @@ LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = (
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
-    """A bore or a pin: unit axis (3,), a point on it (3,), radius, whether the material lies around it, and (k,) its faces."""
+    """A bore or a pin: unit axis (3,), the middle of it (3,), radius, half its length, whether the material lies around it, and
+    (k,) its faces."""
 
     axis: Floats
-    point: Floats
+    middle: Floats
     radius_mm: float
+    half_mm: float
     is_bore: bool
     faces: Ints
+
+    def is_crossed(self, plane: Plane) -> bool:
+        """Whether a plane cuts it more askew than a layer would show."""
+        return float(crossings([self], plane.normal[None], np.array([[plane.offset_mm]]))[0, 0]) > LEAST_ASKEW
+
+    def reaches_below(self, plane: Plane) -> bool:
+        """Whether something of it lies below a plane."""
+        cosine = abs(float(plane.normal @ self.axis))
+        reach_mm = self.half_mm * cosine + self.radius_mm * float(np.sqrt(max(1.0 - cosine * cosine, 0.0)))
+        return float(plane.normal @ self.middle) - plane.offset_mm < reach_mm
 
     @property
     def in_words(self) -> str:
         """What it is and how wide.
 
-        >>> Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, True, np.zeros(0, np.int32)).in_words
+        >>> Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, 5.0, True, np.zeros(0, np.int32)).in_words
         'a bore of 8 mm'
         """
         return f"a {'bore' if self.is_bore else 'pin'} of {round(2.0 * self.radius_mm, 1):g} mm"
@@ -66,19 +85,66 @@ class _Folds:
     radius_mm: Floats
 
 
-def find_cylinders(mesh: Mesh) -> list[Cylinder]:
+def crossings(cylinders: Sequence[Cylinder], directions: Floats, offsets_mm: Floats) -> Floats:
+    """(k, n) how many cylinders planes at (k, n) offsets along (k, 3) directions cut askew: each counts the sine of the angle
+    between axis and direction, for cut across its axis it stays round.
+
+    >>> upright = Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, 5.0, True, np.zeros(0, np.int32))
+    >>> crossings([upright], np.array([[1.0, 0, 0], [0, 0, 1]]), np.array([[3.9, 4.1], [4.9, 5.1]])).tolist()
+    [[1.0, 0.0], [0.0, 0.0]]
+    """
+    total = np.zeros(offsets_mm.shape)
+    for cylinder in cylinders:
+        cosines = np.abs(directions @ cylinder.axis)
+        sines = np.sqrt(np.maximum(1.0 - cosines * cosines, 0.0))
+        reach_mm = cylinder.half_mm * cosines + cylinder.radius_mm * sines - TOUCHED_MM
+        total += (np.abs(offsets_mm - (directions @ cylinder.middle)[:, None]) < reach_mm[:, None]) * sines[:, None]
+    return total
+
+
+def find_cylinders(mesh: Mesh) -> tuple[Cylinder, ...]:
     """The cylinders of a closed mesh, the first faces first."""
-    strips, folds = _folds(mesh)
+    neighbours = opposites(mesh.faces).reshape(-1, 3) // 3
+    strips, folds = _folds(mesh, neighbours)
     label = connected_components(len(folds.radius_mm), *_alike(folds))
     order = np.argsort(label, kind="stable")
     rows = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    fitted = [_fit(mesh, strips, folds, row) for row in rows if len(row) >= FEWEST]
-    return sorted((cylinder for cylinder in fitted if cylinder is not None), key=lambda cylinder: int(cylinder.faces.min()))
+    fitted = (_fit(mesh, strips, folds, row) for row in rows if len(row) >= FEWEST)
+    cylinders = [cylinder for cylinder in fitted if cylinder is not None and not _is_band(mesh, neighbours, cylinder)]
+    bent = _bent(mesh, neighbours, cylinders)
+    return tuple(
+        sorted((c for place, c in enumerate(cylinders) if place not in bent), key=lambda cylinder: int(cylinder.faces.min()))
+    )
 
 
-def _folds(mesh: Mesh) -> tuple[Indices, _Folds]:
+def _is_band(mesh: Mesh, neighbours: Ints, cylinder: Cylinder) -> bool:
+    """Whether a short one is but a band of a round surface, which goes on smoothly at its rims."""
+    if 2.0 * cylinder.half_mm > SHORT * cylinder.radius_mm:
+        return False
+    inside = np.isin(neighbours[cylinder.faces], cylinder.faces)
+    row, corner = np.nonzero(~inside)
+    face = cylinder.faces[row]
+    smooth = (mesh.normals[face] * mesh.normals[neighbours[face, corner]]).sum(axis=1) > SMOOTH
+    return float(smooth.mean()) > 0.5
+
+
+def _bent(mesh: Mesh, neighbours: Ints, cylinders: Sequence[Cylinder]) -> set[int]:
+    """Places of the cylinders that another one of their radius goes on from: pieces of a ring or a bent pipe."""
+    owner = np.full(len(mesh.faces), -1, np.int32)
+    for place, cylinder in enumerate(cylinders):
+        owner[cylinder.faces] = place
+    face, corner = np.nonzero((owner >= 0)[:, None] & (owner[neighbours] >= 0) & (owner[neighbours] != owner[:, None]))
+    across = neighbours[face, corner]
+    smooth = (mesh.normals[face] * mesh.normals[across]).sum(axis=1) > SMOOTH
+    radii, axes = np.array([c.radius_mm for c in cylinders]), np.array([c.axis for c in cylinders])
+    here, there = owner[face[smooth]], owner[across[smooth]]
+    alike = (radii[here] < SAME_RADIUS * radii[there]) & (radii[there] < SAME_RADIUS * radii[here]) if len(here) else smooth[:0]
+    turned = np.abs((axes[here] * axes[there]).sum(axis=1)) < PARALLEL if len(here) else smooth[:0]
+    return set(here[alike & turned].tolist())
+
+
+def _folds(mesh: Mesh, neighbours: Ints) -> tuple[Indices, _Folds]:
     """(m,) the strip that each face belongs to, and the edges at which a surface folds as between the strips of a cylinder."""
-    neighbours = opposites(mesh.faces).reshape(-1, 3) // 3
     face, corner = np.nonzero(neighbours >= 0)
     across = neighbours[face, corner]
     once = face < across
@@ -90,11 +156,28 @@ def _folds(mesh: Mesh) -> tuple[Indices, _Folds]:
     start = mesh.vertices[mesh.faces[face, corner]]
     edge = mesh.vertices[mesh.faces[face, (corner + 1) % 3]] - start
     lengths = np.maximum(np.linalg.norm(edge, axis=1), 1e-9)
-    widths = np.stack([mesh.areas_mm2[face], mesh.areas_mm2[across]]) * 2.0 / lengths
+    pairs = np.stack([face, across], axis=1)
+    widths = np.stack([_widths_mm(mesh, strips, side, edge / lengths[:, None]) for side in pairs.T])
     radius_mm = widths.mean(axis=0) / (2.0 * np.sqrt(0.5 * (1.0 - cosines)))
     even = (widths.max(axis=0) < SAME_RADIUS * widths.min(axis=0)) & (radius_mm < 2.0 * MOST_BORE_MM)
-    pairs = np.stack([face, across], axis=1)[even]
+    pairs = pairs[even]
     return strips, _Folds(strips[pairs], pairs, (edge / lengths[:, None])[even], (start + 0.5 * edge)[even], radius_mm[even])
+
+
+def _widths_mm(mesh: Mesh, strips: Indices, face: Indices, along: Floats) -> Floats:
+    """(e,) how wide the strips that faces belong to are across (e, 3) directions along them; infinite where one has too many
+    faces to be a strip."""
+    order, counts = np.argsort(strips, kind="stable"), np.bincount(strips, minlength=len(strips))
+    starts, size = (np.cumsum(counts) - counts)[strips[face]], counts[strips[face]]
+    size = np.where(size <= MOST_FACES, size, 1)
+    row = np.repeat(np.arange(len(face)), size)
+    inside = order[starts[row] + np.arange(len(row)) - np.repeat(np.cumsum(size) - size, size)]
+    across = np.cross(mesh.normals[face], along)
+    heights = np.einsum("fci,fi->fc", mesh.vertices[mesh.faces[inside]], across[row])
+    begins = np.cumsum(size) - size
+    widths = np.maximum.reduceat(heights.max(axis=1), begins) - np.minimum.reduceat(heights.min(axis=1), begins)
+    widths[counts[strips[face]] > MOST_FACES] = np.inf
+    return widths
 
 
 def _alike(folds: _Folds) -> tuple[Indices, Indices]:
@@ -134,4 +217,6 @@ def _fit(mesh: Mesh, strips: Indices, folds: _Folds, rows: Indices) -> Cylinder 
     if len(angles) < FEWEST or 360.0 - gaps.max() + np.median(gaps) < LEAST_TURN_DEG:
         return None
     faces = np.flatnonzero(np.isin(strips, np.unique(folds.strips[rows])))
-    return Cylinder(axis, centre @ across, radius_mm, is_bore, faces.astype(np.int32))
+    along = mesh.vertices[mesh.faces[faces]] @ axis
+    middle = centre @ across + 0.5 * (along.min() + along.max()) * axis
+    return Cylinder(axis, middle, radius_mm, 0.5 * float(np.ptp(along)), is_bore, faces.astype(np.int32))
