@@ -7,6 +7,7 @@ import numpy as np
 from mdp.mesh import Floats
 from mdp.pose import about
 
+DECIMALS = 9  # of an angle that a person can type: what rounding leaves of right angles is gone
 LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
 
 
@@ -29,3 +30,14 @@ def turns_of(rotation: Floats) -> tuple[float, float, float]:
         return 0.0, degrees(asin(sine)), degrees(atan2(-rotation[0, 1], rotation[1, 1])) + 0.0
     x, z = atan2(rotation[2, 1], rotation[2, 2]), atan2(rotation[1, 0], rotation[0, 0])
     return degrees(x) + 0.0, degrees(asin(sine)) + 0.0, degrees(z) + 0.0
+
+
+def turned_further(rotate_deg: tuple[float, float, float], rotation: Floats) -> tuple[float, float, float]:
+    """The process.rotate_deg by which a model is read as it lies when it was read by another one and then turned by a (3, 3)
+    rotation, degrees.
+
+    >>> turned_further((30.0, 0.0, 0.0), turned_by((60.0, 0.0, 0.0)))
+    (90.0, 0.0, 0.0)
+    """
+    x, y, z = (round(angle, DECIMALS) + 0.0 for angle in turns_of(rotation @ turned_by(rotate_deg)))
+    return x, y, z

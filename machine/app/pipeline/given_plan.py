@@ -1,6 +1,8 @@
 """Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
 
 from machine.app.requests import ModelRequest
+from mdp.directions.turns import turned_further
+from mdp.mesh import Floats
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.search.search import check_part_count
@@ -25,10 +27,14 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
 
 
 def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:
-    """Whether it is searched how the model lies: where the user asks for it, or says nothing of it. A plan, turns in the profile
-    and the paper's terms mean the model as it is."""
+    """Whether it is searched how the model lies: where the user asks for it, or nothing says how it lies, as a plan does."""
     if request.orient is not None or given is not None:
         return bool(request.orient) and given is None
+    return lies_freely(profile)
+
+
+def lies_freely(profile: Profile) -> bool:
+    """Whether a profile leaves it open how a model lies; turns and the paper's terms mean it as it is."""
     return profile.search.effective.objective == "scar" and not any(profile.process.rotate_deg)
 
 
@@ -41,6 +47,15 @@ def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
     except ProfileError as error:
         raise PlanError(f"plan {given.name}: {error}") from None
     return with_part_settings(profile, given.settings)
+
+
+def as_it_lies(profile: Profile, orientation: Floats | None) -> Profile:
+    """The profile that reads the model as it lies after a (3, 3) turn; None: it was not turned. A G-code file holds it, so that
+    its plastic can be held against the model later."""
+    if orientation is None:
+        return profile
+    rotate_deg = turned_further(profile.process.rotate_deg, orientation)
+    return profile.model_copy(update={"process": profile.process.model_copy(update={"rotate_deg": rotate_deg})})
 
 
 def check_parts_named(profile: Profile, parts: int) -> None:

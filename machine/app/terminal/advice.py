@@ -23,17 +23,17 @@ def advice(decomposition: Decomposition, profile: Profile) -> str:
     return _ways_table(ways) + f"advice: {best}\n"
 
 
-def laid_in_words(lying: Lying) -> tuple[str, ...]:
-    """How a model was laid down and what that is better by; nothing where it stays."""
+def laid_in_words(lying: Lying, otherwise: str) -> tuple[str, ...]:
+    """How a model was laid down, what that is better by, and how a person has it otherwise; nothing where it stays."""
     orientation, standing, laid = lying.orientation, lying.standing, lying.decomposition.chosen
     if orientation is None:
         return ()
     side, turns = side_in_words(orientation), in_words(orientation)
-    where = f"{side} ({turns})" if side else turns
-    if standing is None or laid is None:
-        return (f"it is laid down {where}; --as-is keeps it as it stands",)
-    was, now = (f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm2 of scars{_taking(row)}" for row in (standing, laid))
-    return (f"it is laid down {where}: {now}, as it stands {was}; --as-is keeps it so",)
+    where, better = f"{side} ({turns})" if side else turns, ""
+    if standing is not None and laid is not None:
+        was, now = (f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm2 of scars{_taking(row)}" for row in (standing, laid))
+        better = f": {now}, as it stands {was}"
+    return (f"it is laid down {where}{better}; {otherwise}",)
 
 
 def _taking(row: FrontRow) -> str:

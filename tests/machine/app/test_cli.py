@@ -165,11 +165,11 @@ def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.Monkey
 
 def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png", "--front", "front.png"]
-    assert main(["decompose", "demo:bracket", *FAST, *wanted]) == 0
+    assert main(["decompose", "demo:bracket", "--as-is", *FAST, *wanted]) == 0
     told = json.loads(Path("out.json").read_text())
     assert set(told) == {
         "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
-        "candidates_evaluated", "rounds", "parts", "cost_mm2", "seam_mm", "front",
+        "candidates_evaluated", "rounds", "parts", "cost_mm2", "seam_mm", "stairs_mm2", "front", "rotate_deg",
     }  # fmt: skip
     assert set(told["parts"][0]) == {
         "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "feather_share", "faces", "file",
@@ -194,7 +194,7 @@ def test_a_time_limit_of_nothing_prints_one_part_and_says_so(
     folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
 ) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
-    assert main([*command, "tee.stl", *FAST, "--set", "process.support=none", "--time-limit", "0"]) == 0
+    assert main([*command, "tee.stl", "--as-is", *FAST, "--set", "process.support=none", "--time-limit", "0"]) == 0
     assert "search.time_limit_s = 0 ended the search" in capsys.readouterr().err
 
 
@@ -210,6 +210,13 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
         "axes", "findings",
     }  # fmt: skip
     assert first == again
+
+
+@pytest.mark.parametrize("turned", [[], ["--set", "process.rotate_deg=[0, 30, 20]", "--orient"], ["--as-is"]])
+def test_the_plastic_of_a_file_is_held_against_its_model_however_it_was_laid_down(folder: Path, turned: list[str]) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    assert main(["export", "tee.stl", *FAST, *turned, "-o", "a.gcode"]) == 0
+    assert ("; process.rotate_deg = [0.0, 0.0, 0.0]" in Path("a.gcode").read_text()) == ("--as-is" in turned)
     assert main(["simulate", "a.gcode", "--model", "tee.stl", "--json", "beside.json"]) == 0
     beside = json.loads(Path("beside.json").read_text())["model"]
     assert (beside["outside"], beside["filled"] > 0.5) == (0.0, True)
@@ -248,12 +255,27 @@ def test_a_byte_order_mark_is_read_over(folder: Path) -> None:
 
 def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
-    left = []
-    for arguments in ([], ["--orient"]):
+    turned, told = [], []
+    for arguments in (["--as-is"], [], ["--orient"]):
         assert main(["decompose", "tee.stl", *arguments, "--set", "search.directions=20", "--json", "out.json"]) == 0
-        left.append(json.loads(Path("out.json").read_text())["residual_area_mm2"])
-    assert left[1] <= left[0]
-    assert left[1] == pytest.approx(0.0, abs=1e-6)
+        out = json.loads(Path("out.json").read_text())
+        turned.append(out["rotate_deg"])
+        told.append("tee.stl: it is laid down on its front (turned 90 about x): in one piece" in capsys.readouterr().err)
+    assert turned == [[0.0, 0.0, 0.0], [90.0, 0.0, 0.0], [90.0, 0.0, 0.0]]
+    assert told == [False, True, True]
+    assert (out["parts"][0]["direction"], out["residual_area_mm2"]) == ([0.0, 0.0, 1.0], pytest.approx(0.0, abs=1e-6))
+
+
+STAYS = [["--set", "process.rotate_deg=[0, 0, 30]"], ["--set", "search.objective=risky"], ["--planes", "planes.toml"]]
+
+
+@pytest.mark.parametrize("arguments", STAYS, ids=["turned by the profile", "the paper's terms", "planes by hand"])
+def test_a_model_stays_as_it_is_where_something_says_how_it_lies(folder: Path, arguments: list[str]) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    Path("planes.toml").write_text("version = 1\n")
+    assert main(["decompose", "tee.stl", *arguments, "--set", "search.directions=20", "--json", "out.json"]) == 0
+    turn = 30.0 if "process.rotate_deg" in arguments[-1] else 0.0
+    assert json.loads(Path("out.json").read_text())["rotate_deg"] == [0.0, 0.0, turn]
 
 
 def test_profiles_show_and_check_agree(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

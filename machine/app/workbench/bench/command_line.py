@@ -7,7 +7,7 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.part_settings import option
-from mdp.directions.turns import turned_by, turns_of
+from mdp.directions.turns import turned_further
 from profiles.profile import DEFAULTS
 
 
@@ -49,4 +49,4 @@ def export_command(bench: Bench) -> str:
 
 def turns_deg(bench: Bench) -> tuple[float, float, float]:
     """The turns about x, then y, then z that `process.rotate_deg` needs for the model to stand as it does on the bench."""
-    return turns_of(np.array(bench.rotation) @ turned_by(bench.profile.process.rotate_deg))
+    return turned_further(bench.profile.process.rotate_deg, np.array(bench.rotation))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from machine.app.pipeline import compilers
+from machine.app.pipeline.given_plan import lies_freely
 from machine.app.pipeline.pricing import pricing
 from machine.app.terminal.advice import laid_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
@@ -27,6 +28,7 @@ from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
 
 PLAN_NAME = "plan.toml"
+AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # the page's own words
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
 
 
@@ -41,8 +43,7 @@ class Searched:
 @dataclass(frozen=True)
 class SearchWay:
     """How parts are sought, beside what the profile says. orient: laid down the way that costs least, chosen with them, unless
-    a person has turned the model or locked or marked something on it as it lies; ranker: a
-    name for `ranker_named`."""
+    a person has turned the model or locked or marked something on it as it lies; ranker: a name for `ranker_named`."""
 
     orient: bool = True
     ranker: str = CLASSIC
@@ -78,11 +79,12 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
 
         return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, by_hand=locked, price=price)
 
-    if way.orient and bench.turned is None and not locked.parts and locked.zones == NO_ZONES:
+    untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
+    if way.orient and untouched and lies_freely(profile):
         lying = lay_down(mesh, profile, pricing, search)
         turn = None if lying.orientation is None else lying.orientation.rotation
         decomposition = lying.decomposition
-        return Found(decomposition.front, (*decomposition.notes, *laid_in_words(lying)), turn)
+        return Found(decomposition.front, (*decomposition.notes, *laid_in_words(lying, AS_IT_STANDS)), turn)
     decomposition = search(mesh)
     return Found(decomposition.front, decomposition.notes)
 

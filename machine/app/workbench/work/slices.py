@@ -7,6 +7,7 @@ from pathlib import Path
 
 from machine.app.pipeline.comparison import in_one_part, in_parts
 from machine.app.pipeline.copies import in_copies
+from machine.app.pipeline.given_plan import as_it_lies
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
@@ -111,4 +112,5 @@ def share_page(tell: Tell, page: Path, alternatives: tuple[Alternative, ...], ou
 
 def _plated(bench: Bench) -> tuple[Decomposition, Profile]:
     """The parts on the bench, in copies as `export --copies` has them, and what they are printed with."""
-    return in_copies(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.copies, bench.profile)
+    profile = as_it_lies(bench.profile, bench.turned)
+    return in_copies(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.copies, profile)

@@ -15,16 +15,16 @@ from tests.shapes import box, hollow, tee
 
 PROFILE = load()
 PLANES = (Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0))
-WHOLE = FrontRow((), 300.0, 0.0, 300.0, time_s=3723.0, filament_mm=4040.0)
-CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, time_s=3600.0, filament_mm=3900.0)
+WHOLE = FrontRow((), 300.0, 0.0, 425.4, stairs_mm2=125.4, time_s=3723.0, filament_mm=4040.0)
+CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, stairs_mm2=6.0, time_s=3600.0, filament_mm=3900.0)
 
 
 def test_what_was_chosen_is_advised() -> None:
     decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="the least cost")))
     assert advice(decomposition, PROFILE).splitlines() == [
-        "print it      support mm2    less  seams mm  about  filament m",
-        "in one piece        300.0                 0  1h 2m         4.0",
-        "in 3 parts           30.0  90.0 %        80  1h 0m         3.9",
+        "print it      support mm2    less  seams mm  stairs mm2  about  filament m",
+        "in one piece        300.0                 0         125  1h 2m         4.0",
+        "in 3 parts           30.0  90.0 %        80           6  1h 0m         3.9",
         "advice: print it in 3 parts",
     ]
 
@@ -36,15 +36,15 @@ def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
 
 def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> None:
     lying = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
-    assert laid_in_words(Lying(best_orientation(tee(), 45.0), lying, 900.0, CUT)) == (
+    assert laid_in_words(Lying(best_orientation(tee(), 45.0), lying, 900.0, CUT), "--as-is keeps it so") == (
         "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands in 3 parts with"
         " 78 mm2 of scars in 1h 0m; --as-is keeps it so",
     )
-    assert laid_in_words(Lying(None, lying, 900.0, WHOLE)) == ()
+    assert laid_in_words(Lying(None, lying, 900.0, WHOLE), "--as-is keeps it so") == ()
 
 
 def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:
-    assert advice(alone(box(), 0.0), PROFILE).splitlines()[1].split() == ["in", "one", "piece", "0.0", "0", "-", "-"]
+    assert advice(alone(box(), 0.0), PROFILE).splitlines()[1].split() == ["in", "one", "piece", "0.0", "0", "0", "-", "-"]
 
 
 def test_a_rounding_error_is_no_negative_share() -> None:

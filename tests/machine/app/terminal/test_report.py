@@ -47,15 +47,15 @@ def test_the_parts_of_a_tee_stand_in_print_order_with_what_they_save() -> None:
 def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
     planes = (Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0))
     rows = (
-        FrontRow((), 300.0, 0.0, 300.0, time_s=3723.0, filament_mm=4040.0),
+        FrontRow((), 300.0, 0.0, 312.0, stairs_mm2=12.4, time_s=3723.0, filament_mm=4040.0),
         FrontRow(planes[:1], 150.0, 40.0, 174.0),
         FrontRow(planes, 30.0, 80.0, 78.0, chosen=True, reason="the least cost"),
     )
     assert front_table(rows).splitlines() == [
-        "in parts  needs support mm2  seams mm  costs mm2  about  filament m",
-        "1                     300.0         0      300.0  1h 2m         4.0",
-        "2                     150.0        40      174.0      -           -",
-        "3                      30.0        80       78.0      -           -  taken: the least cost",
+        "in parts  needs support mm2  seams mm  stairs mm2  costs mm2  about  filament m",
+        "1                     300.0         0          12      312.0  1h 2m         4.0",
+        "2                     150.0        40           0      174.0      -           -",
+        "3                      30.0        80           0       78.0      -           -  taken: the least cost",
     ]
     assert front_table(rows) in parts_table(replace(tee_in_parts(), front=rows))
 

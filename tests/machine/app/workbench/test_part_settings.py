@@ -107,7 +107,7 @@ def test_the_command_line_names_what_differs_from_the_usual() -> None:
     start = "tiltprint export tee.stl --machine fractal5pro --set process.walls=4"
     assert export_command(replace(BENCH, given=given)) == f"{start} --plan tee-plan.toml -o tee.gcode"
     uncut = with_own(replace(BENCH, given=given, cuts=None), 1, "process.ironing", "true")
-    assert export_command(uncut) == f"{start} --parts 1 --part 1:ironing=true -o tee.gcode"
+    assert export_command(uncut) == f"{start} --parts 1 --as-is --part 1:ironing=true -o tee.gcode"
 
 
 def test_the_command_line_sets_blocks_lists_and_names_as_they_are() -> None:
