@@ -238,7 +238,7 @@ def choices(browser: Browser, tmp_path: Path) -> Browser:
     profile, decomposition, _, _ = hand.printed()
     post = Plane(np.array([0.0, 0.0, 1.0]), 30.0)
     front = (
-        FrontRow((), 100.0, 0.0, 100.0),
+        FrontRow((), 100.0, 0.0, 130.0, stairs_mm2=30.4),
         FrontRow((hand.SIDE,), 0.0, 40.0, 24.0, chosen=True, time_s=4000.0, filament_mm=1234.0, reason="the least cost"),
         FrontRow((hand.SIDE, post), 0.0, 80.0, 48.0),
     )
@@ -249,8 +249,8 @@ def test_the_front_is_shown_with_dashes_where_nothing_is_estimated(choices: Brow
     lines = choices.value(
         "[...document.querySelectorAll('#front tbody tr')].map((line) => [...line.cells].map((c) => c.textContent))"
     )
-    assert lines[0] == ["1", "100.0", "0", "–", "–"]
-    assert lines[1] == ["2✓", "0.0", "40", "1h 7m", "1.2"]
+    assert lines[0] == ["1", "100.0", "0", "30", "–", "–"]
+    assert lines[1] == ["2✓", "0.0", "40", "0", "1h 7m", "1.2"]
     assert text(choices, "front-told") == "✓ taken: the least cost."
 
 

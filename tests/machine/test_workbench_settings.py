@@ -55,8 +55,8 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     assert browser.value("$('settings-part').selectedOptions[0].text") == "part 1 (1 of its own)"
     told = browser.value("$('command-line').textContent")
     assert (
-        "--set 'machine.tilt.limits_deg=[-45, 45]' --set process.top_layers=7 --parts 1 --part 1:walls=5 -o settings.gcode"
-        in told
+        "--set 'machine.tilt.limits_deg=[-45, 45]' --set process.top_layers=7 --parts 1 --as-is --part 1:walls=5"
+        " -o settings.gcode" in told
     )
     browser.click("#reset-settings")
     browser.wait("$('reset-settings').disabled && $('settings-part').selectedOptions[0].text === 'part 1'")
