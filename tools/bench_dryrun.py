@@ -64,7 +64,7 @@ def make(model: str, machine: str, scale: str, layer: str, file: Path) -> None:
     """Write the long program."""
     fine = [f"process.scale={scale}", f"process.layer_height_mm={layer}", "process.infill_density=1"]
     profile = load(machine=machine, settings=fine)
-    found = decompose_model(ModelRequest(model, profile)).decomposition
+    found = decompose_model(ModelRequest(model, profile, orient=False)).decomposition
     sliced = slice_parts(found.parts, profile)
     file.write_text("\n".join(write_gcode(plan(found, sliced, profile), profile)) + "\n")
 

@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--rival", default="prusa-slicer", help="PrusaSlicer's command")
     options = parser.parse_args(arguments)
     settings = [*SAME, *([TREE] if options.support else []), *options.set]
-    ours = [*OURS, "export", "--parts", "1", *(word for setting in settings for word in ("--set", setting)), "-o"]
+    ours = [*OURS, "export", "--parts", "1", "--as-is", *(word for setting in settings for word in ("--set", setting)), "-o"]
     theirs = [options.rival, *PRUSA.split(), *(SNUG if options.support else ("--no-overhangs",)), "-o"]
     print("| model | ours, core s | lines | PrusaSlicer, core s | lines | ratio |\n|---|---|---|---|---|---|")
     for model in options.models:

@@ -22,7 +22,7 @@ WHEEL = "document.getElementById('canvas').dispatchEvent(new WheelEvent('wheel',
 def made(model: str, settings: list[str]) -> bytes:
     """The page of a model, and its row of the first table."""
     profile = load(settings=settings)
-    request = ModelRequest(model, profile)
+    request = ModelRequest(model, profile, orient=False)
     found = decompose_model(request, to_build=True).decomposition
     program = build(found, profile)
     began = perf_counter()

@@ -113,7 +113,7 @@ def options_of(run: Run, file: Path) -> list[str]:
     options += [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
     if copies > 1:
         return [*options, "--parts", "1", "--copies", str(copies)]
-    return [*options, "--orient"] if dice.random() < 0.3 else options
+    return [*options, "--as-is"] if dice.random() < 0.3 else options
 
 
 def _scale(dice: random.Random, longest_mm: float, machine: str, height_mm: float, copies: int) -> float:

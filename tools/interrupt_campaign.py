@@ -22,7 +22,7 @@ SIGNALS = {"GROUP": signal.SIGINT, "INT": signal.SIGINT, "TERM": signal.SIGTERM,
 START = [sys.executable, "-c", "from machine.app.start import main; raise SystemExit(main())"]
 COMMANDS = {
     "decompose": ["decompose", "{model}", "--set", "search.beam_width=10"],
-    "orient": ["decompose", "{model}", "--orient"],
+    "as is": ["decompose", "{model}", "--as-is"],
     "pictures": ["decompose", "{model}", "--parts", "2", "--png", "{out}/a.png", "--sheet", "{out}/b.png", "-o", "{out}/parts"],
     "export": ["export", "{model}", "-o", "{out}/a.gcode"],
     "one part": ["export", "{model}", "-o", "{out}/a.gcode", "--parts", "1"],

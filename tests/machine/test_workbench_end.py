@@ -9,7 +9,7 @@ import pytest
 from machine.app.cli import main
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.prints import commands_sent
-from tests.machine.test_workbench_page import FOUND, IDLE, choose, saved
+from tests.machine.test_workbench_page import IDLE, choose, find_as_it_lies, saved
 from tests.machine.workbench import QUICK, workbench
 from tests.mdp.files import SHARED
 
@@ -30,9 +30,7 @@ def test_what_the_page_prints_the_command_line_prints_from_its_plan(tmp_path: Pa
         choose(browser, model.name, model.read_bytes())
         browser.wait(f"document.documentElement.dataset.shown && $('title').textContent === {json.dumps(model.name)} && {IDLE}")
 
-        browser.click("#tab-parts")
-        browser.click("#find")
-        browser.wait(FOUND)
+        find_as_it_lies(browser)
         browser.wait("document.querySelectorAll('#planes input[type=radio]').length >= 2")
         browser.click("#planes input[type=checkbox]:not(:checked)")
         browser.wait("$('undo').getAttribute('aria-label').startsWith('undo: lock')")

@@ -8,7 +8,7 @@ import pytest
 from mdp.save import stl
 from tests.machine.firefox import FIREFOX, PATIENCE_S, XVFB, Firefox
 from tests.machine.prints import kinds_of_fields, prints_line
-from tests.machine.test_workbench_page import FOUND, choose
+from tests.machine.test_workbench_page import FOUND, choose, find_as_it_lies
 from tests.machine.workbench import Running
 from tests.shapes import tee
 
@@ -81,9 +81,7 @@ def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) ->
 
 
 def test_firefox_finds_parts_and_goes_through_the_front(firefox: Firefox) -> None:
-    firefox.click("#tab-parts")
-    firefox.click("#find")
-    firefox.wait(FOUND)
+    find_as_it_lies(firefox)
     assert "recommended" in firefox.value("$('front-told').textContent")
     put(firefox, "$('front')", 0, "input")
     assert firefox.value("$('front-told').querySelector('dd').textContent") == "1"

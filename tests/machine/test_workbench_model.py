@@ -5,7 +5,7 @@ import pytest
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_workbench_page import FOUND, area, drag_slider, open_model
+from tests.machine.test_workbench_page import area, drag_slider, find_as_it_lies, open_model
 from tests.machine.workbench import Running
 from tests.shapes import tee
 
@@ -89,9 +89,8 @@ def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_i
 
 def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "apart.stl", stl(tee()))
-    browser.click("#tab-parts")
-    browser.click("#find")
-    browser.wait(f"{FOUND} && document.documentElement.dataset.pieces === '2'")
+    find_as_it_lies(browser)
+    browser.wait("document.documentElement.dataset.pieces === '2'")
     first, second = browser.value("[...$('parts-list').querySelectorAll('td.words')].map((cell) => cell.textContent)")
     assert first == "straight up"
     assert "° to the " in second

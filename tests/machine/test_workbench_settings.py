@@ -11,7 +11,7 @@ from machine.app.cli import main
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_workbench_page import FOUND, IDLE, choose, open_model, saved
+from tests.machine.test_workbench_page import IDLE, choose, find_as_it_lies, open_model, saved
 from tests.machine.workbench import Running
 from tests.shapes import tee
 
@@ -118,9 +118,7 @@ def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_a
     browser: Browser, bench: Running
 ) -> None:
     open_model(browser, bench, "front.stl", stl(tee()))
-    browser.click("#tab-parts")
-    browser.click("#find")
-    browser.wait(FOUND)
+    find_as_it_lies(browser)
     row = "[...$('front-told').querySelectorAll('dd')].map((cell) => cell.textContent)"
     before = browser.value(row)
     browser.click("#tab-settings")
@@ -130,8 +128,8 @@ def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_a
     put(browser, "process.infill_density", 1)
     browser.wait(f"{changed('process.infill_density')} && !$('front-told').textContent.includes('worked out anew')")
     after = browser.value(row)
-    assert after[:3] == before[:3]
-    assert float(after[4].split()[0]) > float(before[4].split()[0])  # metres of filament
+    assert after[:4] == before[:4]
+    assert float(after[5].split()[0]) > float(before[5].split()[0])  # metres of filament
     put(browser, "process.self_supporting_angle_deg", 40)
     browser.wait(f"{changed('process.self_supporting_angle_deg')} && $('front-field').hidden && {IDLE}")
     browser.click("#undo")

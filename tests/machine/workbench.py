@@ -18,6 +18,7 @@ from websockets.sync.client import ClientConnection, connect
 PATIENCE_S = 60.0
 COARSE = ("layer_height_mm=0.4", "first_layer_height_mm=0.4", "line_width_mm=0.8")
 QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2", *(f"--set=process.{each}" for each in COARSE))
+QUICK += ("--set=search.stair_weight=0.01",)  # else so coarse a T, whose arms show high stairs, would be printed in one piece
 
 
 class Running:

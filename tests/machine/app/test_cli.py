@@ -224,9 +224,9 @@ def test_the_plastic_of_a_file_is_held_against_its_model_however_it_was_laid_dow
 
 def test_g_code_on_standard_output_is_the_file_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
-    assert main(["export", "tee.stl", *FAST, "-o", "a.gcode"]) == 0
+    assert main(["export", "tee.stl", "--as-is", *FAST, "-o", "a.gcode"]) == 0
     table = capsys.readouterr().out
-    assert main(["export", "tee.stl", *FAST, "-o", "-"]) == 0
+    assert main(["export", "tee.stl", "--as-is", *FAST, "-o", "-"]) == 0
     told = capsys.readouterr()
     assert (told.out, table in told.err) == (Path("a.gcode").read_text(), True)
     assert not Path("-").exists()

@@ -23,7 +23,7 @@ from tests.shapes import tee
 
 NASTY = '<img src=x onerror=alert(1)></title><script>alert(2)</script>/*SCRIPT*/<!--DATA-->".stl'
 COARSE = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
-COARSE += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6"]
+COARSE += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6", "--as-is"]
 
 
 class Elements(HTMLParser):

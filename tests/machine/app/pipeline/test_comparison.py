@@ -2,21 +2,26 @@
 
 from functools import cache
 
-from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part, in_parts, straight_up
 from machine.app.pipeline.pipeline import build
 from machine.program import Alternative, Program
+from mdp.cut import mesh_of
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
+from tests.machine.app.terminal.test_report import alone
 from tests.shapes import tee
 
 COARSE = ("process.layer_height_mm=0.4", "process.first_layer_height_mm=0.4", "process.line_width_mm=0.8", "process.walls=1")
 COARSE += ("search.directions=60", "search.beam_width=1", "process.infill_density=0", "process.support=none")
-COARSE += ("search.stair_weight=0",)  # two arms in one part
 
 
 @cache
 def made() -> tuple[Profile, Program, tuple[Alternative, ...]]:
-    profile = load(settings=COARSE)
+    profile = load(settings=[*COARSE, "search.stair_weight=0"])  # so that both arms are one part
     program = build(decompose(tee(), "tee", profile), profile)
     return profile, program, compare_with_one_part(program, profile)
 
@@ -40,6 +45,16 @@ def test_an_alternative_that_the_machine_cannot_print_stays_in_the_list_with_the
     assert up.time_s is None
     assert "Z" in up.message
     assert up.message in compare_table((up,))
+
+
+def test_stairs_of_a_model_in_one_piece_are_those_of_its_slanted_faces_searched_or_not() -> None:
+    sides = np.array([(x, y, z) for x, y in ((0, 0), (0, 10), (10, 0), (10, 10)) for z in (0, 4 + 0.4 * x)])
+    wedge, profile = mesh_of(Manifold.hull_points(sides)), load(settings=COARSE)
+    searched = in_parts(build(decompose(wedge, "wedge", profile), profile), profile)
+    up = straight_up(alone(wedge, 0.0), profile)
+    # 10 x 10 mm of plate lie under the slanted face, by 0.15 for layers of 0.2 mm
+    assert searched.stairs_mm2 == pytest.approx(30.0)
+    assert [row["stairs_mm2"] for row in alternatives_json((searched, up, up))] == pytest.approx([30.0] * 3)
 
 
 def test_table_and_json_hold_the_same_figures() -> None:

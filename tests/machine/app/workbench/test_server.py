@@ -183,10 +183,9 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
         page.until(lambda state: state["undo"] == "move a plane")
         page.do("lock", part=2, locked=True)
         page.do("search")
-        page.until(lambda state: state["undo"] == "find parts" and not state["search"])
-        page.do("take", parts=3)  # the arm on the other side, too, which takes a little longer than support
-        found = page.until(lambda state: state["parts"] == 3)
+        found = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
         assert (found["cuts"][-1], found["locked"][-1]) == ({"normal": [1.0, 0.0, 0.0], "offset_mm": 9.5}, True)
+        assert found["parts"] > 2
     (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])
     assert main(["decompose", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "parts"]) == 0
     made = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
