@@ -73,13 +73,15 @@ def regret_table(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
 
 def by_size(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
     """A row a ranker, a column a range of sizes."""
-    rows = [[row for row, rated in enumerate(lists) if low <= len(rated.ratings) <= high] for low, high in SIZES]
+    columns = [[row for row, rated in enumerate(lists) if low <= len(rated.ratings) <= high] for low, high in SIZES]
     named = [f"{low}-{high}" if high < SIZES[-1][1] else f"{low} and more" for low, high in SIZES]
     lines = [_row("ranker", named), "|---|" + "---:|" * len(SIZES)]
-    lines.append(_row("lists", [str(len(each)) for each in rows]))
+    lines.append(_row("lists", [str(len(rows)) for rows in columns]))
     for name, scores in given.items():
         ends = [measured(at(cut), scores, lists) for cut in (CUTS[0], CUTS[-1])]
-        lines.append(_row(name, [" / ".join(f"{values[each].mean():.3f}" for values in ends) if each else "-" for each in rows]))
+        lines.append(
+            _row(name, [" / ".join(f"{values[rows].mean():.3f}" for values in ends) if rows else "-" for rows in columns])
+        )
     return "\n".join(lines)
 
 
