@@ -73,8 +73,8 @@ def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> 
     rest = area - strips(lines, 0.5 * width_mm) if lines else area
     if rest.area() < FEW_MM2 * width_mm**2:
         return Polygons()
-    places = [place for place in islands(opening(rest, 0.5 * LEAST_GAP * width_mm)) if place.area() >= FEW_MM2 * width_mm**2]
-    return Polygons.compose(places) if places else Polygons()
+    pieces = [piece for piece in islands(opening(rest, 0.5 * LEAST_GAP * width_mm)) if piece.area() >= FEW_MM2 * width_mm**2]
+    return Polygons.compose(pieces) if pieces else Polygons()
 
 
 def angle_of_layer_deg(infill_angle_deg: float, layer: int) -> float:

@@ -69,9 +69,9 @@ def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y:
     order, flips = longs(len(starts), 0), flags(len(starts))
     for k in range(len(order)):
         order[k] = k
-    for place in range(len(order)):
-        best, flip, least = place, False, np.inf
-        for k in range(place, len(order)):
+    for step in range(len(order)):
+        best, flip, least = step, False, np.inf
+        for k in range(step, len(order)):
             i = order[k]
             distance = (starts[i, 0] - x) ** 2 + (starts[i, 1] - y) ** 2
             if distance < least or (distance == least and i < order[best]):
@@ -81,8 +81,8 @@ def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y:
                 if distance < least:
                     best, flip, least = k, True, distance
         i = order[best]
-        order[place], order[best] = i, order[place]
-        flips[place] = flip
+        order[step], order[best] = i, order[step]
+        flips[step] = flip
         x, y = (starts[i, 0], starts[i, 1]) if flip else (ends[i, 0], ends[i, 1])
     return order, flips
 
