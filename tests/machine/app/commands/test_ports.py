@@ -61,11 +61,11 @@ def test_several_ports_are_asked_at_a_time_and_told_in_order(
         hear_out(monkeypatch, port_reports, mute)
         here += [device(printer.path), device(stranger), device(mute), device("/dev/no-such-port")]
         assert main(["ports", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert [each["port"] for each in found] == [each.name for each in here]
-    assert [each["answer"] for each in found] == ["printer", "no printer", "silent", None]
-    assert found[0]["axes"] == ["X", "Y", "Z", "A", "C"]
-    assert found[3]["trouble"].startswith("port /dev/no-such-port does not exist")
+    reports = json.loads(capsys.readouterr().out)
+    assert [port["port"] for port in reports] == [port.name for port in here]
+    assert [port["answer"] for port in reports] == ["printer", "no printer", "silent", None]
+    assert reports[0]["axes"] == ["X", "Y", "Z", "A", "C"]
+    assert reports[3]["trouble"].startswith("port /dev/no-such-port does not exist")
 
 
 def test_an_impossible_rate_is_refused_before_any_port_is_asked(capsys: pytest.CaptureFixture[str]) -> None:

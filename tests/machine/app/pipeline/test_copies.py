@@ -41,10 +41,10 @@ def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> Non
     many, profile = in_copies(decomposed(whole(box(10, 10, 0.9))), 3, plate())
     program = build(many, profile)
     assert [each.code for each in program.run.findings if each.code != "uncalibrated"] == []
-    one = build(decomposed(whole(box(10, 10, 0.9))), profile)
-    own = [float(each.run.segment_mm3[_own(each.run)].sum()) for each in (one, program)]
+    single = build(decomposed(whole(box(10, 10, 0.9))), profile)
+    own = [float(each.run.segment_mm3[_own(each.run)].sum()) for each in (single, program)]
     assert own[1] == pytest.approx(3.0 * own[0], rel=1e-3)
-    assert program.run.program.layers == one.run.program.layers == 3
+    assert program.run.program.layers == single.run.program.layers == 3
 
 
 def _own(run) -> np.ndarray:  # type: ignore[no-untyped-def]
