@@ -1,4 +1,4 @@
-"""Carried: planes and zones that belong to a model go along when it is turned, scaled or lifted."""
+"""Placing: planes and zones that belong to a model go along when it is turned, scaled or lifted."""
 
 from dataclasses import dataclass, replace
 

@@ -48,7 +48,7 @@ def left_by_a_killed_one(*names: str) -> Path:
     return folder
 
 
-def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_goes_with_the_program(place: Path) -> None:
+def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_goes_with_the_program(temporary: Path) -> None:
     sent = temporary / "sent"
     sent.mkdir()
     (sent / "large.stl").write_bytes(bytes(2**20 + 1))
@@ -65,7 +65,7 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
     assert list(temporary.glob("tiltprint-edit-*")) == []
 
 
-def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(place: Path) -> None:
+def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(temporary: Path) -> None:
     folder = left_by_a_killed_one("tee.stl")
     assert tidy_left() == tidy_left() == (folder,)
     assert names_in(folder) == [FOUND, "tee.stl"]
@@ -75,7 +75,7 @@ def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(p
     assert not folder.exists()
 
 
-def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_that_runs_is_not_touched(place: Path) -> None:
+def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_that_runs_is_not_touched(temporary: Path) -> None:
     received = Received()
     received.new_file("tee.stl").write_text("solid")
     empty = left_by_a_killed_one()
@@ -90,7 +90,7 @@ def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_t
     assert list(temporary.iterdir()) == []
 
 
-def test_what_was_left_in_several_folders_is_listed_together_the_newest_first(place: Path) -> None:
+def test_what_was_left_in_several_folders_is_listed_together_the_newest_first(temporary: Path) -> None:
     older, newer = left_by_a_killed_one("old.stl", "newest.stl"), left_by_a_killed_one("newer.stl")
     for age_s, name in enumerate(("newest.stl", "newer.stl", "old.stl")):
         (path,) = temporary.glob(f"*/*/{name}")

@@ -57,7 +57,9 @@ def test_two_servers_never_have_one_port() -> None:
         listen(own.getsockname()[1])
 
 
-def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and_opens_its_files(place: Path, port: str) -> None:
+def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and_opens_its_files(
+    temporary: Path, port: str
+) -> None:
     with workbench("--port", port) as killed, killed.line() as page:
         assert send(killed, temporary, "tee.stl", TEE) == 200
         page.until(lambda state: state["model"])
@@ -85,7 +87,7 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
 
 
 def test_a_page_of_a_killed_workbench_says_what_to_do_and_the_next_one_offers_its_files(
-    browser: Browser, place: Path, port: str
+    browser: Browser, temporary: Path, port: str
 ) -> None:
     with workbench("--port", port) as killed:
         assert send(killed, temporary, "tee.stl", TEE) == 200
