@@ -64,7 +64,7 @@ class Look:
     twice: Worst = NONE
     missing: tuple[str, ...] = ()
 
-    def with_other(self, look: "Look") -> "Look":
+    def merged_with(self, look: "Look") -> "Look":
         """Both together."""
         pairs = ((getattr(self, name), getattr(look, name)) for name in NAMES)
         return Look(*(max(a, b) if isinstance(a, Worst) else a + b for a, b in pairs))
@@ -102,7 +102,7 @@ def look_at(lines: Sequence[str]) -> Look:
     for part in np.unique(beads.part):
         if beads.settings.get("machine.coordinates") == PLATE_FOLLOWED and abs(beads.tilt_deg[int(part)]) > 0.01:
             continue  # its layers do not lie level in the file
-        whole = whole.with_other(_PartLook(beads, int(part)).look())
+        whole = whole.merged_with(_PartLook(beads, int(part)).look())
     return whole
 
 
@@ -161,9 +161,9 @@ class _PartLook:
             steps = self._steps(rows)
             if len(before) or self._part == 1:  # what it lies on is known
                 gap = z_mm - height_mm > below_mm + self._stand_off_mm(rows, before, height_mm) + ROUNDING_MM
-                whole = whole.with_other(Look(missing=(name,) if gap else ()))
-                whole = whole.with_other(self._hanging(steps, before)).with_other(self._volume(rows, name))
-            whole = whole.with_other(self._twice(steps, name))
+                whole = whole.merged_with(Look(missing=(name,) if gap else ()))
+                whole = whole.merged_with(self._hanging(steps, before)).merged_with(self._volume(rows, name))
+            whole = whole.merged_with(self._twice(steps, name))
             tops_mm = self._beads.end[steps.row, 2] + np.where(self._support[steps.row], self._gap_mm, 0.0)
             np.maximum.at(self._top_mm, steps.cells.ravel(), np.repeat(tops_mm, steps.cells.shape[1]))
             before, below_mm = rows, z_mm

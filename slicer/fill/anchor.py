@@ -52,7 +52,7 @@ class _BorderPoint(NamedTuple):
 
     edge: int
     contour: int
-    place_mm: float
+    way_mm: float
 
 
 def anchor_lines(pieces: Pieces, border: Border, limits: Limits, group: Indices | None = None) -> list[Floats]:
@@ -184,7 +184,7 @@ def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border:
     edges, way = border.edges, border.way
     e, first, end = since.edge, border.offsets[since.contour], border.offsets[since.contour + 1]
     left, forward = abs(length), length > 0.0
-    at = since.place_mm - way[e] if forward else way[e + 1] - since.place_mm
+    at = since.way_mm - way[e] if forward else way[e + 1] - since.way_mm
     step = way[e + 1] - way[e]
     corner = 2 if forward else 0
     while left > step - at:

@@ -76,8 +76,8 @@ def test_an_impossible_rate_is_refused_before_any_port_is_asked(capsys: pytest.C
 def test_without_asking_no_port_is_opened(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
     here.append(MEGA)
     assert main(["ports", "--no-ask"]) == 0
-    told_lines = ["/dev/serial/by-id/usb-Mega", "    /dev/ttyACM0, Mega 2560 (2341:0042), serial number 7533"]
-    assert capsys.readouterr() == ("\n".join(told_lines) + "\n", "")
+    lines = ["/dev/serial/by-id/usb-Mega", "    /dev/ttyACM0, Mega 2560 (2341:0042), serial number 7533"]
+    assert capsys.readouterr() == ("\n".join(lines) + "\n", "")
 
 
 def test_a_port_in_use_is_told_without_its_name_twice() -> None:
