@@ -15,7 +15,7 @@ from mdp.formats.surface import Surface, check_meshes, check_placed, check_surfa
 from mdp.mesh import Floats
 from profiles.errors import MeshError
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # "glTF", "JSON" and "BIN" read as little-endian numbers
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 TRIANGLES = 4  # primitive mode
 DEEPEST = 64  # nodes within nodes

@@ -19,7 +19,7 @@ Z_UP_OF = {
     "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
     "Z_UP": np.eye(3),
 }
-MM = 1000.0
+MM = 1000.0  # in a metre, which the <unit> of COLLADA counts in
 
 
 def read(path: Path) -> list[Surface]:

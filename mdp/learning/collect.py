@@ -21,7 +21,7 @@ from mdp.learning.collection.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
 from profiles.profile import DEFAULTS
 
-MOST_WIDE = 1000
+MOST_WIDE = 1000  # as search.beam_width allows
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -11,8 +11,8 @@ from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import LinkedFaces
 
 DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
-ROUNDING_MM = 1e-6
-UNSEEN = -1
+ROUNDING_MM = 1e-6  # bottoms whose heights differ by less are as low
+UNSEEN = -1  # no vertex
 
 
 class Pool(NamedTuple):

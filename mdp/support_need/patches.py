@@ -23,7 +23,7 @@ from mdp.support_need.spans import Sides, spans
 from mdp.topology.linked_faces import LinkedFaces
 
 Classes = NDArray[np.uint8]
-CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2
+CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2  # classes of faces, the dearer the higher
 NARROW = 2.0  # line widths from an anchor that lines hold on to their neighbours
 UNNUMBERED = -1  # faces that belong to no patch yet
 ROUNDING_MM, ROUNDING_MM2 = 1e-6, 1e-6  # of a patch just as high or as large as it may be

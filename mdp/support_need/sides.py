@@ -18,7 +18,7 @@ STEP_MM = 0.5  # between the places of a side at which one looks down
 END_MM = 0.01  # of a side, within which the first and the last of them lie
 SHORT_MM = 0.1  # a side no longer has only one
 HALVINGS = 6  # until the end of an anchor between two of them is found
-UNKNOWN, HELD, UNHELD = 0, 1, 2
+UNKNOWN, HELD, UNHELD = 0, 1, 2  # what is known of a patch
 
 
 class Patches(NamedTuple):

@@ -14,10 +14,12 @@ from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 
 REACH = 200  # exchanges reach so far along the order, less far in an order of more than a thousand paths
+# Random lines of 1 to 8 mm on a plate of 100 mm, commit 5c72b83f: with up to 900 of them nothing is gained after 12 passes,
+# 4 leave the way 0.6 to 1 % longer for half the time, 1 leaves it 6 to 13 % longer; with 2,500 of them 4 leave it 0.3 % longer.
 PASSES, FEW_PASSES = 12, 4
-MANY = 1000
-GAIN_MM = 1e-6
-MOST_MOVED = 3
+MANY = 1000  # paths, from which on there are few passes
+GAIN_MM = 1e-6  # less is rounding, and an exchange back and forth would never end
+MOST_MOVED = 3  # as Or (1976); one leaves the same ways 0.3 to 0.8 % longer, four change them by -0.4 to +0.5 %
 
 Order = tuple[NDArray[np.int64], NDArray[np.bool_]]
 

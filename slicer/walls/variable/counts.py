@@ -17,8 +17,8 @@ POINT = 0.3  # of its half thickness: a piece of the axis shorter than that is a
 FLICKER = 2.0  # nominal spacings: a shorter stretch keeps the count of its neighbours where beads can be as wide
 ROUNDS = 4  # of taking out such stretches
 ALIKE = 1.1  # the thickest point of a place belongs to an axis beside it where it is not thicker by this factor
-SAME_MM = 1e-6
-MOST_HOPS = 8
+SAME_MM = 1e-6  # radii that differ by less are equal
+MOST_HOPS = 8  # from node to node; two that lead to each other would go on for ever
 
 
 class Counts(NamedTuple):
