@@ -166,16 +166,16 @@ def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.Monkey
 def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png", "--front", "front.png"]
     assert main(["decompose", "demo:bracket", *FAST, *wanted]) == 0
-    told = json.loads(Path("out.json").read_text())
-    assert set(told) == {
+    record = json.loads(Path("out.json").read_text())
+    assert set(record) == {
         "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
         "candidates_evaluated", "rounds", "parts", "cost_mm2", "seam_mm", "front",
     }  # fmt: skip
-    assert set(told["parts"][0]) == {
+    assert set(record["parts"][0]) == {
         "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "feather_share", "faces", "file",
     }  # fmt: skip
-    assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
-    files = {part["file"] for part in told["parts"]} | set(FOLDER_FILES)
+    assert sum(part["volume_mm3"] for part in record["parts"]) == pytest.approx(record["volume_mm3"], rel=1e-6)
+    files = {part["file"] for part in record["parts"]} | set(FOLDER_FILES)
     assert {file.name for file in Path("parts").iterdir()} == files
     assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png", "front.png"))
 
@@ -220,8 +220,8 @@ def test_g_code_on_standard_output_is_the_file_alone(folder: Path, capsys: pytes
     assert main(["export", "tee.stl", *FAST, "-o", "a.gcode"]) == 0
     table = capsys.readouterr().out
     assert main(["export", "tee.stl", *FAST, "-o", "-"]) == 0
-    told = capsys.readouterr()
-    assert (told.out, table in told.err) == (Path("a.gcode").read_text(), True)
+    output = capsys.readouterr()
+    assert (output.out, table in output.err) == (Path("a.gcode").read_text(), True)
     assert not Path("-").exists()
 
 

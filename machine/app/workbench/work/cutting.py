@@ -92,9 +92,9 @@ def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ..
     return cut_bench(bench, plan, prices=True).front
 
 
-def price_row(tell: Tell, bench: Bench, place: int) -> FrontRow:
+def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
     """A row of the front on the bench with its time and plastic; as it is where it cannot be cut any more."""
-    row = bench.rows[place]
+    row = bench.rows[number]
     with suppress(PlanError):
         return cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts_of(row), front=()), prices=True).front[0]
     return row

@@ -52,7 +52,7 @@ class Sliced:
     @property
     def errors(self) -> tuple[Finding, ...]:
         """Those that are errors, with which the command line writes no file and prints nothing without --force."""
-        return tuple(each for each in self.findings if each.severity == "error")
+        return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
 def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:

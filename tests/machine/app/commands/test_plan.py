@@ -110,8 +110,8 @@ def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Pa
     _run("export", "tee.stl", "-o", "searched.gcode", *orient)
     _run("decompose", "tee.stl", "--plan", "tee.toml", *orient)
     _run("export", "tee.stl", "-o", "planned.gcode", "--plan", "tee.toml")
-    told = Path("tee.toml").read_text()
-    assert (told.count("[[part]]") > 1, "orientation" in told) == (not orient, bool(orient))
+    plan_text = Path("tee.toml").read_text()
+    assert (plan_text.count("[[part]]") > 1, "orientation" in plan_text) == (not orient, bool(orient))
     assert Path("planned.gcode").read_bytes() == Path("searched.gcode").read_bytes()
 
 

@@ -40,11 +40,11 @@ def test_copies_stand_in_rows_near_the_middle(count: int, reach_mm: float) -> No
 def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> None:
     many, profile = in_copies(decomposed(whole(box(10, 10, 0.9))), 3, plate())
     program = build(many, profile)
-    assert [each.code for each in program.run.findings if each.code != "uncalibrated"] == []
-    one = build(decomposed(whole(box(10, 10, 0.9))), profile)
-    own = [float(each.run.segment_mm3[_own(each.run)].sum()) for each in (one, program)]
+    assert [finding.code for finding in program.run.findings if finding.code != "uncalibrated"] == []
+    single = build(decomposed(whole(box(10, 10, 0.9))), profile)
+    own = [float(printed.run.segment_mm3[_own(printed.run)].sum()) for printed in (single, program)]
     assert own[1] == pytest.approx(3.0 * own[0], rel=1e-3)
-    assert program.run.program.layers == one.run.program.layers == 3
+    assert program.run.program.layers == single.run.program.layers == 3
 
 
 def _own(run) -> np.ndarray:  # type: ignore[no-untyped-def]

@@ -52,9 +52,9 @@ def test_the_simulated_printer_lays_the_plastic_where_the_model_is(machine: str,
 def test_the_plastic_is_what_the_sliced_paths_say() -> None:
     free = "search.second_mm2=0"  # so that no part is estimated
     profile = load(settings=[*QUICK, "material.prime_extra_mm=0", free])  # what is pushed after a turn is no path's
-    found = decompose_model(ModelRequest("demo:tree", profile), to_build=True).decomposition
-    planned = sum(part.volume_mm3 for part in slice_parts(found.parts, profile))
-    built = build(found, profile)
+    decomposition = decompose_model(ModelRequest("demo:tree", profile), to_build=True).decomposition
+    planned = sum(part.volume_mm3 for part in slice_parts(decomposition.parts, profile))
+    built = build(decomposition, profile)
     run = built.run
     assert built.decomposition is not None
     assert [row.time_s for row in built.decomposition.front if row.chosen] == [run.time_s]

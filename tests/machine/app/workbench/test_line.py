@@ -79,4 +79,4 @@ def test_a_bug_of_one_direction_is_not_taken_for_a_page_that_has_gone() -> None:
 
     with pytest.raises(ExceptionGroup) as raised:
         asyncio.run(run())
-    assert [str(each) for each in raised.value.exceptions] == ["a bug"]
+    assert [str(error) for error in raised.value.exceptions] == ["a bug"]
