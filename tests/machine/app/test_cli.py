@@ -165,7 +165,8 @@ def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.Monkey
 
 def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png", "--front", "front.png"]
-    assert main(["decompose", "demo:bracket", *FAST, *wanted]) == 0
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    assert main(["decompose", "tee.stl", *FAST, *wanted]) == 0
     told = json.loads(Path("out.json").read_text())
     assert set(told) == {
         "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
@@ -174,6 +175,7 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     assert set(told["parts"][0]) == {
         "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "feather_share", "faces", "file",
     }  # fmt: skip
+    assert len(told["parts"]) > 1
     assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
     files = {part["file"] for part in told["parts"]} | set(FOLDER_FILES)
     assert {file.name for file in Path("parts").iterdir()} == files
