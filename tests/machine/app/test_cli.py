@@ -267,9 +267,9 @@ def test_profiles_show_and_check_agree(folder: Path, capsys: pytest.CaptureFixtu
 
 
 def _program(folder: Path) -> Path:
-    """Three hours of careful strokes over a hot bed."""
+    """Six hours of careful strokes over a hot bed."""
     lines = ["G21", "G90", "M83", "G28 X Y Z", "G92 A0 C0", "M140 S60", "M190 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
-    lines += [f"G1 X{40 * (k % 2)} E1.0 F60" for k in range(1, 200)]
+    lines += [f"G1 X{40 * (k % 2)} E1.0 F60" for k in range(1, 600)]
     file = folder / "long.gcode"
     file.write_text("\n".join([*lines, "M104 S0", "M140 S0"]) + "\n")
     return file
@@ -277,7 +277,7 @@ def _program(folder: Path) -> Path:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path, number: int) -> None:
-    options = ["--port", "sim", "--sim-speed", "20", "--force"]
+    options = ["--port", "sim", "--sim-speed", "60", "--force"]
     command = [sys.executable, "-m", "machine.app.cli", "print", str(_program(folder)), *options]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3])
     assert process.stderr is not None
