@@ -39,7 +39,7 @@ def _pieces_around(starts: Floats, area: Polygons) -> Ints:
     import shapely  # 30 ms, which commands that slice nothing need not spend
 
     rings = shapely.linearrings(np.concatenate(outer), indices=np.repeat(np.arange(len(outer)), [len(loop) for loop in outer]))
-    start, piece = shapely.STRtree(shapely.polygons(rings)).query(shapely.points(starts), "within")
+    piece, start = shapely.STRtree(shapely.points(starts)).query(shapely.polygons(rings), "contains")
     pieces = np.full(len(starts), len(outer), np.int32)
     np.minimum.at(pieces, start, piece.astype(np.int32))  # of an island in a hole of another one the inner, which is smaller
     return pieces
