@@ -215,7 +215,7 @@ KITTEN = Path(__file__).parents[3].parent / "shared" / "models" / "kitten.off"
 
 @pytest.mark.slow
 def test_a_page_takes_a_third_of_what_it_may_and_holds_the_path_to_a_hundredth() -> None:
-    profile = load(settings=["process.scale=0.6", "search.beam_width=1", "search.directions=60"])
+    profile = load(settings=["process.scale=0.45", "search.beam_width=1", "search.directions=60"])
     model = str(KITTEN) if KITTEN.exists() else "demo:figure"
     program = build(decompose_model(ModelRequest(model, profile), to_build=True).decomposition, profile)
     content = print_page(model, program, profile)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -296,6 +296,7 @@ LINES = (
 )
 
 
+@settings(max_examples=50)
 @given(st.lists(st.sampled_from(LINES), max_size=25))
 def test_whatever_the_order_of_lines_rows_layers_and_parts_fit_together(lines: list[str]) -> None:
     header, columns = read("\n".join(lines))

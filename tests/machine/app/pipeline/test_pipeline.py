@@ -22,11 +22,13 @@ if SHARED.exists():
 WHOLE = {"hook.stl", "bracket.3mf"}  # no cut makes more of them safe
 QUICK = ["search.directions=100", "search.beam_width=1", "process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
 QUICK += ["process.scale=0.35", "process.walls=1", "process.infill_density=0.05"]  # a twentieth of the lines, the same shapes
+LARGE = ("bracket", "hook.stl", "kitten.off")  # those whose lines are most of all
 QUICK += ["search.seam_mm=0", "search.cut_mm2=0"]  # else nobody would cut what is so small
 
 
 def _built(model: str, machine: str) -> Program:
-    profile = load(machine=machine, settings=QUICK)
+    smaller = ["process.scale=0.25"] if model.endswith(LARGE) else []
+    profile = load(machine=machine, settings=[*QUICK, *smaller])
     return build(decompose_model(ModelRequest(model, profile)).decomposition, profile)
 
 

@@ -129,6 +129,23 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
         page.until(lambda state: state["rotation"] == as_it_lies["rotation"] and state["front"] == as_it_lies["front"])
 
 
+def test_the_best_of_a_search_that_is_stopped_is_what_the_command_line_cuts_by_its_plan(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        page.do("demo", name="demo:tree")
+        page.until(lambda state: state["model"] and state["model"]["name"] == "demo:tree")
+        page.do("search")
+        page.until(lambda state: state["search"] and state["search"]["planes"])
+        page.do("stop")
+        taken = page.until(lambda state: state["undo"] == "stop the search")
+        assert [row["time_s"] for row in taken["front"]] == [None]
+        (priced,) = page.until(lambda state: state["front"][0]["time_s"])["front"]
+    (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])
+    assert main(["decompose", "demo:tree", *QUICK, "--plan", "plan.toml", "--json", "cut.json"]) == 0
+    (cut,) = json.loads((folder / "cut.json").read_text())["front"]
+    figures = ("parts", "seam_mm", "support_area_mm2", "time_s", "filament_mm")
+    assert {name: priced[name] for name in figures} == {name: cut[name] for name in figures}
+
+
 def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refused(bench: Running, folder: Path) -> None:
     (folder / "other.stl").write_bytes(stl(tee(8.0)))
     assert main(["decompose", "other.stl", *QUICK, "--plan", "plan.toml"]) == 0
