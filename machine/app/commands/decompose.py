@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from machine.app.file_roles import check_model_files
 from machine.app.output import check_outputs, delete, make_folder, write_bytes, write_json
 from machine.app.pictures.front_picture import front_picture
@@ -17,7 +15,6 @@ from machine.app.terminal.plain import show
 from machine.app.terminal.report import part_settings_lines, parts_table
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
-from mdp.directions.turns import turned_by, turns_of
 from mdp.plans.writing import plan_text
 from mdp.save import FOLDER_FILES, HEADING, PART_FILES, glb, json_values, part_file, stl, threemf
 from profiles.profile import Profile
@@ -32,9 +29,7 @@ def decompose(request: ModelRequest) -> int:
     check_model_files(request, ())
     decomposed = decompose_model(request)
     decomposition, profile = decomposed.decomposition, decomposed.profile
-    turned = np.eye(3) if decomposed.plan.orientation is None else np.array(decomposed.plan.orientation)
-    rotate_deg = turns_of(turned @ turned_by(profile.process.rotate_deg))
-    figures = json_values(decomposition, decomposed.read_s, decomposed.total_s) | {"rotate_deg": rotate_deg}
+    figures = json_values(decomposition, decomposed.read_s, decomposed.total_s) | {"rotate_deg": profile.process.rotate_deg}
     if outputs.folder is not None:
         make_folder(outputs.folder)
         for part in decomposition.parts:

@@ -1,11 +1,15 @@
 """Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
 
 from machine.app.requests import ModelRequest
+from mdp.directions.turns import turned_by, turns_of
+from mdp.mesh import Floats
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.search.search import check_part_count
 from profiles.errors import PlanError, ProfileError
 from profiles.profile import Profile, with_part_settings
+
+TURN_DIGITS = 9  # of the degrees that a file tells: over a metre that is less than a tenth of a micrometre
 
 
 def read_given_plan(request: ModelRequest) -> PlanFile | None:
@@ -30,6 +34,13 @@ def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -
     if request.orient is not None or given is not None:
         return bool(request.orient) and given is None
     return profile.search.effective.objective == "scar" and not any(profile.process.rotate_deg)
+
+
+def as_turned(profile: Profile, orientation: Floats) -> Profile:
+    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it lies."""
+    turns = turns_of(orientation @ turned_by(profile.process.rotate_deg))
+    process = profile.process.model_copy(update={"rotate_deg": tuple(round(angle, TURN_DIGITS) + 0.0 for angle in turns)})
+    return profile.model_copy(update={"process": process})
 
 
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
