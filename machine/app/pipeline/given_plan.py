@@ -37,7 +37,8 @@ def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -
 
 
 def as_turned(profile: Profile, orientation: Floats) -> Profile:
-    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it lies."""
+    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it
+    lies."""
     turns = turns_of(orientation @ turned_by(profile.process.rotate_deg))
     process = profile.process.model_copy(update={"rotate_deg": tuple(round(angle, TURN_DIGITS) + 0.0 for angle in turns)})
     return profile.model_copy(update={"process": process})
