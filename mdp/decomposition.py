@@ -11,8 +11,8 @@ from mdp.pose import Pose
 from mdp.zone import UNMARKED, Marked
 from profiles.errors import DecompositionError
 
-VOLUME_TOLERANCE = 1e-6
-ORDER_TOLERANCE_MM = 1e-4
+VOLUME_TOLERANCE = 1e-6  # of the model's: 200 cuts at random lost 4e-16 of it at most, and a sliver left out is more
+ORDER_TOLERANCE_MM = 1e-4  # the same cuts left corners 5e-14 mm off their planes; no print shows a ten thousandth
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from mdp.pose import UP
 from profiles.frozen import Vector
 from profiles.machine import Machine
 
-FIELD = 120
+FIELD = 120  # directions all around, some 18 degrees apart
 
 
 @dataclass(frozen=True)

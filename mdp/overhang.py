@@ -13,7 +13,7 @@ from mdp.mesh import Floats, Mesh, dot
 from mdp.plane import UP as UP
 from mdp.plane import Plane
 
-ROUNDING = 1e-4
+ROUNDING = 1e-4  # faces at exactly the angle, common in printed models, are thrown to either side by float32 files
 PLATFORM_TOLERANCE_MM = 0.3  # a first layer's chamfer still stands on the platform
 BASE_TOLERANCE_MM = 1e-6  # faces of a part that a cut made lie in its base plane up to rounding
 

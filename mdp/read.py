@@ -19,7 +19,7 @@ from profiles.errors import MeshError
 DEMO = "demo:"
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
-TYPICAL_MM = 100.0
+TYPICAL_MM = 100.0  # of several units that would fit the one is proposed by which a model is nearest to this
 MANY_FACES = 500_000  # more make no better print: at 0.2 mm an edge they are an area of 90 cm2
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
 

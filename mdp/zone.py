@@ -20,7 +20,7 @@ from mdp.topology.edges import edges_of
 from profiles.frozen import Vector
 
 FARTHEST_MM = 1.0  # from a surface that a point may lie to mean a place of it
-MOST_GROWN_DEG = 180.0
+MOST_GROWN_DEG = 180.0  # no two normals are farther apart
 ROUNDING_COSINE = 1e-6  # an angle of 0 takes the faces of a flat place
 ROUNDING_MM = 1e-6  # a plane may touch what it must not pass through
 MOST_PRODUCTS = 4_000_000  # of directions and points at a time

@@ -83,10 +83,10 @@ def _is_private(folder: Path) -> bool:
 def _temporary() -> Path:
     """This user's folder among the temporary files. Raises OutputError where there can be none."""
     try:
-        place = Path(tempfile.gettempdir())
+        folder = Path(tempfile.gettempdir())
     except FileNotFoundError:
         raise OutputError("no folder for temporary files can be written: name one by the variable TMPDIR") from None
-    return place / (f"tiltprint-{os.geteuid()}" if hasattr(os, "geteuid") else "tiltprint")
+    return folder / (f"tiltprint-{os.geteuid()}" if hasattr(os, "geteuid") else "tiltprint")
 
 
 @cache

@@ -79,8 +79,8 @@ def merge_part_settings(process: Process, given: Iterable[PartSettings], nozzle_
     nozzle's diameter.
     """
     merged: dict[int, dict[str, Any]] = {}
-    for each in given:
-        merged[each.part] = merged.get(each.part, {}) | each.process
+    for settings in given:
+        merged[settings.part] = merged.get(settings.part, {}) | settings.process
     problems = [
         f"part {part}: {problem}" for part in sorted(merged) for problem in _problems(process, part, merged[part], nozzle_mm)
     ]

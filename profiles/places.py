@@ -54,7 +54,7 @@ def kind_of(name: str) -> str:
         if name in known(kind):
             return kind
     if not is_file_name(name):
-        raise _unknown("profile", name, (each for kind in KINDS for each in known(kind)))
+        raise _unknown("profile", name, (known_name for kind in KINDS for known_name in known(kind)))
     return kind_in(Path(name))
 
 
@@ -69,15 +69,15 @@ def kind_in(path: Path) -> str:
 
 def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
     """The tables of a profile by name or path, with those it inherits; ProfileError when there is no such profile."""
-    document, place = _document(kind, name, seen)
-    if place in seen:
-        raise ProfileError(f"{name} inherits itself by way of {', '.join(seen[seen.index(place) + 1 :]) or 'its own name'}")
+    document, source = _document(kind, name, seen)
+    if source in seen:
+        raise ProfileError(f"{name} inherits itself by way of {', '.join(seen[seen.index(source) + 1 :]) or 'its own name'}")
     if len(seen) >= MOST_INHERITED:
         raise ProfileError(f"{name} is inherited by way of {len(seen)} profiles: at most {MOST_INHERITED} are allowed")
     problem = strangers(kind, name, document)
     if problem:
         raise ProfileError(problem)
-    return merged(inherited(kind, name, document, (*seen, place)), own_tables(document))
+    return merged(inherited(kind, name, document, (*seen, source)), own_tables(document))
 
 
 def shipped_base(kind: str, name: str) -> str | None:
@@ -85,13 +85,13 @@ def shipped_base(kind: str, name: str) -> str | None:
     of the user's own stands in the shipped one's place."""
     seen: tuple[str, ...] = ()
     while True:
-        document, place = _document(kind, name, seen)
-        if place == name and name in shipped(kind):
+        document, source = _document(kind, name, seen)
+        if source == name and name in shipped(kind):
             return None if name in own(kind) else name
         parent = document.get(PARENT)
         if parent is None:
             return None
-        name, seen = _parent_of(name, parent), (*seen, place)
+        name, seen = _parent_of(name, parent), (*seen, source)
 
 
 def inherited(kind: str, name: str, document: Mapping[str, Any], seen: tuple[str, ...] = ()) -> dict[str, Any]:

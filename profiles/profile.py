@@ -37,7 +37,7 @@ class Profile(Frozen):
 
     def of_part(self, index: int) -> "Profile":
         """What a part is sliced with."""
-        own = next((each.process for each in self.parts if each.part == index), None)
+        own = next((settings.process for settings in self.parts if settings.part == index), None)
         return self if own is None else self.model_copy(update={"process": process_of_part(self.process, own), "parts": []})
 
     @property
@@ -83,7 +83,7 @@ def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[st
     for setting in settings:
         _apply(whole, setting)
         if setting.partition(".")[0].strip() not in OF_KIND[kind]:
-            own_keys = " and ".join(f"{each}." for each in OF_KIND[kind])
+            own_keys = " and ".join(f"{section}." for section in OF_KIND[kind])
             raise ProfileError(f"--set {setting}: {name} is a {kind} profile, whose keys begin with {own_keys}")
     problems = [problem for name in OF_KIND[kind] for problem in _section_problems(name, whole[name]).problems]
     if problems:

@@ -35,7 +35,7 @@ def read_value(text: str) -> Any:
 def value_text(value: Any) -> str:
     """A value of a profile in one line of TOML."""
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{key_text(key)} = {value_text(each)}' for key, each in value.items())}}}"
+        return f"{{{', '.join(f'{key_text(key)} = {value_text(entry)}' for key, entry in value.items())}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(value_text, value))}]"
     return json.dumps(value, ensure_ascii=False).replace(DELETE, "\\u007f")
@@ -44,9 +44,9 @@ def value_text(value: Any) -> str:
 def rows_text(value: Mapping[str, Any] | Sequence[Any]) -> str:
     """The same of a list or a table, a line for each of what is in it."""
     if isinstance(value, Mapping):
-        rows = ",\n".join(f"  {key_text(key)} = {value_text(each)}" for key, each in value.items())
+        rows = ",\n".join(f"  {key_text(key)} = {value_text(entry)}" for key, entry in value.items())
         return f"{{\n{rows}\n}}" if rows else "{}"
-    rows = "".join(f"  {value_text(each)},\n" for each in value)
+    rows = "".join(f"  {value_text(entry)},\n" for entry in value)
     return f"[\n{rows}]" if rows else "[]"
 
 

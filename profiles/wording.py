@@ -17,7 +17,7 @@ KINDS = (("A-Za-z", "letters"), ("0-9", "digits"))
 
 def sentences(problems: list[Any], root: type[BaseModel], prefix: str = "") -> list[str]:
     """One sentence for each problem of a ValidationError: key, value, what is allowed; keys are dotted after the prefix."""
-    unique = dict.fromkeys(sentence for problem in problems for sentence in _each(problem, root, prefix))
+    unique = dict.fromkeys(sentence for problem in problems for sentence in _sentences(problem, root, prefix))
     return list(unique)
 
 
@@ -35,7 +35,7 @@ def keys(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, FieldInfo]]
             yield f"{prefix}{name}", field
 
 
-def _each(problem: Any, root: type[BaseModel], prefix: str) -> Iterator[str]:
+def _sentences(problem: Any, root: type[BaseModel], prefix: str) -> Iterator[str]:
     """The sentences of one problem: a check of a whole table may tell several, one a line."""
     for text in problem["msg"].removeprefix("Value error, ").splitlines():
         yield _sentence(problem, text, root, prefix)
@@ -90,13 +90,13 @@ def _table(root: type[BaseModel], steps: tuple[str | int, ...]) -> type[BaseMode
 
 def _model(annotation: Any) -> type[BaseModel] | None:
     candidates = (annotation, *get_args(annotation))
-    return next((each for each in candidates if isinstance(each, type) and issubclass(each, BaseModel)), None)
+    return next((kind for kind in candidates if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
 
 
 def _allowed(annotation: Any, metadata: list[Any]) -> str:
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Literal:
-        return ("one of " if len(inner) > 1 else "") + ", ".join(_shown(each) for each in inner)
+        return ("one of " if len(inner) > 1 else "") + ", ".join(_shown(value) for value in inner)
     if origin is UnionType:
         return _allowed(inner[0], metadata)
     if origin is tuple:
@@ -108,7 +108,7 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
     if annotation is bool:
         return "true or false"
     if annotation is str:
-        pattern = next((text for each in metadata for text in [_bound(each, "pattern")] if text), None)
+        pattern = next((text for rule in metadata for text in [_bound(rule, "pattern")] if text), None)
         return _matching(pattern) if pattern else "a text"
     if annotation in (int, float):
         return ("a whole number" if annotation is int else "a number") + _range(metadata)
@@ -118,9 +118,9 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
 
 def _matching(pattern: str) -> str:
     """A text's pattern in words: one character of a few, or a name of some kinds of character."""
-    one, name = ONE_OF.fullmatch(pattern), NAME_OF.fullmatch(pattern)
-    if one:
-        return f"one letter of {one[1]}"
+    letter, name = ONE_OF.fullmatch(pattern), NAME_OF.fullmatch(pattern)
+    if letter:
+        return f"one letter of {letter[1]}"
     if not name:
         return f"a text that matches {pattern}"
     kinds = [*(word for characters, word in KINDS if characters in name[1]), *re.sub("[A-Za-z0-9]-[A-Za-z0-9]", "", name[1])]
@@ -133,23 +133,23 @@ def _list(item: Any, metadata: list[Any]) -> str:
         return f"a list of tables with the keys {', '.join(model.model_fields)}"
     if item is str:
         return "a list of texts"
-    most = next((most for each in metadata if (most := _bound(each, "max_length"))), None)
-    needed = " one or more" if any(_bound(each, "min_length") for each in metadata) else f" at most {most}" if most else ""
+    most = next((most for rule in metadata if (most := _bound(rule, "max_length"))), None)
+    needed = " one or more" if any(_bound(rule, "min_length") for rule in metadata) else f" at most {most}" if most else ""
     number = _allowed(get_args(item)[0], []).removeprefix("a ").replace("number", "numbers")
     return f"a list of{needed} pairs of {number}"
 
 
 def _range(metadata: list[Any]) -> str:
-    bounds = {name: value for each in metadata for name in ("ge", "gt", "le", "lt") if (value := _bound(each, name)) is not None}
+    bounds = {name: value for rule in metadata for name in ("ge", "gt", "le", "lt") if (value := _bound(rule, name)) is not None}
     low = f" from {bounds['ge']:g}" if "ge" in bounds else f" above {bounds['gt']:g}" if "gt" in bounds else ""
     high = f" to {bounds['le']:g}" if "le" in bounds else f" and below {bounds['lt']:g}" if "lt" in bounds else ""
     return low + (f" and{high.replace(' to', ' up to')}" if low.startswith(" above") and high.startswith(" to") else high)
 
 
-def _bound(constraint: Any, name: str) -> Any:
+def _bound(rule: Any, name: str) -> Any:
     """A bound of a constraint: annotated-types keep it as an attribute, pydantic's Field and general metadata below it."""
-    for each in (constraint, *getattr(constraint, "metadata", ())):
-        value = getattr(each, name, None)
+    for holder in (rule, *getattr(rule, "metadata", ())):
+        value = getattr(holder, name, None)
         if value is not None:
             return value
     return None

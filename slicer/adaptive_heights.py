@@ -16,7 +16,7 @@ from profiles.process import Process
 BIN_SHARE = 0.125  # of the least layer height: slopes are known in bins of this height, each by its worst face
 LEVEL = 0.9998  # cosine of one degree: flatter faces count as level
 LEAST_LEVEL_MM2 = 1.0  # a smaller level face is no surface that a layer should end at
-MOST_BINS = 2_000_000
+MOST_BINS = 2_000_000  # 16 MB; a part 300 mm high has 24,000 at a least layer height of 0.1 mm
 
 
 @dataclass(frozen=True, eq=False)

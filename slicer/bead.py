@@ -14,7 +14,7 @@ from slicer.geometry.segments import Segment, squared_distance
 from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
-ROUND_SIDES = 1.0 - pi / 4.0
+ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: what two half circles leave of their square, as in PrusaSlicer's Flow
 EVEN_MM = 0.03  # widths that differ by less are one
 PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSlicer's resolution of G-code
 

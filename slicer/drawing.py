@@ -26,10 +26,10 @@ COLOURS = {
 }
 WALLS = (Kind.OUTER_WALL, Kind.OVERHANG)
 TRAVEL_COLOUR, RETRACTED_COLOUR, SEAM_COLOUR = "#3c8d93", "#c2185b", "#000000"
-MARGIN_MM = 2.0
+MARGIN_MM = 2.0  # around the paths, more than half of any bead
 LINE_MM = 0.06  # how thick travels are drawn
 SCALE = 10  # pixels a millimetre, for viewers that do not zoom
-LEGEND_MM = 3.0
+LEGEND_MM = 3.0  # height of a row of the legend
 
 
 def layer_svg(sliced: SlicedPart, number: int) -> str:

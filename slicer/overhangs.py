@@ -127,7 +127,7 @@ def bridges_of_layers(
         bare = opening(free - held, 0.25 * process.line_width_mm)
         if bare.is_empty():
             continue
-        slopes = outlines[i] - union([free, *(bridge.place for bridge in overhang.bridges)])
+        slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
         anchors = edges(offset(union([_plastic_below(sections, i), held, slopes]), 0.25 * process.line_width_mm))
         bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
     return bridges
@@ -135,8 +135,8 @@ def bridges_of_layers(
 
 def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
     """The places that hanging layers make up together."""
-    places = [offset(place, RIM_MM) for place in hanging if not place.is_empty()]
-    return union([union(places[k : k + HEAP]) for k in range(0, len(places), HEAP)])
+    areas = [offset(area, RIM_MM) for area in hanging if not area.is_empty()]
+    return union([union(areas[k : k + HEAP]) for k in range(0, len(areas), HEAP)])
 
 
 def drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
@@ -144,5 +144,5 @@ def drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
     small = union([island for island in islands(seen_from_above(hanging)) if island.area() < least_mm2])
     if small.is_empty():
         return list(hanging)
-    large = [place if place.is_empty() else place - small for place in hanging]
-    return [place if place.area() >= LEAST_MM2 else Polygons() for place in large]
+    large = [area if area.is_empty() else area - small for area in hanging]
+    return [area if area.area() >= LEAST_MM2 else Polygons() for area in large]

@@ -29,7 +29,7 @@ from slicer.support.handed_down.plan import plan_supports
 from slicer.support.support import Supports, own_supports
 
 FEWEST_LAYERS = 250  # fewer are sliced sooner than processes are forked and their paths brought back
-LOOK_S = 0.2
+LOOK_S = 0.2  # between two looks at processes: progress moves five times a second
 
 Planned = Sequence[tuple[Supports, Sequence[Overhang]]]
 

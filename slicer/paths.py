@@ -118,7 +118,7 @@ class SlicedPart:
     @property
     def unsupported_mm2(self) -> float:
         """Area of all places without support."""
-        return sum(place.mm2 for place in self.unsupported)
+        return sum(area.mm2 for area in self.unsupported)
 
     @property
     def volume_mm3(self) -> float:

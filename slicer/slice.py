@@ -108,7 +108,7 @@ def _unsupported(supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupport
     """The places that got no support, with the numbers of the layers that print anything."""
     tops = np.array([layer.z_mm for layer in layers])
     count = np.searchsorted(tops, supports.sections.heights.tip_mm, side="right")
-    return tuple(replace(place, layer=int(count[place.layer])) for place in explain(supports))
+    return tuple(replace(area, layer=int(count[area.layer])) for area in explain(supports))
 
 
 def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None) -> Layer:

@@ -27,7 +27,7 @@ CONFINED = {
         "machine/app/pipeline/precompile",
     ),
     "numba": ("mdp/kernels/kernel",),
-    "shapely": (),
+    "shapely": ("slicer/travel/islands", "machine/dryrun/placement"),
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
     "httpx": ("machine/network/http.py",),

@@ -19,7 +19,7 @@ NAME = re.compile(r"`((?:profiles|mdp|slicer|machine)(?:\.[A-Za-z_]\w*)+)([(][^`
 
 def named(page: str) -> list[str]:
     text = (ROOT / page).read_text(encoding="utf-8")
-    return sorted({found[1] for found in NAME.finditer(text) if not is_key(found[1])})
+    return sorted({match[1] for match in NAME.finditer(text) if not is_key(match[1])})
 
 
 def is_key(name: str) -> bool:
@@ -30,15 +30,15 @@ def is_key(name: str) -> bool:
 
 def _is_field(model: Any, steps: list[str]) -> bool:
     fields = [kind.model_fields for kind in (model, *get_args(model)) if isinstance(kind, type) and issubclass(kind, BaseModel)]
-    return not steps or any(steps[0] in each and _is_field(each[steps[0]].annotation, steps[1:]) for each in fields)
+    return not steps or any(steps[0] in names and _is_field(names[steps[0]].annotation, steps[1:]) for names in fields)
 
 
 def exists(name: str) -> bool:
     """True for a package, a module, and what a module defines, down to the fields and methods of its classes."""
     steps = name.split(".")
     for count in range(len(steps), 0, -1):
-        place = ROOT.joinpath(*steps[:count])
-        file = place.with_suffix(".py") if place.with_suffix(".py").is_file() else place / "__init__.py"
+        path = ROOT.joinpath(*steps[:count])
+        file = path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__init__.py"
         if file.is_file():
             return _defined(ast.parse(file.read_text(encoding="utf-8")).body, steps[count:])
     return False
@@ -99,6 +99,6 @@ def test_the_check_tells_what_exists_from_what_does_not() -> None:
 def test_the_stages_take_what_the_tour_says(signature: str) -> None:
     module, _, function = signature.partition("(")[0].rpartition(".")
     tree = ast.parse(ROOT.joinpath(*module.split(".")).with_suffix(".py").read_text(encoding="utf-8"))
-    found = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == function)
-    assert f"{module}.{function}({', '.join(argument.arg for argument in found.args.args)})" == signature
+    definition = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == function)
+    assert f"{module}.{function}({', '.join(argument.arg for argument in definition.args.args)})" == signature
     assert f"`{signature}" in (ROOT / TOUR).read_text(encoding="utf-8")

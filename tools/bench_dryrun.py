@@ -64,9 +64,9 @@ def make(model: str, machine: str, scale: str, layer: str, file: Path) -> None:
     """Write the long program."""
     fine = [f"process.scale={scale}", f"process.layer_height_mm={layer}", "process.infill_density=1"]
     profile = load(machine=machine, settings=fine)
-    found = decompose_model(ModelRequest(model, profile, orient=False)).decomposition
-    sliced = slice_parts(found.parts, profile)
-    file.write_text("\n".join(write_gcode(plan(found, sliced, profile), profile)) + "\n")
+    decomposition = decompose_model(ModelRequest(model, profile, orient=False)).decomposition
+    sliced = slice_parts(decomposition.parts, profile)
+    file.write_text("\n".join(write_gcode(plan(decomposition, sliced, profile), profile)) + "\n")
 
 
 def stages(file: Path, profile: Profile) -> None:
@@ -110,8 +110,8 @@ def whole(file: Path, profile: Profile) -> None:
     run = dry_run(file.read_text().splitlines(), profile)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     errors = len(run.errors)
-    told = f"{len(run.program.line)} moves, {run.time_s / 3600:.1f} h, {errors} errors"
-    print(f"\nwhole: {process_time() - cpu:.1f} s processor, {perf_counter() - wall:.1f} s wall, peak {peak:.2f} GB ({told})")
+    summary = f"{len(run.program.line)} moves, {run.time_s / 3600:.1f} h, {errors} errors"
+    print(f"\nwhole: {process_time() - cpu:.1f} s processor, {perf_counter() - wall:.1f} s wall, peak {peak:.2f} GB ({summary})")
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ def row(name: str, mesh: Mesh, ours: Sequence[str], theirs: Sequence[str]) -> st
         outs = Path(folder) / "ours.gcode", Path(folder) / "theirs.gcode"
         core_s(ours, outs[0], file)  # compiles what is not compiled yet
         runs = [[core_s(command, out, file) for command, out in zip((ours, theirs), outs, strict=True)] for _ in range(RUNS)]
-        best = [min(each) for each in zip(*runs, strict=True)]
+        best = [min(figures) for figures in zip(*runs, strict=True)]
         lines = [len(out.read_bytes().splitlines()) for out in outs]
     return f"| {name} | {best[0]:.2f} | {lines[0]} | {best[1]:.2f} | {lines[1]} | {best[0] / best[1]:.2f} |"
 

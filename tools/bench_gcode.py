@@ -43,9 +43,9 @@ def main() -> None:
     given = parser.parse_args()
     blocks = ["machine.gcode.start=", "machine.gcode.end="]  # the example's own are Marlin's
     profile = load(settings=[f"machine.dialect={given.dialect}", f"machine.coordinates={given.coordinates}", *blocks])
-    made = program()
+    planned = program()
     marks = [time.process_time()]
-    begun = write_gcode(made, profile)
+    begun = write_gcode(planned, profile)
     marks.append(time.process_time())
     lines = tuple(begun)
     marks.append(time.process_time())

@@ -187,13 +187,13 @@ def main() -> None:
     for name, advanced in kinds if "terminal" in what else ():
         wall_s, work_s = over_the_terminal(lines, BuildOptions(advanced_ok=advanced))
         print(f"{name:10s} {len(lines) / wall_s:8.0f} lines/s  ({len(lines)} lines in {wall_s:.1f} s, processor {work_s:.1f} s)")
-    for where in (place for place in ("uart", "virtual") if place in what):
+    for where in (kind for kind in ("uart", "virtual") if kind in what):
         for baud in BAUDS:
             for name, advanced in kinds:
                 build = BuildOptions(advanced_ok=advanced, rx_ring=128)
                 rate, share, again, lost = used(resting(UART_LINES), baud, build, where == "uart")
-                told = f"{rate:6.1f} lines/s, {100 * share:5.1f} % of the line, {again} resends, {lost} bytes lost"
-                print(f"{where:8s} {baud:7d} {name:10s} {told}", flush=True)
+                figures = f"{rate:6.1f} lines/s, {100 * share:5.1f} % of the line, {again} resends, {lost} bytes lost"
+                print(f"{where:8s} {baud:7d} {name:10s} {figures}", flush=True)
     if "alone" in what:
         print(f"{'sender':10s} {len(lines) / sender_alone(lines):8.0f} lines/s alone")
         print(f"{'firmware':10s} {len(lines) / firmware_alone(lines):8.0f} lines/s alone")

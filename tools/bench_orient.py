@@ -2,9 +2,8 @@
 
     python tools/bench_orient.py MODEL [MODEL ...] [--set KEY=VALUE ...]
 
-One row a model: scars in mm2 and minutes in one piece as it stands, as the search cuts it there, and laid down; in brackets
-the time and the filament over those of one piece as it stands. Then processor time of the search alone, and of laying down over
-it.
+One row a model: scars in mm2 and minutes in one piece as it stands, as the search cuts it there, and laid down; in brackets the
+time and the filament over those of one piece as it stands. Then processor time of the search alone, and of laying down over it.
 """
 
 import argparse

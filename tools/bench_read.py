@@ -45,8 +45,8 @@ def row(kind: str, names: list[Path], folder: Path) -> str:
     for number, path in enumerate(written(kind, names, folder)):
         ours, theirs = READERS[path.suffix], read_with_trimesh
         times.append((seconds(ours, path), seconds(theirs, path)))
-        one, other = (concatenate(reader(path)) for reader in (ours, theirs))
-        same += np.array_equal(one.vertices[one.faces], other.vertices[other.faces])
+        own, theirs_read = (concatenate(reader(path)) for reader in (ours, theirs))
+        same += np.array_equal(own.vertices[own.faces], theirs_read.vertices[theirs_read.faces])
         if number < WEIGHED:
             memory.append(peak_bytes(theirs, path) / peak_bytes(ours, path))
     ours_ms, theirs_ms = np.median(times, axis=0) * 1e3

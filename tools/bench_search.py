@@ -63,10 +63,15 @@ def searches(mesh: Mesh, name: str, profiles: Sequence[Profile]) -> None:
     heading("B", "M2", "parts", "candidates", "core s", "wall s", "largest memory so far, MB")
     for profile in profiles:
         core, wall = time.process_time(), time.perf_counter()
-        found = decompose(mesh, name, profile)
+        result = decompose(mesh, name, profile)
         spent = (f"{time.process_time() - core:.2f}", f"{time.perf_counter() - wall:.2f}")
-        told = (profile.search.beam_width, f"{found.reduction:.4f}", len(found.parts), found.candidates_evaluated)
-        row(*told, *spent, memory_mb())
+        figures = (
+            profile.search.beam_width,
+            f"{result.reduction:.4f}",
+            len(result.parts),
+            result.candidates_evaluated,
+        )
+        row(*figures, *spent, memory_mb())
 
 
 def growth(mesh: Mesh, profile: Profile, largest: int) -> None:
@@ -90,9 +95,9 @@ def growth(mesh: Mesh, profile: Profile, largest: int) -> None:
         _, two_s = on_cores(2, work)
         core, wall = time.process_time(), time.perf_counter()
         decompose(shape, "grown", profile)
-        each = (f"{core_s / count * 1e6:.2f}", f"{core_s / profile.search.directions / len(shape.faces) * 1e9:.1f}")
+        shares = (f"{core_s / count * 1e6:.2f}", f"{core_s / profile.search.directions / len(shape.faces) * 1e9:.1f}")
         spent = (time.process_time() - core, time.perf_counter() - wall)
-        row(len(shape.faces), *each, *(f"{value:.3f}" for value in (core_s, two_s, *spent)), memory_mb())
+        row(len(shape.faces), *shares, *(f"{value:.3f}" for value in (core_s, two_s, *spent)), memory_mb())
         shape = subdivided(shape)
 
 
@@ -110,9 +115,9 @@ def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], 
     remainder = Remainder(mesh, risky_upright(mesh, angle_deg, profile.search.count_platform_faces))
 
     def evaluate() -> int:
-        found = gains(remainder, limits.directions, step_mm, threshold(angle_deg))
+        evaluated = gains(remainder, limits.directions, step_mm, threshold(angle_deg))
         sweep(remainder, limits.directions, step_mm, limits.least_height_mm)
-        return int(found.count.sum())
+        return int(evaluated.count.sum())
 
     return evaluate, evaluate()
 

@@ -75,14 +75,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print_table(ours(mesh, profile), rival(mesh, words) if shutil.which(options.rival) else None)
 
 
-def print_table(own: Figures, other: Figures | None) -> None:
+def print_table(own: Figures, peer: Figures | None) -> None:
     """Own figures, those of the rival and own / rival."""
     rows = [
-        ("core s", own.core_s, other and other.core_s),
-        ("memory MB", own.memory_mb, other and other.memory_mb),
-        ("plastic cm3", own.plastic_mm3 / 1000, other and other.plastic_mm3 / 1000),
+        ("core s", own.core_s, peer and peer.core_s),
+        ("memory MB", own.memory_mb, peer and peer.memory_mb),
+        ("plastic cm3", own.plastic_mm3 / 1000, peer and peer.plastic_mm3 / 1000),
         *(
-            (f"{kind.value} m", own.lengths_m.get(kind.value, 0.0), other and other.lengths_m.get(kind.value, 0.0))
+            (f"{kind.value} m", own.lengths_m.get(kind.value, 0.0), peer and peer.lengths_m.get(kind.value, 0.0))
             for kind in KINDS
         ),
     ]

@@ -98,8 +98,8 @@ def own_gcode(mesh: Mesh, profile: Profile) -> list[str]:
     """Our text from the first layer on."""
     pose = level(profile.machine)
     part = Part(1, mesh, PLATFORM, pose, np.eye(3), mesh.volume_mm3, 0.0)
-    found = Decomposition("bench", mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
-    return list(write_gcode(plan(found, [slice_part(part, profile)], profile), profile))
+    decomposition = Decomposition("bench", mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    return list(write_gcode(plan(decomposition, [slice_part(part, profile)], profile), profile))
 
 
 def prusa_gcode(mesh: Mesh, command: str) -> list[str]:

@@ -19,16 +19,16 @@ SCREEN = "document.documentElement.dataset"
 WHEEL = "document.getElementById('canvas').dispatchEvent(new WheelEvent('wheel', {deltaY: %d, cancelable: true}))"
 
 
-def made(model: str, settings: list[str]) -> bytes:
+def page_of(model: str, settings: list[str]) -> bytes:
     """The page of a model, and its row of the first table."""
     profile = load(settings=settings)
     request = ModelRequest(model, profile, orient=False)
-    found = decompose_model(request, to_build=True).decomposition
-    program = build(found, profile)
+    decomposition = decompose_model(request, to_build=True).decomposition
+    program = build(decomposition, profile)
     began = perf_counter()
     page = print_page(request.name, program, profile)
     seconds, moves = perf_counter() - began, len(program.run.program.line)
-    alone = len(parts_page(found, profile)) / 1e6
+    alone = len(parts_page(decomposition, profile)) / 1e6
     print(f"| {request.name} | {moves} | {len(page) / 1e6:.2f} | {len(page) / moves:.1f} | {seconds:.2f} | {alone:.2f} |")
     return page
 
@@ -67,7 +67,7 @@ def main() -> None:
             print("| model | moves | page MB | bytes a move | made in s | parts alone MB |\n|---|---|---|---|---|---|")
         for model in models:
             pages[model] = Path(folder) / f"{len(pages)}.html"
-            pages[model].write_bytes(made(model, given.settings))
+            pages[model].write_bytes(page_of(model, given.settings))
         if CHROMIUM is None:
             return
         print("\n| page | rows | usable after s | first picture s | every move s | frame s |\n|---|---|---|---|---|---|")

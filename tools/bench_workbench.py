@@ -181,7 +181,7 @@ def memory(running: Running) -> str:
     return f"{len(processes)}, {kib / 2**20:.2f} GiB"
 
 
-def told(row: dict[str, float]) -> str:
+def sentence(row: dict[str, float]) -> str:
     """A row of the table."""
     live = f"{1000 * row['live']:.0f} / {1000 * row['worst']:.0f}"
     page, turn = (f"{row[of]:.0f} / {row[f'worst {of}']:.0f}" if of in row else "-" for of in ("page", "turn"))
@@ -218,7 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             models.append(f"{folder}/figure-{faces}.stl")
             Path(models[-1]).write_bytes(stl(mesh_of(figure(faces))))
         for model in models:
-            print(told(measure(model, options.moves)), flush=True)
+            print(sentence(measure(model, options.moves)), flush=True)
 
 
 if __name__ == "__main__":

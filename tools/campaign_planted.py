@@ -23,10 +23,10 @@ def plant_all(run: Run, limits: Limits) -> dict[str, Any] | None:
     """Export a model, plant every fault by itself and dry-run it: the line of planted.jsonl, name of fault -> result."""
     if time.time() > limits.begin_before:
         return None
-    with TemporaryDirectory() as place:
-        file = model_file(run, Path(place))
-        gcode = Path(place) / "print.gcode"
-        tiltprint(["export", str(file), "-o", str(gcode), *options_of(run, file)], Path(place), limits)
+    with TemporaryDirectory() as folder:
+        file = model_file(run, Path(folder))
+        gcode = Path(folder) / "print.gcode"
+        tiltprint(["export", str(file), "-o", str(gcode), *options_of(run, file)], Path(folder), limits)
         lines = gcode.read_text().split("\n") if gcode.exists() else []
     profile = read_embedded_profile(lines, load(), frozenset())[0]
     clean = {finding.code for finding in dry_run(lines, profile).findings}
@@ -80,5 +80,5 @@ def planted_table(records: Sequence[dict[str, Any]]) -> str:
         where = ", ".join(file for file, end in ends.items() if end == MISSED)
         rows.append("| " + " | ".join([name, *(str(counts[end]) for end in RESULTS), where or "-"]) + " |")
     whole = Counter(end for record in records for end in record["results"].values())
-    told = ", ".join(f"{whole[end]} {end}" for end in RESULTS)
-    return "\n".join([f"{sum(whole.values())} plantings into {len(records)} programs: {told}", "", *rows])
+    summary = ", ".join(f"{whole[end]} {end}" for end in RESULTS)
+    return "\n".join([f"{sum(whole.values())} plantings into {len(records)} programs: {summary}", "", *rows])

@@ -97,18 +97,18 @@ def tiltprint(arguments: Sequence[str], folder: Path, limits: Limits) -> Ended:
 def peak_mb(pid: int) -> float:
     """The most memory that a process has taken so far; what wait4 tells begins with what its parent had when it forked."""
     try:
-        told = Path(f"/proc/{pid}/status").read_text()
+        status = Path(f"/proc/{pid}/status").read_text()
     except OSError:
         return 0.0
-    return float(next((line.split()[1] for line in told.splitlines() if line.startswith("VmHWM:")), 0)) / 1024
+    return float(next((line.split()[1] for line in status.splitlines() if line.startswith("VmHWM:")), 0)) / 1024
 
 
 def run_print(run: Run, out: Path, limits: Limits, keep: bool) -> dict[str, Any] | None:
     """Print a model: the line of runs.jsonl. The G-code of what is refused or suspect is kept in out/kept. None: too late."""
     if time.time() > limits.begin_before:
         return None
-    with TemporaryDirectory() as place:
-        folder = Path(place)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
         file = model_file(run, folder)
         options = options_of(run, file)
         gcode, figures = folder / "print.gcode", folder / "figures.json"

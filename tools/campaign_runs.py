@@ -44,7 +44,7 @@ class Run:
         return f"{self.group}/{self.model}{VARIED if self.varies else ''}"
 
     @property
-    def place(self) -> str:
+    def order_key(self) -> str:
         """Sorts runs so that the first n of all are a fair sample of all."""
         return sha256(self.name.encode()).hexdigest()
 
@@ -53,7 +53,7 @@ def all_runs(folders: dict[str, Path], forms: int, varied_share: float) -> list[
     """Every model of folders (by group) and so many forms, each by default settings, and a share of them varied, in order."""
     models = [Run(group, file.stem, str(file.resolve())) for group, folder in folders.items() for file in _models(folder)]
     models += [Run("forms", name, name) for name in form_names(forms)]
-    return sorted([*models, *_varied(models, varied_share)], key=lambda run: run.place)
+    return sorted([*models, *_varied(models, varied_share)], key=lambda run: run.order_key)
 
 
 def _models(folder: Path) -> list[Path]:
@@ -62,7 +62,7 @@ def _models(folder: Path) -> list[Path]:
 
 def _varied(runs: list[Run], share: float) -> Iterator[Run]:
     for run in (Run(run.group, run.model, run.source, True) for run in runs):
-        if int(run.place[8:16], 16) < share * 2**32:  # not the digits that order them: these would all come first
+        if int(run.order_key[8:16], 16) < share * 2**32:  # not the digits that order them: these would all come first
             yield run
 
 
@@ -95,7 +95,7 @@ def options_of(run: Run, file: Path) -> list[str]:
         return []
     dice = random.Random(run.name)
     machine, nozzle_mm = dice.choice(MACHINES), dice.choice(NOZZLES_MM)
-    height_mm = dice.choice([each for each in HEIGHTS_MM if each <= 0.75 * nozzle_mm])
+    height_mm = dice.choice([height for height in HEIGHTS_MM if height <= 0.75 * nozzle_mm])
     support = dice.choice([*get_args(Process.model_fields["support_style"].annotation), "none"])
     copies = dice.choice([1, 1, 1, 1, 1, 2, 3])
     settings = {

@@ -48,10 +48,10 @@ def failures(records: Sequence[Record]) -> Iterator[str]:
     yield "| run | outcome | what is said | our own look | options |"
     yield "|---" * 5 + "|"
     order = {outcome: k for k, outcome in enumerate(reversed(OUTCOMES))}
-    for record in sorted(records, key=lambda each: (order[each["outcome"]], each["name"])):
+    for record in sorted(records, key=lambda row: (order[row["outcome"]], row["name"])):
         if record["outcome"] != PRINTED or record.get("suspect"):
-            found = record.get("findings") or []
-            said = "; ".join(f"{f['code']} (part {f['part']}, layer {f['layer']}): {f['message']}" for f in found)
+            findings = record.get("findings") or []
+            said = "; ".join(f"{f['code']} (part {f['part']}, layer {f['layer']}): {f['message']}" for f in findings)
             cells = [record["name"], record["outcome"], said or record["sentence"] or "-"]
             cells += ["; ".join(record.get("suspect", [])) or "-", record["options"] or "-"]
             yield "| " + " | ".join(cell.replace("|", "/").replace("\n", " ") for cell in cells) + " |"

@@ -65,9 +65,9 @@ def row(file: Path, model: Path | None) -> tuple[str, int]:
     compared = process_time()
     errors = "; ".join(f"{f.code} (line {f.line}, part {f.part}, layer {f.layer}): {f.message}" for f in run.errors)
     warnings = Counter(f.code for f in run.findings if f.severity == "warning" and f.code != "uncalibrated")
-    told = " ".join(f"{code} {count}" for code, count in sorted(warnings.items()))
+    counts = " ".join(f"{code} {count}" for code, count in sorted(warnings.items()))
     seconds = f"{played - began:.1f} | {compared - played:.1f}"
-    return f"| {file.stem} | {len(run.program.line)} | {errors or 0} | {told} | {seconds} |", len(run.errors)
+    return f"| {file.stem} | {len(run.program.line)} | {errors or 0} | {counts} | {seconds} |", len(run.errors)
 
 
 if __name__ == "__main__":

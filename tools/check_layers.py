@@ -49,8 +49,8 @@ def looked_at(layer: Layer, section: shapely.Geometry, width_mm: float) -> tuple
     slit = 0.5 * SLIT * width_mm
     empty = section.difference(plastic).buffer(-slit).buffer(slit)
     spots = [spot.area for spot in shapely.get_parts(empty)]
-    over = [each for each in shapely.get_parts(plastic.difference(section)) if each.area > 1e-6]
-    corners = [shapely.distance(section, shapely.points(np.array(each.exterior.coords))).max() for each in over]
+    over = [piece for piece in shapely.get_parts(plastic.difference(section)) if piece.area > 1e-6]
+    corners = [shapely.distance(section, shapely.points(np.array(piece.exterior.coords))).max() for piece in over]
     return [area for area in spots if area > 0.05 * width_mm**2], max(corners, default=0.0)
 
 

@@ -62,27 +62,27 @@ def row(file: Path, machine: str, settings: list[str], stream: bool) -> str:
     began = process_time()
     try:
         profile = load(machine=machine, settings=["process.infill_density=1", *settings])
-        found = decompose_model(ModelRequest(str(file), profile)).decomposition
+        decomposition = decompose_model(ModelRequest(str(file), profile)).decomposition
         searched = process_time()
-        program = build(found, profile)
+        program = build(decomposition, profile)
     except UserError as error:
         return f"| {file.name} | {machine} | refused: {error} |"
     if stream:
         program = streamed(program, profile)
-    told = [*figures(found, program, profile), round(searched - began), round(process_time() - searched)]
-    return "| " + " | ".join(str(cell) for cell in [file.name, machine, *told]) + " |"
+    cells = [*figures(decomposition, program, profile), round(searched - began), round(process_time() - searched)]
+    return "| " + " | ".join(str(cell) for cell in [file.name, machine, *cells]) + " |"
 
 
-def figures(found: Decomposition, program: Program, profile: Profile) -> list[object]:
+def figures(decomposition: Decomposition, program: Program, profile: Profile) -> list[object]:
     """The columns between the machine and the seconds."""
-    told, run = agreement(program.run, found.mesh, profile)
-    mesh = found.mesh
+    agreed, run = agreement(program.run, decomposition.mesh, profile)
+    mesh = decomposition.mesh
     codes = sorted({finding.code for finding in run.errors})
-    error = abs(found.volume_mm3 / mesh.volume_mm3 - 1.0)
+    error = abs(decomposition.volume_mm3 / mesh.volume_mm3 - 1.0)
     plastic = run.segment_mm3.sum() / mesh.volume_mm3
     return [
-        len(found.parts), f"{error:.1e}", f"{found.reduction:.3f}", f"{told.filled:.4f}", f"{plastic:.3f}",
-        f"{told.outside:.4f}", f"{told.farthest_mm:.2f}", f"{told.unsupported:.4f}", f"{told.reported:.4f}",
+        len(decomposition.parts), f"{error:.1e}", f"{decomposition.reduction:.3f}", f"{agreed.filled:.4f}", f"{plastic:.3f}",
+        f"{agreed.outside:.4f}", f"{agreed.farthest_mm:.2f}", f"{agreed.unsupported:.4f}", f"{agreed.reported:.4f}",
         " ".join(codes) or "0",
     ]  # fmt: skip
 

@@ -66,11 +66,11 @@ def summary(rows: list[str]) -> str:
 
 def files(models: list[Path], every: int) -> list[Path]:
     """The files that are named, and every Nth of the folders."""
-    found = []
+    chosen = []
     for model in models:
         inside = sorted(file for file in model.iterdir() if file.suffix != ".csv") if model.is_dir() else [model]
-        found += inside[::every]
-    return found
+        chosen += inside[::every]
+    return chosen
 
 
 def mesh_of(file: Path, profile: Profile) -> Mesh:
@@ -90,20 +90,20 @@ def row(file: Path, profile: Profile, orient: bool) -> str:
         if len(decomposition.parts) == 1 and not orient:
             return f"| {file.name} | 1 | 1 | 1 | | {decomposition.risky_area_mm2:.0f} | | | stays whole |"
         program = build(decomposition, profile)
-        other = best_lying(mesh, profile) if orient else straight_up(decomposition, profile)
+        uncut = best_lying(mesh, profile) if orient else straight_up(decomposition, profile)
         ours = in_parts(program, profile)
     except UserError as error:
         return f"| {file.name} | | | | | | | | {error} |"
-    if other.time_s is None:
-        return f"| {file.name} | {ours.parts} | | | | | | | one piece: {other.message} |"
+    if uncut.time_s is None:
+        return f"| {file.name} | {ours.parts} | | | | | | | one piece: {uncut.message} |"
     cells = [
         file.name,
         str(ours.parts),
-        f"{ours.time_s / other.time_s:.3f}",
-        f"{ours.filament_mm / other.filament_mm:.3f}",
-        f"{ours.support_mm3 / 1000:.2f} / {other.support_mm3 / 1000:.2f}",
-        f"{ours.risky_mm2:.0f} / {other.risky_mm2:.0f}",
-        f"{ours.unsupported_mm2:.0f} / {other.unsupported_mm2:.0f}",
+        f"{ours.time_s / uncut.time_s:.3f}",
+        f"{ours.filament_mm / uncut.filament_mm:.3f}",
+        f"{ours.support_mm3 / 1000:.2f} / {uncut.support_mm3 / 1000:.2f}",
+        f"{ours.risky_mm2:.0f} / {uncut.risky_mm2:.0f}",
+        f"{ours.unsupported_mm2:.0f} / {uncut.unsupported_mm2:.0f}",
         f"{ours.seam_mm:.0f}",
         ours.message,
     ]

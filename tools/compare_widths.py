@@ -162,17 +162,26 @@ def searched(key: Key, mesh: Mesh) -> Row:
     core, wall = time.process_time(), time.perf_counter()
     search = (name, settings, method, width, len(mesh.faces))
     try:
-        found = decompose(mesh, name, profile, ranker=ranker)
+        result = decompose(mesh, name, profile, ranker=ranker)
     except Exception as error:  # noqa: BLE001 - whatever fails is what the table counts
         spent = (time.process_time() - core, time.perf_counter() - wall)
         return Row(*search, 0.0, 0.0, 1.0, 0, *spent, 0, f"{type(error).__name__}: {error}", ranker)
     spent = (time.process_time() - core, time.perf_counter() - wall)
-    if found.risky_area_mm2 <= 0.0:
-        return Row(*search, 0.0, 0.0, 0.0, 1, *spent, found.candidates_evaluated, "", ranker)
-    cost_mm2 = min(row.cost_mm2 for row in found.front) if profile.search.objective == "scar" else found.residual_area_mm2
-    share, floor = cost_mm2 / found.risky_area_mm2, floor_mm2(mesh, profile) / found.risky_area_mm2
+    if result.risky_area_mm2 <= 0.0:
+        return Row(*search, 0.0, 0.0, 0.0, 1, *spent, result.candidates_evaluated, "", ranker)
+    cost_mm2 = min(row.cost_mm2 for row in result.front) if profile.search.objective == "scar" else result.residual_area_mm2
+    share, floor = cost_mm2 / result.risky_area_mm2, floor_mm2(mesh, profile) / result.risky_area_mm2
     return Row(
-        *search, found.risky_area_mm2, cost_mm2, share, len(found.parts), *spent, found.candidates_evaluated, "", ranker, floor
+        *search,
+        result.risky_area_mm2,
+        cost_mm2,
+        share,
+        len(result.parts),
+        *spent,
+        result.candidates_evaluated,
+        "",
+        ranker,
+        floor,
     )
 
 
@@ -193,15 +202,15 @@ def read(path: Path) -> list[Row]:
         return [Row(**{key: kinds[key](value) for key, value in line.items()}) for line in csv.DictReader(file)]
 
 
-def summary(found: Sequence[Row]) -> Iterator[str]:
+def summary(records: Sequence[Row]) -> Iterator[str]:
     """A table in Markdown for each of the settings, then what failed."""
-    for settings in dict.fromkeys(row.settings for row in found):
-        here = [row for row in found if row.settings == settings]
+    for settings in dict.fromkeys(row.settings for row in records):
+        here = [row for row in records if row.settings == settings]
         yield table([row for row in here if row.ranker == CLASSIC], settings)
         for method in sorted({row.method for row in here if row.ranker != CLASSIC}):
             yield rankers_table([row for row in here if row.method == method], f"{settings or 'default settings'}, {method}")
-    failed = [f"- {row.mesh}, {row.method}, width {row.width}: {row.error}" for row in found if row.error]
-    yield "\n".join([f"{len(failed)} of {len(found)} searches failed", *failed])
+    failed = [f"- {row.mesh}, {row.method}, width {row.width}: {row.error}" for row in records if row.error]
+    yield "\n".join([f"{len(failed)} of {len(records)} searches failed", *failed])
 
 
 HEADS = (
@@ -211,10 +220,10 @@ HEADS = (
 )
 
 
-def table(found: Sequence[Row], settings: str) -> str:
+def table(records: Sequence[Row], settings: str) -> str:
     """One row a method and width, over the models with a risky face for which all of them were searched without failure."""
-    shares = _by_search(found)
-    models = sorted(set.intersection(*(set(each) for each in shares.values()))) if shares else []
+    shares = _by_search(records)
+    models = sorted(set.intersection(*(set(by_mesh) for by_mesh in shares.values()))) if shares else []
     count = HEADS.count("|") + 1
     lines = [f"{settings or 'default settings'}, {len(models)} models", "", f"| {HEADS} |", "|" + "---|" * count]
     for method, width in sorted(shares):
@@ -227,12 +236,12 @@ def table(found: Sequence[Row], settings: str) -> str:
     return "\n".join(lines)
 
 
-def _by_search(found: Sequence[Row]) -> dict[tuple[str, int], dict[str, Row]]:
+def _by_search(records: Sequence[Row]) -> dict[tuple[str, int], dict[str, Row]]:
     searches: dict[tuple[str, int], dict[str, Row]] = {}
-    for row in found:
-        each = searches.setdefault((row.method, row.width), {})
+    for row in records:
+        by_mesh = searches.setdefault((row.method, row.width), {})
         if not row.error and row.risky_mm2 > 0:
-            each[row.mesh] = row
+            by_mesh[row.mesh] = row
     return searches
 
 
@@ -264,16 +273,16 @@ RANKER_HEADS = (
 MORE = 0.01  # of J: a model is worse or better
 
 
-def rankers_table(found: Sequence[Row], title: str) -> str:
+def rankers_table(records: Sequence[Row], title: str) -> str:
     """One row a ranker and width, over the models with a risky face for which all of them were searched without failure."""
     searches: dict[tuple[str, int], dict[str, Row]] = {}
-    for row in found:
-        each = searches.setdefault((row.ranker, row.width), {})
+    for row in records:
+        by_mesh = searches.setdefault((row.ranker, row.width), {})
         if not row.error and row.risky_mm2 > 0:
-            each[row.mesh] = row
-    models = sorted(set.intersection(*(set(each) for each in searches.values())))
+            by_mesh[row.mesh] = row
+    models = sorted(set.intersection(*(set(by_mesh) for by_mesh in searches.values())))
     lines = [f"{title}, {len(models)} models", "", f"| {RANKER_HEADS} |", "|" + "---|" * (RANKER_HEADS.count("|") + 1)]
-    plain = {width: [each[name] for name in models] for (ranker, width), each in searches.items() if ranker == CLASSIC}
+    plain = {width: [by_mesh[name] for name in models] for (ranker, width), by_mesh in searches.items() if ranker == CLASSIC}
     for ranker, width in sorted(searches, key=lambda key: (key[1], key[0])):
         here = [searches[ranker, width][name] for name in models]
         lines.append(f"| {ranker} | {width} | {' | '.join(_ranker_cells(here, plain, width))} |")
@@ -282,7 +291,7 @@ def rankers_table(found: Sequence[Row], title: str) -> str:
 
 def _ranker_cells(here: list[Row], plain: dict[int, list[Row]], width: int) -> list[str]:
     costs = {number: _free(rows) for number, rows in plain.items()}
-    means = {number: float(each.mean()) for number, each in costs.items()}
+    means = {number: float(shares.mean()) for number, shares in costs.items()}
     own, widest = _free(here), max(plain, default=0)
 
     def of_gap(wide: int, narrow: int) -> str:
@@ -301,13 +310,13 @@ def _ranker_cells(here: list[Row], plain: dict[int, list[Row]], width: int) -> l
     return [*cells, f"{worse.mean():.1%}", f"{better.mean():.1%}"]
 
 
-def _free(found: Sequence[Row]) -> Floats:
+def _free(records: Sequence[Row]) -> Floats:
     """J without the floor, shares of what is risky straight up."""
-    return np.array([row.share - row.floor for row in found])
+    return np.array([row.share - row.floor for row in records])
 
 
-def _column(found: Sequence[Row], name: str) -> Floats:
-    return np.array([getattr(row, name) for row in found], dtype=np.float64)
+def _column(records: Sequence[Row], name: str) -> Floats:
+    return np.array([getattr(row, name) for row in records], dtype=np.float64)
 
 
 def ratios(values: Floats, others: Floats) -> Floats:

@@ -101,8 +101,8 @@ def move(content: bytes, dice: random.Random) -> bytes:
     """A stretch stands elsewhere."""
     begin, end = span(content, dice)
     rest = content[:begin] + content[end:]
-    place = dice.randrange(len(rest) + 1)
-    return rest[:place] + content[begin:end] + rest[place:]
+    begin_at = dice.randrange(len(rest) + 1)
+    return rest[:begin_at] + content[begin:end] + rest[begin_at:]
 
 
 def fill(content: bytes, dice: random.Random) -> bytes:
@@ -114,7 +114,7 @@ def fill(content: bytes, dice: random.Random) -> bytes:
 def renumber(content: bytes, dice: random.Random) -> bytes:
     """Some numbers are others that readers stumble over."""
     places = list(NUMBER.finditer(content[:200_000]))
-    for match in sorted(dice.sample(places, min(len(places), dice.choice([1, 2, 10]))), key=lambda each: -each.start()):
+    for match in sorted(dice.sample(places, min(len(places), dice.choice([1, 2, 10]))), key=lambda number: -number.start()):
         content = content[: match.start()] + dice.choice(NASTY) + content[match.end() :]
     return content
 
@@ -162,12 +162,12 @@ def model_seeds(folders: Sequence[Path]) -> list[tuple[str, bytes]]:
     return seeds
 
 
-def program_seeds(folders: Sequence[Path], place: Path) -> list[tuple[str, bytes]]:
+def program_seeds(folders: Sequence[Path], scratch: Path) -> list[tuple[str, bytes]]:
     """(suffix, content) of whole G-code files."""
     for machine in MACHINES:
-        if tiltprint(["export", "demo:bracket", "--parts", "2", "--machine", machine, "-o", str(place / f"{machine}.gcode")]):
+        if tiltprint(["export", "demo:bracket", "--parts", "2", "--machine", machine, "-o", str(scratch / f"{machine}.gcode")]):
             raise SystemExit(f"demo:bracket cannot be exported for {machine}")
-    files = [file for folder in (place, *folders) for file in sorted(folder.glob("*.gcode"))]
+    files = [file for folder in (scratch, *folders) for file in sorted(folder.glob("*.gcode"))]
     return [(".gcode", file.read_bytes()) for file in files]
 
 
@@ -226,11 +226,11 @@ class Trial:
     said: str
 
 
-def trial(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], place: Path, number: int) -> Trial:
+def trial(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], scratch: Path, number: int) -> Trial:
     """Damage one of the seeds as its number says, and read it."""
     dice = random.Random(number)
     suffix, content = dice.choice(seeds)
-    file = place / f"{number}{suffix}"
+    file = scratch / f"{number}{suffix}"
     file.write_bytes(damaged(excerpt(content, dice) if suffix == ".gcode" else content, dice))
     began = perf_counter()
     became = outcome(read, file)
@@ -241,14 +241,14 @@ def trial(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], place: P
     return Trial(number, suffix, became, took_s, text[-1500:])
 
 
-def campaign(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], numbers: range, jobs: int, place: Path) -> list[str]:
+def campaign(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], numbers: range, jobs: int, scratch: Path) -> list[str]:
     """Print what became of how many files, and how long the longest took; returns what went wrong."""
     # Processes, not threads: a process forked while another thread holds a lock waits for that lock for ever.
     with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
-        trials = list(pool.map(partial(trial, seeds, read, place), numbers, chunksize=50))
-    counts = Counter((each.suffix, each.became) for each in trials)
+        trials = list(pool.map(partial(trial, seeds, read, scratch), numbers, chunksize=50))
+    counts = Counter((shot.suffix, shot.became) for shot in trials)
     print(", ".join(f"{suffix} {became}: {count}" for (suffix, became), count in sorted(counts.items())))
-    longest = max(trials, key=lambda each: each.took_s)
+    longest = max(trials, key=lambda shot: shot.took_s)
     print(f"{len(trials)} files, number {longest.number} ({longest.suffix}) took longest: {longest.took_s:.1f} s", flush=True)
     return [f"number {t.number}, {t.suffix}: {t.became}\n{t.said}" for t in trials if t.became in (CRASHED, LIMITED)]
 
@@ -256,14 +256,14 @@ def campaign(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], numbe
 def wrong(given: argparse.Namespace) -> Iterator[str]:
     """Everything that went wrong, models first."""
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
+        scratch = Path(folder)
         if given.models:
             yield from campaign(
-                model_seeds(given.more), read_model, range(given.first, given.first + given.models), given.jobs, place
+                model_seeds(given.more), read_model, range(given.first, given.first + given.models), given.jobs, scratch
             )
         if given.programs:
-            seeds = program_seeds(given.more, place)
-            yield from campaign(seeds, read_program, range(given.first, given.first + given.programs), given.jobs, place)
+            seeds = program_seeds(given.more, scratch)
+            yield from campaign(seeds, read_program, range(given.first, given.first + given.programs), given.jobs, scratch)
 
 
 def main() -> None:

@@ -50,7 +50,7 @@ def import_graph(sources: Mapping[str, str]) -> dict[str, set[str]]:
 def rooms_of(modules: Iterable[str]) -> dict[str, str]:
     """Module -> its room: its folder, or itself where the folder has rooms."""
     folders = {module.rpartition(".")[0] for module in modules}
-    parted = {folder for folder in folders if any(other.startswith(f"{folder}.") for other in folders)}
+    parted = {folder for folder in folders if any(path.startswith(f"{folder}.") for path in folders)}
     rooms = {}
     for module in modules:
         folder, _, file = module.rpartition(".")

@@ -33,7 +33,7 @@ def _word(signal: Signal) -> str:
 
 def page(text: str) -> str:
     """The page with its diagram made anew."""
-    return MARKED.sub(lambda found: found[1] + diagram() + found[2], text)
+    return MARKED.sub(lambda match: match[1] + diagram() + match[2], text)
 
 
 if __name__ == "__main__":

@@ -99,8 +99,8 @@ def run(command: str, model: str, name: str | None, moment_s: float) -> End:
         if left:
             sleep(MOST_S)
             left = session(process.pid)
-        for each in left:
-            os.kill(each, signal.SIGKILL)
+        for pid in left:
+            os.kill(pid, signal.SIGKILL)
         words.seek(0)
         return End(
             after_s, process.returncode, words.read().decode(errors="replace").strip().rpartition("\n")[2][:200], len(left)
@@ -109,15 +109,15 @@ def run(command: str, model: str, name: str | None, moment_s: float) -> End:
 
 def session(number: int) -> list[int]:
     """The processes of a session that are no zombies."""
-    found = []
+    pids = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             fields = (folder / "stat").read_text().rpartition(")")[2].split()
         except OSError:
             continue
         if int(fields[3]) == number and fields[0] != "Z":
-            found.append(int(folder.name))
-    return found
+            pids.append(int(folder.name))
+    return pids
 
 
 if __name__ == "__main__":

@@ -134,22 +134,22 @@ def apart(work: Callable[[], object]) -> int:
 
 def begin_print(text: GcodeFile, port: Path, journal: Path) -> None:
     """A print with a journal."""
-    with Journal(journal, JournalHeading(str(text.path), text.sha256(), "campaign", {})) as kept:
-        print_lines(text, str(port), 250000, timing=QUICK, journal=kept, profile=PROFILE)
+    with Journal(journal, JournalHeading(str(text.path), text.sha256(), "campaign", {})) as record:
+        print_lines(text, str(port), 250000, timing=QUICK, journal=record, profile=PROFILE)
 
 
-def go_on(text: GcodeFile, port: Path, journal: Path, told: Path) -> None:
+def go_on(text: GcodeFile, port: Path, journal: Path, plan_file: Path) -> None:
     """Resume as the command does, without asking; writes down how."""
     story = read_journal(journal)
     point = read_interrupted_print(text, story.last, PROFILE, LIMIT)
 
-    def begin(found: PrinterStatus) -> ResumePoint:
-        way = plan_resume(point, found, PROFILE)
-        told.write_text(json.dumps([way.start.line, way.reason.partition(":")[0].partition(";")[0]]), encoding="utf-8")
+    def begin(status: PrinterStatus) -> ResumePoint:
+        way = plan_resume(point, status, PROFILE)
+        plan_file.write_text(json.dumps([way.start.line, way.reason.partition(":")[0].partition(";")[0]]), encoding="utf-8")
         return way.start
 
-    with Journal(journal.with_suffix(".rest"), story.heading) as kept:
-        print_lines(text, str(port), 250000, timing=QUICK, journal=kept, profile=PROFILE, begin=begin)
+    with Journal(journal.with_suffix(".rest"), story.heading) as record:
+        print_lines(text, str(port), 250000, timing=QUICK, journal=record, profile=PROFILE, begin=begin)
 
 
 def moment(delay_s: float, speed: float, folder: Path, whole: list[list[float]]) -> Result:
@@ -162,15 +162,15 @@ def moment(delay_s: float, speed: float, folder: Path, whole: list[list[float]])
         sleep(delay_s)
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
-        told = folder / "told"
+        plan_file = folder / "plan"
         if not journal.exists() or not journal.read_bytes():
             begin_print(text, port, folder / "again")
         elif read_journal(journal).finished:
             how = "killed after its end"
         else:
-            code = os.waitstatus_to_exitcode(os.waitpid(apart(lambda: go_on(text, port, journal, told)), 0)[1])
-            how = json.loads(told.read_text())[1] if told.exists() else "nothing left to do"
-            if code and told.exists():
+            code = os.waitstatus_to_exitcode(os.waitpid(apart(lambda: go_on(text, port, journal, plan_file)), 0)[1])
+            how = json.loads(plan_file.read_text())[1] if plan_file.exists() else "nothing left to do"
+            if code and plan_file.exists():
                 how = f"FAILED: {how}"
     return judged(how, json.loads((folder / "record.json").read_text()), whole)
 
@@ -199,7 +199,7 @@ def undisturbed(folder: Path, speed: float) -> tuple[list[list[float]], float]:
 
 def campaign(moments: int, seed: int) -> list[Result]:
     """Results of many random moments, every other one on a printer that takes its time."""
-    chance, found = random.Random(seed), []
+    chance, results = random.Random(seed), []
     undone = {}
     for speed in (inf, SPEED):
         with tempfile.TemporaryDirectory() as name:
@@ -208,8 +208,8 @@ def campaign(moments: int, seed: int) -> list[Result]:
         with tempfile.TemporaryDirectory() as name:
             speed = inf if number % 2 else SPEED
             whole, taken_s = undone[speed]
-            found.append(moment(chance.uniform(GREETING_S, taken_s), speed, Path(name), whole))
-    return found
+            results.append(moment(chance.uniform(GREETING_S, taken_s), speed, Path(name), whole))
+    return results
 
 
 def lifted_program() -> list[str]:
@@ -275,11 +275,11 @@ def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float,
     point, doubts = read_interrupted_print(text, read_journal(journal).last, PROFILE, LIMIT), list[int]()
 
     def begin(status: PrinterStatus) -> ResumePoint:
-        way, told = plan_resume(point, status, PROFILE), point
+        way, seen_point = plan_resume(point, status, PROFILE), point
         if is_in_doubt(way, point, PROFILE):
             doubts.append(len(heights_mm(point)))
-            told = replace(point, stood_mm=min(heights_mm(point), key=lambda z: abs(z - stood_mm)))
-        return plan_resume(told, status, PROFILE).start
+            seen_point = replace(point, stood_mm=min(heights_mm(point), key=lambda z: abs(z - stood_mm)))
+        return plan_resume(seen_point, status, PROFILE).start
 
     done = len(moves_of(printer))
     try:

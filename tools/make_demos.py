@@ -165,9 +165,9 @@ def standing(solid: m3.Manifold) -> tuple[NDArray[np.float32], NDArray[np.int32]
     mesh = solid.translate((-(x0 + x1) / 2, -(y0 + y1) / 2, -z0)).to_mesh64()
     vertices = np.asarray(mesh.vert_properties)[:, :3].astype("<f4") + np.float32(0.0)
     order = np.lexsort(vertices.T)
-    place = np.empty(len(order), dtype="<i4")
-    place[order] = np.arange(len(order))
-    faces = place[np.asarray(mesh.tri_verts)]
+    rank = np.empty(len(order), dtype="<i4")
+    rank[order] = np.arange(len(order))
+    faces = rank[np.asarray(mesh.tri_verts)]
     first = faces.argmin(axis=1)
     faces = faces[np.arange(len(faces))[:, None], (first[:, None] + np.arange(3)) % 3]
     return vertices[order], faces[np.lexsort(faces.T[::-1])]

@@ -48,8 +48,8 @@ SHOTS = {
 def content(demo: str, parts: int | None) -> bytes:
     """The page of a demo model, sliced for the usual machine."""
     profile = load()
-    found = decompose_model(ModelRequest(f"demo:{demo}", profile, cuts=Cuts(parts=parts)))
-    return print_page(f"demo:{demo}", build(found.decomposition, profile), profile)
+    decomposed = decompose_model(ModelRequest(f"demo:{demo}", profile, cuts=Cuts(parts=parts)))
+    return print_page(f"demo:{demo}", build(decomposed.decomposition, profile), profile)
 
 
 def choose(browser: Browser, name: str, value: object) -> None:

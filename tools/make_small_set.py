@@ -66,11 +66,11 @@ DRAWN: dict[str, tuple[Callable[[np.random.Generator], m3.Manifold], int]] = {
 
 def models() -> dict[str, m3.Manifold]:
     """The solids by name."""
-    made = {name: DEMOS[name]().scale((scale, scale, scale)) for name, scale in SCALES.items()}
+    solids = {name: DEMOS[name]().scale((scale, scale, scale)) for name, scale in SCALES.items()}
     for kind, (draw, count) in DRAWN.items():
         for number in range(count):
-            made[f"{kind}{number}"] = draw(np.random.default_rng([number, *kind.encode()]))
-    return made
+            solids[f"{kind}{number}"] = draw(np.random.default_rng([number, *kind.encode()]))
+    return solids
 
 
 def main(folder: Path) -> None:

@@ -58,7 +58,7 @@ def walk(browser: Browser, address: str, steps: tuple[Step, ...], keep: Callable
     print(f"complaints: {browser.complaints or 'none'}")
 
 
-def one(path: Path, size: tuple[int, int], last: str) -> None:
+def picture(path: Path, size: tuple[int, int], last: str) -> None:
     """The picture of the step of a name."""
     names = [step.name for step in STEPS]
     with workbench(DEMO) as running, Browser(size) as browser:
@@ -92,5 +92,5 @@ if __name__ == "__main__":
     if len(sys.argv) > 1:
         every(Path(sys.argv[1]))
     else:
-        one(DOCS / "workbench.png", DESKTOP, "plane")
-        one(DOCS / "workbench-phone.png", PHONE, "parts")
+        picture(DOCS / "workbench.png", DESKTOP, "plane")
+        picture(DOCS / "workbench-phone.png", PHONE, "parts")

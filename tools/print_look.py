@@ -64,25 +64,25 @@ class Look:
     twice: Worst = NONE
     missing: tuple[str, ...] = ()
 
-    def with_other(self, other: "Look") -> "Look":
+    def merged_with(self, look: "Look") -> "Look":
         """Both together."""
-        pairs = ((getattr(self, name), getattr(other, name)) for name in NAMES)
+        pairs = ((getattr(self, name), getattr(look, name)) for name in NAMES)
         return Look(*(max(a, b) if isinstance(a, Worst) else a + b for a, b in pairs))
 
     @property
     def figures(self) -> dict[str, str]:
         """All of it in short, for a table."""
         values = {name: getattr(self, name) for name in NAMES}
-        told = {name: f"{value.value:.3g} ({value.at})" for name, value in values.items() if isinstance(value, Worst)}
+        worst = {name: f"{value.value:.3g} ({value.at})" for name, value in values.items() if isinstance(value, Worst)}
         return {
-            name: told.get(name, f"{value:.3g}" if isinstance(value, float) else str(len(value)))
+            name: worst.get(name, f"{value:.3g}" if isinstance(value, float) else str(len(value)))
             for name, value in values.items()
         }
 
     @property
     def suspect(self) -> list[str]:
         """Why a person should look at the print, nothing where it seems right."""
-        reasons = [f"a gap below {place}" for place in self.missing[:3]]
+        reasons = [f"a gap below {spot}" for spot in self.missing[:3]]
         if self.air_mm.value > LONGEST_MM:
             reasons.append(f"{self.air_mm.value:.1f} mm in the air that no bridge is, {self.air_mm.at}")
         if self.volume.value > WRONG_VOLUME:
@@ -102,7 +102,7 @@ def look_at(lines: Sequence[str]) -> Look:
     for part in np.unique(beads.part):
         if beads.settings.get("machine.coordinates") == PLATE_FOLLOWED and abs(beads.tilt_deg[int(part)]) > 0.01:
             continue  # its layers do not lie level in the file
-        whole = whole.with_other(_PartLook(beads, int(part)).look())
+        whole = whole.merged_with(_PartLook(beads, int(part)).look())
     return whole
 
 
@@ -131,7 +131,7 @@ class _PartLook:
         # Heights of the plastic so far, those of support raised by its gap.
         self._top_mm = np.full(self._shape, 0.0 if part == 1 else -np.inf).ravel()
         self._support, self._aside = beads.is_kind(SUPPORT), beads.is_kind((*SUPPORT, *ASIDE))
-        self._sparse, self._told = beads.is_kind(SPARSE), beads.is_kind(HANGING)
+        self._sparse, self._hangs = beads.is_kind(SPARSE), beads.is_kind(HANGING)
         self._gap_mm = beads.number("process.support_gap_mm", 0.2)
         self._width_mm, density = beads.number("process.line_width_mm", 0.45), beads.number("process.infill_density", 0.2)
         self._reach = min(
@@ -161,9 +161,9 @@ class _PartLook:
             steps = self._steps(rows)
             if len(before) or self._part == 1:  # what it lies on is known
                 gap = z_mm - height_mm > below_mm + self._stand_off_mm(rows, before, height_mm) + ROUNDING_MM
-                whole = whole.with_other(Look(missing=(name,) if gap else ()))
-                whole = whole.with_other(self._hanging(steps, before)).with_other(self._volume(rows, name))
-            whole = whole.with_other(self._twice(steps, name))
+                whole = whole.merged_with(Look(missing=(name,) if gap else ()))
+                whole = whole.merged_with(self._hanging(steps, before)).merged_with(self._volume(rows, name))
+            whole = whole.merged_with(self._twice(steps, name))
             tops_mm = self._beads.end[steps.row, 2] + np.where(self._support[steps.row], self._gap_mm, 0.0)
             np.maximum.at(self._top_mm, steps.cells.ravel(), np.repeat(tops_mm, steps.cells.shape[1]))
             before, below_mm = rows, z_mm
@@ -199,8 +199,8 @@ class _PartLook:
         depth_mm = 0.9 * float(np.median(beads.height_mm[before])) if len(before) else ROUNDING_MM
         floor_mm = beads.end[row, 2] - beads.height_mm[row] - depth_mm
         air = own & (self._top_mm[steps.cells] < floor_mm[:, None]).all(axis=1)
-        untold = air & ~self._told[row]
-        look = Look(float(length_mm[own].sum()), float(length_mm[air].sum()), float(length_mm[air & self._told[row]].sum()))
+        untold = air & ~self._hangs[row]
+        look = Look(float(length_mm[own].sum()), float(length_mm[air].sum()), float(length_mm[air & self._hangs[row]].sum()))
         if not untold.any() or beads.settings.get("process.support") == "none":  # then what hangs is meant to
             return look
         middles, ways, lines = steps.cells[:, steps.cells.shape[1] // 2], beads.way[row], beads.line[row]

@@ -25,7 +25,7 @@ def table(section: str) -> str:
 
 def page(text: str) -> str:
     """The page with every marked table made anew."""
-    return MARKED.sub(lambda found: found[1] + table(found[2]) + found[3], text)
+    return MARKED.sub(lambda match: match[1] + table(match[2]) + match[3], text)
 
 
 def _given(model: Any, key: str) -> str:

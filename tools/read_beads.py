@@ -138,5 +138,5 @@ class _Reader:
         if pushed <= 0.0 or not across:
             self._way += 1
         elif self._part:
-            told = (self._part, self._layer, self._kind, number, self._way, self._height, self._width)
-            self.rows.append((*before, *after, pushed, *told))
+            context = (self._part, self._layer, self._kind, number, self._way, self._height, self._width)
+            self.rows.append((*before, *after, pushed, *context))

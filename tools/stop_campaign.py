@@ -78,9 +78,9 @@ def _pass_on(start: socket.socket, end: socket.socket, watched: bool = False) ->
     except OSError:
         pass
     finally:
-        for each in (start, end):
+        for side in (start, end):
             with suppress(OSError):
-                each.shutdown(socket.SHUT_RDWR)
+                side.shutdown(socket.SHUT_RDWR)
 
 
 def sleep_lightly(core: int) -> None:
@@ -125,33 +125,33 @@ def begin_prints(page: PrintPage, ports: Sequence[str]) -> list[int]:
     """The numbers of prints at these ports that all move already."""
 
     def of(port: str) -> dict[str, Any]:
-        return next((each for each in page.state["prints"] if each["port"] == port), {"phase": "over", "number": 0})
+        return next((entry for entry in page.state["prints"] if entry["port"] == port), {"phase": "over", "number": 0})
 
     while wanting := [port for port in ports if of(port)["phase"] == "over"]:  # a busy computer asks a printer in vain
         before = {port: of(port)["number"] for port in wanting}
         for port in wanting:
             page.do("check", port=port)
-        page.until(lambda one: all(of(port)["number"] != number for port, number in before.items()))  # noqa: B023
-        page.until(lambda one: all(of(port)["phase"] in ("ready", "over") for port in ports))
+        page.until(lambda state: all(of(port)["number"] != number for port, number in before.items()))  # noqa: B023
+        page.until(lambda state: all(of(port)["phase"] in ("ready", "over") for port in ports))
     for port in ports:
         page.do("begin", print=of(port)["number"])
-    page.until(lambda one: all(of(port)["phase"] == "over" or _moves(of(port)) for port in ports))
+    page.until(lambda state: all(of(port)["phase"] == "over" or _moves(of(port)) for port in ports))
     if ended_early := [of(port)["sentence"] for port in ports if of(port)["phase"] == "over"]:
         raise SystemExit(f"a print has not begun: {ended_early[0]}")
     return [int(of(port)["number"]) for port in ports]
 
 
-def _moves(told: dict[str, Any]) -> bool:
-    return bool(told["progress"]) and told["progress"]["state"] == "printing"
+def _moves(state: dict[str, Any]) -> bool:
+    return bool(state["progress"]) and state["progress"]["state"] == "printing"
 
 
 def ended(page: PrintPage, number: int) -> dict[str, Any]:
     """The last state of a print."""
 
     def of(number: int) -> dict[str, Any]:
-        return next(each for each in page.state["prints"] if each["number"] == number)
+        return next(entry for entry in page.state["prints"] if entry["number"] == number)
 
-    page.until(lambda one: of(number)["phase"] == "over")
+    page.until(lambda state: of(number)["phase"] == "over")
     return of(number)
 
 
@@ -273,8 +273,8 @@ def main() -> None:
             moments_s = [chance.uniform(0.0, window_s) for _ in range(min(AT_ONCE, asked.stops - len(stops)))]
             fresh, asked_for, window_s = stops_at(moments_s, running, ball)
             stops, answers = stops + fresh, answers + asked_for
-            told = " ".join(f"{1000 * (end - begin):.0f}" for begin, end in fresh)
-            print(f"opened in {window_s:.1f} s, stops after {told} ms", flush=True)
+            delays = " ".join(f"{1000 * (end - begin):.0f}" for begin, end in fresh)
+            print(f"opened in {window_s:.1f} s, stops after {delays} ms", flush=True)
         overslept = united(span for night in nights for span in read_spans(night))
     print(f"{len(stops)} stops, all arrived: {figures(stops, overslept)}")
     print(f"{len(answers)} other answers: {figures(answers, overslept)}")
@@ -302,7 +302,7 @@ def figures(spans: Sequence[Span], overslept: Sequence[Span]) -> str:
     """How long they are, in milliseconds."""
     whole = [end - begin for begin, end in spans]
     own = [end - begin - sum(max(min(end, b) - max(begin, a), 0.0) for a, b in overslept) for begin, end in spans]
-    worst, median, worst_own = (1000 * each for each in (max(whole), statistics.median(whole), max(own)))
+    worst, median, worst_own = (1000 * seconds for seconds in (max(whole), statistics.median(whole), max(own)))
     return f"worst {worst:.0f} ms, median {median:.1f} ms; without what was overslept worst {worst_own:.0f} ms"
 
 

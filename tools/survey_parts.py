@@ -60,7 +60,7 @@ def survey(file: Path, profile: Profile, terms: dict[str, Profile]) -> dict[str,
     if rivals:
         published, front = rivals["published"], rivals["risky"].front
         left_mm2 = published.residual_area_mm2
-        enough = [other.parts for other in front if other.support_area_mm2 <= left_mm2 * (1.0 + 1e-6)]
+        enough = [plan.parts for plan in front if plan.support_area_mm2 <= left_mm2 * (1.0 + 1e-6)]
         row |= {"published_parts": len(published.parts), "published_mm2": left_mm2, "parts_for_it": min(enough, default=None)}
     return row
 

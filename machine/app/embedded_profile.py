@@ -80,8 +80,8 @@ def _with_lists(value: Any) -> Any:
     if not isinstance(value, dict):
         return None if value == "None" else value
     below = {key: _with_lists(item) for key, item in value.items()}
-    places = [str(place) for place in range(len(below))]
-    return [below[place] for place in places] if places and below.keys() == {*places} else below
+    indices = [str(index) for index in range(len(below))]
+    return [below[index] for index in indices] if indices and below.keys() == {*indices} else below
 
 
 def in_words(taken: Sequence[str], profile: Profile) -> str:

@@ -81,14 +81,14 @@ def calibration_lines(profile: Profile, touches: TouchPlan) -> Iterator[str]:
     if dialect.follow_persists:
         yield dialect.follow_off
     up, across = 60.0 * machine.z.speed_mm_s, 60.0 * min(machine.x.speed_mm_s, machine.y.speed_mm_s, 100.0)
-    for place, (pose, (x, y, z)) in enumerate(zip(touches.poses, touches.expected_mm, strict=True), start=1):
+    for index, (pose, (x, y, z)) in enumerate(zip(touches.poses, touches.expected_mm, strict=True), start=1):
         name = f"{machine.tilt.letter}{number(pose.tilt_deg)} {machine.turn.letter}{number(pose.turn_deg)}"
-        yield f"; touch {place}: {name}, expected near X{x:.1f} Y{y:.1f} Z{z:.1f}"
+        yield f"; touch {index}: {name}, expected near X{x:.1f} Y{y:.1f} Z{z:.1f}"
         yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
         yield from _turn(pose, pen)
         yield f"G1 X{x:.3f} Y{y:.3f} F{across:.0f}"
         yield f"G1 Z{_hover(machine, z, touches.safe_z_mm):.3f} F{up:.0f}"
-        yield from (line.format(text=f"touch {place} {name} note X Y Z") for line in dialect.wait_for_person)
+        yield from (line.format(text=f"touch {index} {name} note X Y Z") for line in dialect.wait_for_person)
     yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
     yield from _turn(level(machine), pen)
     for word in dialect.before_end:

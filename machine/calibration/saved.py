@@ -14,14 +14,14 @@ from profiles.places import PARENT, merged, own, own_folder, parse, shipped
 FOUND = tuple(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "point_mm"))
 
 
-def found_keys(zero_of_turn: bool) -> tuple[str, ...]:
+def fitted_keys(zero_of_turn: bool) -> tuple[str, ...]:
     """The keys that a calibration finds; the turn's zero only where the mark's direction was told."""
     return (*FOUND, "machine.tilt.zero_deg", *(("machine.turn.zero_deg",) if zero_of_turn else ()))
 
 
-def found_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
+def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
     """The tables of the calibrated profile: numbers, sources, and what is left uncalibrated."""
-    keys = found_keys(zero_of_turn)
+    keys = fitted_keys(zero_of_turn)
     source = f"tiltprint calibrate, {len(calibration.residuals_mm)} touches, {calibration.rms_mm:.3f} mm off"
     axes: dict[str, dict[str, Any]] = {"tilt": {}, "turn": {}}
     for key in keys:

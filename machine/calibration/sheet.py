@@ -67,7 +67,7 @@ def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
     rows = document.get("touch", [])
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
         raise ProfileError(f"{path}: touch must be a list of tables, [[touch]]")
-    touches = [_touch(path, place, row) for place, row in enumerate(rows, start=1)]
+    touches = [_touch(path, index, row) for index, row in enumerate(rows, start=1)]
     height = (
         mark_height_mm if mark_height_mm is not None else _number(path, "mark_height_mm", document.get("mark_height_mm", 0.0))
     )
@@ -81,22 +81,22 @@ def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
     )
 
 
-def _touch(path: Path, place: int, row: Mapping[str, Any]) -> Touch | None:
+def _touch(path: Path, index: int, row: Mapping[str, Any]) -> Touch | None:
     """One touch; None when it has not been filled in."""
-    place_of = f"touch {place}"
+    label = f"touch {index}"
     unknown = [key for key in row if key not in ("tilt_deg", "turn_deg", "xyz_mm", "on")]
     if unknown:
-        raise ProfileError(f"{path}: {place_of}: {unknown[0]} is not known: allowed are tilt_deg, turn_deg, xyz_mm and on")
+        raise ProfileError(f"{path}: {label}: {unknown[0]} is not known: allowed are tilt_deg, turn_deg, xyz_mm and on")
     where = row.get("on", "mark")
     if where not in WHERE:
-        raise ProfileError(f"{path}: {place_of}: on is {where!r}: it must be one of {', '.join(WHERE)}")
+        raise ProfileError(f"{path}: {label}: on is {where!r}: it must be one of {', '.join(WHERE)}")
     at = row.get("xyz_mm")
     if not isinstance(at, list) or len(at) != 3 or not all(isinstance(x, int | float) for x in at):
-        raise ProfileError(f"{path}: {place_of}: xyz_mm is {at!r}: it must be a list of three numbers")
+        raise ProfileError(f"{path}: {label}: xyz_mm is {at!r}: it must be a list of three numbers")
     if any(isnan(x) for x in at):
         return None
-    tilt, turn = (_number(path, f"{place_of}: {key}", row.get(key)) for key in ("tilt_deg", "turn_deg"))
-    x, y, z = (_number(path, f"{place_of}: xyz_mm", value) for value in at)
+    tilt, turn = (_number(path, f"{label}: {key}", row.get(key)) for key in ("tilt_deg", "turn_deg"))
+    x, y, z = (_number(path, f"{label}: xyz_mm", value) for value in at)
     return Touch(Pose(tilt, turn), (x, y, z), where == "plate")
 
 
@@ -118,16 +118,16 @@ def _csv(path: Path) -> dict[str, Any]:
     missing = [name for name in COLUMNS[:5] if not rows or name not in rows[0]]
     if missing:
         raise ProfileError(f"{path}: the columns {', '.join(missing)} are missing: the first line must name {', '.join(COLUMNS)}")
-    return {"touch": [_csv_row(path, place, row) for place, row in enumerate(rows, start=1)]}
+    return {"touch": [_csv_row(path, index, row) for index, row in enumerate(rows, start=1)]}
 
 
-def _csv_row(path: Path, place: int, row: Mapping[str, str | None]) -> dict[str, Any]:
+def _csv_row(path: Path, index: int, row: Mapping[str, str | None]) -> dict[str, Any]:
     cells = {}
     for name in COLUMNS[:5]:
         text = (row[name] or "").strip()
         try:
             cells[name] = float(text) if text else float("nan")
         except ValueError:
-            raise ProfileError(f"{path}: touch {place}: {name} is {text!r}: it must be a number") from None
+            raise ProfileError(f"{path}: touch {index}: {name} is {text!r}: it must be a number") from None
     at = [cells[name] for name in COLUMNS[2:5]]
     return {"tilt_deg": cells["tilt_deg"], "turn_deg": cells["turn_deg"], "xyz_mm": at, "on": (row.get("on") or "mark").strip()}

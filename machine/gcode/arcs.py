@@ -42,7 +42,7 @@ def centre_of(start: Point, end: Point, radius: float, clockwise: bool) -> Point
     return 0.5 * (start[0] + end[0]) - aside * dy, 0.5 * (start[1] + end[1]) + aside * dx
 
 
-def told_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: bool) -> Point | None:
+def arc_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: bool) -> Point | None:
     """Centre by the words R or I J of an arc, mm; None where they give none."""
     if "R" in shape:
         return centre_of(start, end, shape["R"], clockwise)

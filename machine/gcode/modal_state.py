@@ -14,7 +14,7 @@ SETTINGS = (
     "M200", "M201", "M203", "M204", "M205", "M207", "M220", "M221", "SET_VELOCITY_LIMIT", "M900", "M572", "SET_PRESSURE_ADVANCE",
 )  # fmt: skip
 
-Place = tuple[float | None, ...]  # X Y Z tilt turn E
+Coordinates = tuple[float | None, ...]  # X Y Z tilt turn E
 
 
 @dataclass
@@ -34,7 +34,7 @@ class ModalState:
     def __post_init__(self) -> None:
         self.modes = Modes(self.axes)
 
-    def place(self) -> Place:
+    def coordinates(self) -> Coordinates:
         """Where the axes stand."""
         return tuple(self.at)
 

@@ -96,8 +96,8 @@ class Modes:
         """mm of one unit of length."""
         return self.units[0]
 
-    def move(self, place: list[Any], words: Iterable[Word]) -> bool:
-        """Take the words of a move: `place` becomes where it leads, F the feed; True when an axis is named.
+    def move(self, coordinates: list[Any], words: Iterable[Word]) -> bool:
+        """Take the words of a move: `coordinates` become where it leads, F the feed; True when an axis is named.
 
         A coordinate that is None is not known: a step leaves it so. Raises GcodeError, if strict, for an F that is not above 0
         and for a word that is no axis's; else they change nothing.
@@ -115,9 +115,9 @@ class Modes:
             moved = True
             value *= units[axis]
             if not steps[axis]:
-                place[axis] = value - offset[axis]
-            elif place[axis] is not None:
-                place[axis] += value
+                coordinates[axis] = value - offset[axis]
+            elif coordinates[axis] is not None:
+                coordinates[axis] += value
         return moved
 
     def _refusal(self, letter: str, value: float) -> GcodeError:

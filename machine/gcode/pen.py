@@ -63,7 +63,7 @@ class Pen:
         self.feed = feed
         return f" F{feed}"
 
-    def place(self, x: int, y: int, z: int) -> str:
+    def coordinates(self, x: int, y: int, z: int) -> str:
         """The words of the coordinates that change."""
         text = ""
         if x != self.x:

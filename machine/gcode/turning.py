@@ -66,14 +66,14 @@ def _followed(to: Pose, seconds: float, pen: Pen) -> Iterator[str]:
         tilt_deg = begin.tilt_deg + share * (to.tilt_deg - begin.tilt_deg)
         pose = Pose(tilt_deg, begin.turn_deg + share * (to.turn_deg - begin.turn_deg)) if k < count else to
         before = np.array([pen.x, pen.y, pen.z]) / 1000.0
-        place = pen.place(*thousandths(followed_places(machine, pose, head))[0])
+        words = pen.coordinates(*thousandths(followed_places(machine, pose, head))[0])
         moved = float(np.linalg.norm(np.array([pen.x, pen.y, pen.z]) / 1000.0 - before))
         if pen.dialect.inverse_time:
             feed = f" F{number(60.0 * count / seconds)}"
         else:
             step = moved if moved > 0 else hypot(to.tilt_deg - begin.tilt_deg, to.turn_deg - begin.turn_deg) / count
             feed = f" F{number(max(60.0 * step * count / seconds, 0.001))}"
-        yield f"G1{place}{_words(pose, pen)}{feed}"
+        yield f"G1{words}{_words(pose, pen)}{feed}"
     if pen.dialect.inverse_time:
         yield "G94"
 

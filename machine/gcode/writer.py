@@ -63,10 +63,10 @@ def _lines(program: MachineProgram, profile: Profile, elapsed: Floats, filament_
     last_strokes = _last_strokes(program)
     yield from settings.head(program.name, profile)
     yield from _start(profile, parts, pen)
-    for place, move in enumerate(program.moves):
+    for index, move in enumerate(program.moves):
         if isinstance(move, Stroke):
             yield from _stroke(move, profile, pen)
-            if place in last_strokes:
+            if index in last_strokes:
                 yield from _dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"])
         elif isinstance(move, Travel):
             yield from _travel(move, pen)
@@ -78,17 +78,17 @@ def _lines(program: MachineProgram, profile: Profile, elapsed: Floats, filament_
             pen.filament_mm -= move.filament_mm
             yield f"G1{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
-            yield from _heat_ahead(program, place, profile, pen)
+            yield from _heat_ahead(program, index, profile, pen)
             yield from _reorient(move, next_part, pen)
         elif isinstance(move, Pause):
             yield from _pause(move, pen)
         elif isinstance(move, BeginPart):
             next_part = next(coming, None)
             yield from _begin_part(move, len(parts), pen)
-            yield from _contents(program, place)
+            yield from _contents(program, index)
         else:
             yield from _begin_layer(move, profile, pen)
-            yield from _progress(float(elapsed[place]), total, pen)
+            yield from _progress(float(elapsed[index]), total, pen)
     yield from _end(pen)
     yield from _progress(total, total, pen)
     yield from _dialect_line(pen.dialect.last, pen)
@@ -102,9 +102,9 @@ def _parts(program: MachineProgram) -> list[BeginPart]:
 def _last_strokes(program: MachineProgram) -> set[int]:
     """Places of the last stroke of each part."""
     strokes, latest = set(), -1
-    for place, move in enumerate(program.moves):
+    for index, move in enumerate(program.moves):
         if isinstance(move, Stroke) and move.kind is not Kind.PURGE:
-            latest = place
+            latest = index
         elif isinstance(move, BeginPart) and latest >= 0:
             strokes.add(latest)
     return strokes | {latest}
@@ -158,19 +158,19 @@ def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
     machine = pen.machine
     yield f";PART:{move.index} of {parts}"
     yield f";POSE:{machine.tilt.letter}{angle(move.pose.tilt_deg)} {machine.turn.letter}{angle(move.pose.turn_deg)}"
-    for place in move.unsupported:
-        yield f";UNSUPPORTED:{place.mm2:.2f}@{place.layer} {place.reason}"
+    for area in move.unsupported:
+        yield f";UNSUPPORTED:{area.mm2:.2f}@{area.layer} {area.reason}"
     pen.values |= {"part": move.index, "tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "part_layers": move.layers}
     pen.kind, pen.width_mm = None, 0.0
     pen.part += 1
 
 
-def _contents(program: MachineProgram, place: int) -> Iterator[str]:
-    """What the strokes of the part that begins with the move at `place` come to."""
+def _contents(program: MachineProgram, index: int) -> Iterator[str]:
+    """What the strokes of the part that begins with the move at `index` come to."""
     strokes: list[Stroke] = []
     layers: set[int] = set()
     layer = 0
-    for move in program.moves[place + 1 :]:
+    for move in program.moves[index + 1 :]:
         if isinstance(move, BeginPart):
             break
         if isinstance(move, BeginLayer):
@@ -199,9 +199,9 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     yield from _set_fan(move.fan, pen)
 
 
-def _heat_ahead(program: MachineProgram, place: int, profile: Profile, pen: Pen) -> Iterator[str]:
-    """Before the turn at `place`, the heat of a layer after it that is to be hotter: it takes as long as a turn to come."""
-    coming = next((move for move in islice(program.moves, place, None) if isinstance(move, BeginLayer)), None)
+def _heat_ahead(program: MachineProgram, index: int, profile: Profile, pen: Pen) -> Iterator[str]:
+    """Before the turn at `index`, the heat of a layer after it that is to be hotter: it takes as long as a turn to come."""
+    coming = next((move for move in islice(program.moves, index, None) if isinstance(move, BeginLayer)), None)
     if coming is not None and (wanted := _nozzle_c(coming, profile)) > pen.nozzle_c:
         yield from _set_nozzle(wanted, pen)
 
@@ -282,8 +282,8 @@ def _arc(move: Stroke, run: tuple[int, int], centre: tuple[float, float], pen: P
     first, last = run
     pen.filament_mm += float(move.filament_mm[first:last].sum())
     ((pen.x, pen.y),) = thousandths(move.points_mm[last : last + 1, :2])
-    place = f" X{pen.x / 1000:.3f} Y{pen.y / 1000:.3f} I{centre[0]:.3f} J{centre[1]:.3f}"
-    return f"{place}{pen.filament()}{pen.speed(move.speed_mm_s)}"
+    words = f" X{pen.x / 1000:.3f} Y{pen.y / 1000:.3f} I{centre[0]:.3f} J{centre[1]:.3f}"
+    return f"{words}{pen.filament()}{pen.speed(move.speed_mm_s)}"
 
 
 def _travel(move: Travel, pen: Pen) -> Iterator[str]:
@@ -294,9 +294,9 @@ def _travel(move: Travel, pen: Pen) -> Iterator[str]:
         yield f"{pen.dialect.travel} Z{pen.z / 1000:.3f}{pen.speed(move.speed_mm_s)}"
         return
     for x, y, z in points[1:]:
-        place = pen.place(x, y, z)
-        if place:
-            yield f"{pen.dialect.travel}{place}{pen.speed(move.speed_mm_s)}"
+        words = pen.coordinates(x, y, z)
+        if words:
+            yield f"{pen.dialect.travel}{words}{pen.speed(move.speed_mm_s)}"
 
 
 def _reorient(move: Reorient, next_part: BeginPart | None, pen: Pen) -> Iterator[str]:

@@ -118,7 +118,7 @@ class Feed:
         number = self.exchange.send(command)
         moves = self._track(command)
         self.sent += 1
-        self.history.send(SentLine(number, line, moves, self.modal.place()))
+        self.history.send(SentLine(number, line, moves, self.modal.coordinates()))
 
     def _commands(self, lines: Iterable[str]) -> Iterator[tuple[int, str]]:
         for line, text in enumerate(lines, 1):

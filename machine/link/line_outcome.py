@@ -35,7 +35,7 @@ def line_was_done(command: str, before: Sequence[float | None], after: ModalStat
         for letter, old, new in zip(after.axes.letters, before, after.at, strict=True)
         if letter in reported and old is not None and new is not None
     ]
-    start, end = (dict(zip(after.axes.letters, place, strict=True)) for place in (before, after.at))
+    start, end = (dict(zip(after.axes.letters, values, strict=True)) for values in (before, after.at))
     if not _still_running(reported, (start, end), letters, status, after):
         return None
     for chosen in ([letter for letter in letters if letter != "E"], letters):  # some firmwares count filament in their own way
@@ -49,7 +49,7 @@ def line_was_done(command: str, before: Sequence[float | None], after: ModalStat
 
 def _still_running(
     reported: Mapping[str, float],
-    places: Sequence[Mapping[str, float | None]],
+    ends: Sequence[Mapping[str, float | None]],
     letters: Sequence[str],
     status: PrinterStatus,
     after: ModalState,
@@ -60,7 +60,7 @@ def _still_running(
     if any(wanted > 0 and target is not None and target <= 0 for wanted, target in pairs):
         return False
     at = [letter for letter in letters if letter != "E"]
-    stands = any(_greatest_difference(reported, place, at) <= SAME for place in places)
+    stands = any(_greatest_difference(reported, end, at) <= SAME for end in ends)
     hot = any(wanted > 0 and target for wanted, target in pairs)
     return stands and (hot or sum(abs(reported[letter]) > SAME for letter in letters) >= SEVERAL)
 
@@ -74,9 +74,9 @@ def _reached_end(
     return from_end < from_start if min(from_start, from_end) <= SAME else None
 
 
-def _greatest_difference(one: Mapping[str, float | None], other: Mapping[str, float | None], letters: Sequence[str]) -> float:
+def _greatest_difference(a: Mapping[str, float | None], b: Mapping[str, float | None], letters: Sequence[str]) -> float:
     """The greatest difference of two places on some axes."""
-    return max((abs((one[letter] or 0.0) - (other[letter] or 0.0)) for letter in letters), default=0.0)
+    return max((abs((a[letter] or 0.0) - (b[letter] or 0.0)) for letter in letters), default=0.0)
 
 
 def position_differences(modal: ModalState, reported: tuple[tuple[str, float], ...], near: float) -> list[str]:

@@ -239,7 +239,7 @@ def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[
 
 
 def _goal(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
-    standing = axis_position(profile.machine, point.modal.place(), False)
+    standing = axis_position(profile.machine, point.modal.coordinates(), False)
     assert standing is not None  # _check has seen to it
     return standing
 

@@ -3,6 +3,9 @@
 from itertools import product
 from math import ceil, hypot
 
+import numpy as np
+
+from machine.planning.fit import over_edge_mm
 from profiles.machine import Machine
 
 EDGE_MM = 2.0  # kept to the plate's edge
@@ -31,13 +34,7 @@ def _lattice(size_mm: Place, gap_mm: float, shift: Place, machine: Machine) -> l
     steps = [side + gap_mm for side in size_mm]
     counts = [ceil(2.0 * machine.table.radius_mm / step) + 1 for step in steps]
     columns, rows = ([(k + part) * step for k in range(-n, n + 1)] for n, part, step in zip(counts, shift, steps, strict=True))
-    inside = [(x, y) for x in columns for y in rows if _fits((x, y), size_mm, machine)]
-    return sorted(inside, key=lambda place: (round(hypot(*place), 6), place[1], place[0]))
-
-
-def _fits(place: Place, size_mm: Place, machine: Machine) -> bool:
-    """Whether a box lies on the plate."""
-    far = [abs(middle) + 0.5 * side + EDGE_MM for middle, side in zip(place, size_mm, strict=True)]
-    if machine.table.size_mm is None:
-        return hypot(*far) <= machine.table.radius_mm
-    return all(reach <= 0.5 * side for reach, side in zip(far, machine.table.size_mm, strict=True))
+    middles = np.array(list(product(columns, rows)))
+    over_mm, _ = over_edge_mm(np.abs(middles) + 0.5 * np.array(size_mm) + EDGE_MM, machine.table)
+    inside = [(x, y) for x, y in middles[over_mm <= 0.0].tolist()]
+    return sorted(inside, key=lambda middle: (round(hypot(*middle), 6), middle[1], middle[0]))

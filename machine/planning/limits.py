@@ -35,12 +35,12 @@ def check(program: MachineProgram, rows: Rows, machine: Machine) -> None:
     worst = rows.end[row, axis]
     unit = "mm" if axis < 3 else "deg"
     raise MoveError(
-        f"{place(program, int(rows.move[row]))}: {letter} would go to {worst:.3f} {unit}, "
+        f"{location(program, int(rows.move[row]))}: {letter} would go to {worst:.3f} {unit}, "
         f"allowed is {least[axis]:g} to {most[axis]:g} {unit} on {machine.name}"
     )
 
 
-def place(program: MachineProgram, index: int) -> str:
+def location(program: MachineProgram, index: int) -> str:
     """Where a move stands in the print: "part 2, layer 14", or how it gets there."""
     part = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginPart)), None)
     layer = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginLayer)), None)

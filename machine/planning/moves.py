@@ -124,11 +124,11 @@ def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
     """All straight moves of a program that begins with the table at (tilt_deg, turn_deg)."""
     blocks: list[Floats] = []
     speeds: list[float] = []
-    places: list[int] = []
+    indices: list[int] = []
     accelerations: list[float] = []
     at = np.array([0.0, 0.0, 0.0, tilt_deg, turn_deg])
     filament = 0.0
-    for place, move in enumerate(program.moves):
+    for index, move in enumerate(program.moves):
         if isinstance(move, Stroke | Travel | Wipe):
             block = np.empty((len(move.points_mm), 6))
             block[:, :3], block[:, 3:5], block[:, 5] = move.points_mm, at[3:], filament
@@ -150,7 +150,7 @@ def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
             continue
         blocks.append(block)
         speeds.append(speed)
-        places.append(place)
+        indices.append(index)
         accelerations.append(_acceleration(move))
     if not blocks:
         return Rows(np.zeros((0, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0))
@@ -159,7 +159,7 @@ def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
         np.concatenate([block[:-1] for block in blocks]),
         np.concatenate([block[1:] for block in blocks]),
         np.repeat(speeds, counts),
-        np.repeat(np.array(places, dtype=np.int64), counts),
+        np.repeat(np.array(indices, dtype=np.int64), counts),
         np.repeat(accelerations, counts),
     )
 

@@ -46,8 +46,8 @@ def find_park_position(
     lift = (x, y, height)
     if height < min(top, most) - 1e-9:
         return Park(lift, lift)
-    for place in sorted([*stands, *_corners(machine)], key=lambda place: abs(place[0] - x) + abs(place[1] - y)):
-        stand = (*place, height)
+    for point in sorted([*stands, *_corners(machine)], key=lambda point: abs(point[0] - x) + abs(point[1] - y)):
+        stand = (*point, height)
         if height >= top - 1e-9 or _path_is_clear(machine, pose, np.array(lift), np.array(stand), printed):
             return Park(lift, stand)
     return Park(lift, lift)

@@ -155,8 +155,8 @@ def stands(machine: Machine, turn: Turn) -> Iterator[tuple[float, float]]:
     """Places to stand: where the tip is, above the next first point, half way, then a lattice over X and Y."""
     here = turn.at_mm[:2]
     there = here if turn.target_mm is None else turn.target_mm[:2]
-    for place in (here, there, 0.5 * (here + there)):
-        yield float(place[0]), float(place[1])
+    for point in (here, there, 0.5 * (here + there)):
+        yield float(point[0]), float(point[1])
     xs, ys = (np.linspace(*axis.limits_mm, STANDS) for axis in (machine.x, machine.y))
     for x in xs:
         for y in ys:

@@ -25,8 +25,8 @@ class Stop:
     @property
     def option(self) -> str:
         """What a person has written."""
-        place = f"{f'{self.height_mm:.6f}'.rstrip('0').rstrip('.')}mm" if self.layer is None else str(self.layer)
-        return f"{'--filament-change' if self.change else '--pause'} {self.part}:{place}"
+        at = f"{f'{self.height_mm:.6f}'.rstrip('0').rstrip('.')}mm" if self.layer is None else str(self.layer)
+        return f"{'--filament-change' if self.change else '--pause'} {self.part}:{at}"
 
 
 def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ...]:

@@ -4,7 +4,7 @@ from math import hypot, inf
 
 import numpy as np
 
-from machine.gcode.arcs import chord_count, chords, sweep_rad, told_centre
+from machine.gcode.arcs import arc_centre, chord_count, chords, sweep_rad
 from machine.gcode.modes import E_AXIS
 from machine.kinematics.coordinates import axis_positions, followed_places
 from machine.reader.state import Reader, Words
@@ -55,7 +55,7 @@ def arc(reader: Reader, name: str, words: Words) -> None:
     after = reader.at.copy()
     del reader.rows[known:]
     start, end = (before[0], before[1]), (after[0], after[1])
-    centre = told_centre(start, end, shape, clockwise)
+    centre = arc_centre(start, end, shape, clockwise)
     radii = [0.0, 0.0] if centre is None else [hypot(p[0] - centre[0], p[1] - centre[1]) for p in (start, end)]
     if centre is None or min(radii) == 0.0 or abs(radii[0] - radii[1]) > ROUND_MM:
         raise GcodeError(
@@ -94,7 +94,7 @@ def follow(reader: Reader, on: bool) -> None:
     """From here on X Y Z are places on the table (TCP), or axis positions again; nothing moves."""
     if on != reader.followed:
         reader.followed = on
-        place = np.array([reader.at[:5]])
+        coordinates = np.array([reader.at[:5]])
         pose = Pose(reader.at[3], reader.at[4])
-        moved = followed_places(reader.machine, pose, place[:, :3]) if on else axis_positions(reader.machine, place)
+        moved = followed_places(reader.machine, pose, coordinates[:, :3]) if on else axis_positions(reader.machine, coordinates)
         reader.at[:3] = moved[0].tolist()

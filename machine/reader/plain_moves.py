@@ -77,19 +77,19 @@ def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], firs
         reader.feed_share, bool(reader.dialect.rapid), reader.travelling,
     )  # fmt: skip
     rows = np.empty((min(MOST_AT_ONCE, len(text.start) - 1 - first), ROW))
-    place = np.array([*reader.at, modes.feed])
-    last, count = _read_run(text, meaning, first, place, rows)
+    state = np.array([*reader.at, modes.feed])
+    last, count = _read_run(text, meaning, first, state, rows)
     if last > first:
         begin = int(text.start[last - 1])
         reader.number, reader.motion = last, text.text[begin : begin + 2].tobytes().decode("ascii")
-        reader.at[:], modes.feed = place[:6].tolist(), float(place[6])
+        reader.at[:], modes.feed = state[:6].tolist(), float(state[6])
         reader.rows.frombytes(rows[:count].tobytes())
     return last
 
 
 @kernel
-def _read_run(text: Text, meaning: Meaning, first: int, place: Floats, rows: Floats) -> tuple[int, int]:
-    """The line after the run and how many rows it has; place: (7,) axes and feed, which it leaves as they are then."""
+def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Floats) -> tuple[int, int]:
+    """The line after the run and how many rows it has; state: (7,) axes and feed, which it leaves as they are then."""
     words = np.empty((32, 2))
     count, line = 0, first
     while line < len(text.start) - 1 and line - first < len(rows):
@@ -100,22 +100,22 @@ def _read_run(text: Text, meaning: Meaning, first: int, place: Floats, rows: Flo
         for k in range(ROW):
             rows[count, k] = meaning.row[k]
         for k in range(6):
-            rows[count, BEFORE + k] = place[k]
+            rows[count, BEFORE + k] = state[k]
         moved = False
         for k in range(word_count):
             axis, value = int(words[k, 0]), words[k, 1]
             if axis == F:
-                place[F] = value * meaning.units[0]
+                state[F] = value * meaning.units[0]
                 continue
             moved = True
             value *= meaning.units[axis]
-            place[axis] = place[axis] + value if meaning.steps[axis] else value - meaning.offset[axis]
+            state[axis] = state[axis] + value if meaning.steps[axis] else value - meaning.offset[axis]
         if moved:
             rows[count, LINE] = line + 1
             for k in range(6):
-                rows[count, AFTER + k] = place[k]
+                rows[count, AFTER + k] = state[k]
             quick = meaning.rapid and text.text[begin + 1] == 48
-            rows[count, FEED] = inf if quick else place[F] * meaning.feed_share
+            rows[count, FEED] = inf if quick else state[F] * meaning.feed_share
             if rows[count, BEFORE + E_AXIS] == rows[count, AFTER + E_AXIS]:
                 rows[count, ACCELERATION] = meaning.travelling
             count += 1

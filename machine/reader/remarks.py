@@ -34,8 +34,8 @@ def remark(reader: Reader, text: str) -> None:
         if totals is not None:
             reader.part_totals.append(totals)
     elif key == "UNSUPPORTED":
-        area, _, place = value.partition("@")
-        layer, _, reason = place.partition(" ")
+        area, _, rest = value.partition("@")
+        layer, _, reason = rest.partition(" ")
         worst = int(layer) if re.fullmatch("[0-9]{1,6}", layer) else 0
         reader.unsupported.append(Unheld(reader.number, reader.part, _positive(area), worst, reason))
 

@@ -126,8 +126,8 @@ def _merge_turns(keep: NDArray[np.bool_], rows: _Rows, change: Floats) -> _Rows:
     first = np.flatnonzero(keep)
     last = np.append(first[1:], len(keep)) - 1
     minutes = np.add.reduceat(_feed_length(change) / rows.feed, first)
-    place = np.append(np.cumsum(keep) - 1, len(first))
-    events = tuple(replace(event, row=int(place[event.row])) for event in rows.events)
+    merged_row = np.append(np.cumsum(keep) - 1, len(first))
+    events = tuple(replace(event, row=int(merged_row[event.row])) for event in rows.events)
     merged = _Rows(rows.read[first], rows.start[first], rows.end[last], rows.feed[first], events)
     joined = first < last
     merged.feed[joined] = _feed_length(merged.change())[joined] / minutes[joined]

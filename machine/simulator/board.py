@@ -133,8 +133,8 @@ class Board:
         self.idle_after_s = self.rules.idle.after_s if self.rules.idle is not None else inf
         self.awake_s = 0.0  # what is no move has kept the motors on until then
         self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = self.homes = False
-        self.report_every_s = self.place_every_s = 0.0
-        self.report_s = self.place_s = inf
+        self.report_every_s = self.position_every_s = 0.0
+        self.report_s = self.position_s = inf
 
     def note(self, what: str, trouble: bool = False) -> None:
         """Put an event on record; trouble: it is none that a program asks for."""

@@ -21,8 +21,8 @@ class _FaultQueue:
         self._script = script
         self._heap: list[tuple[int, int, Iterator[int]]] = []
         for index in indices:
-            places = script.places(index)
-            self._heap.append((next(places), index, places))
+            strikes = script.strikes(index)
+            self._heap.append((next(strikes), index, strikes))
         heapify(self._heap)
 
     def __bool__(self) -> bool:
@@ -32,21 +32,21 @@ class _FaultQueue:
         """Places below `end` with their faults; they are used up."""
         heap = self._heap
         while heap and heap[0][0] < end:
-            place, index, places = heap[0]
-            next_place = next(places, None)
-            if next_place is None:
+            strike, index, strikes = heap[0]
+            next_strike = next(strikes, None)
+            if next_strike is None:
                 heappop(heap)
             else:
-                heapreplace(heap, (next_place, index, places))
-            yield place, self._script.faults[index]
+                heapreplace(heap, (next_strike, index, strikes))
+            yield strike, self._script.faults[index]
 
 
 class _Direction:
     """One direction of the cable: bytes carried so far, the faults to come, and what is held back until a time."""
 
-    def __init__(self, places: _FaultQueue) -> None:
-        self.places = places
-        self.carried = 0
+    def __init__(self, faults: _FaultQueue) -> None:
+        self.faults = faults
+        self.count = 0
         self.open_s = -inf
         self._held: deque[tuple[float, bytes]] = deque()
 
@@ -157,9 +157,9 @@ class Cable:
 
     def _carry(self, data: bytes, direction: _Direction, now_s: float, until_s: float = inf) -> None:
         """Hand bytes to a direction, damaged where a fault is due."""
-        begin, direction.carried, done = direction.carried, direction.carried + len(data), 0
-        for place, fault in direction.places.before(direction.carried):
-            at = max(place - begin, 0)
+        begin, direction.count, done = direction.count, direction.count + len(data), 0
+        for strike, fault in direction.faults.before(direction.count):
+            at = max(strike - begin, 0)
             if at < done:
                 continue
             direction.put(data[done:at])

@@ -110,8 +110,8 @@ def _autoreport_temperatures(board: Board, words: WordValues, text: str) -> Work
 
 
 def _autoreport_position(board: Board, words: WordValues, text: str) -> Work:
-    board.place_every_s = max(0.0, words.get("S", 0.0))
-    board.place_s = board.now_s + board.place_every_s if board.place_every_s else inf
+    board.position_every_s = max(0.0, words.get("S", 0.0))
+    board.position_s = board.now_s + board.position_every_s if board.position_every_s else inf
     return None
 
 

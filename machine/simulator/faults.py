@@ -72,17 +72,17 @@ class FaultScript:
     faults: tuple[Fault, ...] = ()
     seed: int = 0
 
-    def places(self, index: int) -> Iterator[int]:
+    def strikes(self, index: int) -> Iterator[int]:
         """Where the fault of this index strikes, rising; those of a chance lie as far apart as a geometric law throws them."""
         fault = self.faults[index]
         first = 0 if fault.counted == "byte" else 1
         if fault.at is not None:
             yield fault.at
             return
-        rng, place = random.Random(f"{self.seed} {index}"), first - 1
+        rng, count = random.Random(f"{self.seed} {index}"), first - 1
         while True:
-            place += 1 + (int(log(1.0 - rng.random()) / log(1.0 - fault.chance)) if fault.chance < 1.0 else 0)
-            yield place
+            count += 1 + (int(log(1.0 - rng.random()) / log(1.0 - fault.chance)) if fault.chance < 1.0 else 0)
+            yield count
 
 
 def units_of(kind: Kind) -> tuple[Unit, ...]:

@@ -115,7 +115,7 @@ class SimulatedFirmware:
         if self.dead:
             return inf
         board = self.board
-        due_s = min(board.report_s, board.place_s, board.nozzle.trip_s, board.bed.trip_s, board.idle_s)
+        due_s = min(board.report_s, board.position_s, board.nozzle.trip_s, board.bed.trip_s, board.idle_s)
         if self._wake_s is None:
             return board.now_s if self._queue or len(self._receiver) else min(due_s, self._wait_s)
         return min(self._wake_s, due_s, inf if board.waits_for_heat else self._busy_s)  # no busy while it tells temperatures
@@ -317,7 +317,7 @@ class SimulatedFirmware:
             busy_s = self._busy_s if self._wake_s is not None and not board.waits_for_heat else inf
             trip_s = min(board.nozzle.trip_s, board.bed.trip_s)
             wait_s = self._wait_s if self._wake_s is None and not self._queue else inf
-            due_s = min(busy_s, wait_s, board.report_s, board.place_s, trip_s, board.idle_s)
+            due_s = min(busy_s, wait_s, board.report_s, board.position_s, trip_s, board.idle_s)
             if due_s > to_s or due_s == inf:
                 break
             board.now_s = max(board.now_s, due_s, min(to_s - CHATTER_S, trip_s))
@@ -345,4 +345,4 @@ class SimulatedFirmware:
             board.report_s = board.now_s + board.report_every_s
         else:
             self._said.append(board.position())
-            board.place_s = board.now_s + board.place_every_s
+            board.position_s = board.now_s + board.position_every_s

@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from math import ceil, hypot, inf, pi, sqrt
 
 from machine.firmware import simulation_of
-from machine.gcode.arcs import chords, sweep_rad, told_centre
+from machine.gcode.arcs import arc_centre, chords, sweep_rad
 from machine.gcode.modes import Modes, axes_of
 from machine.kinematics.coordinates import origin_mm
 from machine.planning.timing import axis_accelerations, axis_speeds
-from machine.simulator.planner import ExecutedMoves, Place, Planner, block_of
+from machine.simulator.planner import Axes, ExecutedMoves, Planner, block_of
 from mdp.pose import Pose, rotation, shift
 from profiles.machine import Machine
 
@@ -32,13 +32,13 @@ class TcpKinematics:
         self._origin: list[float] = origin_mm(machine).tolist()
         self._pose: tuple[float, float] | None = None
 
-    def positions(self, place: Place) -> list[float]:
-        """Where the axes stand when the tip is at a place: R (place - origin) + shift."""
-        self._turn(place[3], place[4])
-        x, y, z = (p - o for p, o in zip(place[:3], self._origin, strict=True))
-        return [a * x + b * y + c * z + s for (a, b, c), s in zip(self._rotation, self._shift, strict=True)] + list(place[3:5])
+    def positions(self, tip: Axes) -> list[float]:
+        """Where the axes stand when the tip is at a point: R (tip - origin) + shift."""
+        self._turn(tip[3], tip[4])
+        x, y, z = (p - o for p, o in zip(tip[:3], self._origin, strict=True))
+        return [a * x + b * y + c * z + s for (a, b, c), s in zip(self._rotation, self._shift, strict=True)] + list(tip[3:5])
 
-    def place(self, positions: Place) -> list[float]:
+    def tip(self, positions: Axes) -> list[float]:
         """Where the tip is on the table when the axes stand so."""
         self._turn(positions[3], positions[4])
         x, y, z = (p - s for p, s in zip(positions[:3], self._shift, strict=True))
@@ -54,10 +54,10 @@ class TcpKinematics:
 
 
 class Motion:
-    """Axes X Y Z tilt turn E. place: what the firmware believes, in its own coordinates; place + modes.offset: the program's.
+    """Axes X Y Z tilt turn E. position: what the firmware believes, in its own coordinates; with modes.offset the program's.
 
-    While the firmware follows the table (TCP) place is on the table, else it is the axes' positions. What the axes really do
-    differs by an offset after a reset, or when following is switched at a turned table; `executed` has the real moves.
+    While the firmware follows the table (TCP) it is the tip's on the table, else the axes'. What the axes really do differs by an
+    offset after a reset, or when following is switched at a turned table; `executed` has the real moves.
     """
 
     def __init__(
@@ -88,9 +88,9 @@ class Motion:
     def forget(self) -> None:
         """The board restarts: the axes stay where they are, the firmware believes them at home or zero and knows its defaults."""
         machine = self._machine
-        self.place = [*machine.home, 0.0] if self._starts_at_home else [0.0] * 6
+        self.position = [*machine.home, 0.0] if self._starts_at_home else [0.0] * 6
         self.modes = Modes(self._axes, feed=60.0 * FIRST_FEED)
-        self._offset = [real - place for real, place in zip(self._real[:5], self.place, strict=False)]
+        self._offset = [real - position for real, position in zip(self._real[:5], self.position, strict=False)]
         self.follows = False
         self.soft_limits = True
         self.homed: set[int] = set()
@@ -103,35 +103,35 @@ class Motion:
 
     def target(self, words: WordValues, extrude: bool = True) -> list[float]:
         """Where a G0 or G1 leads, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
-        place = self._wanted(words)
+        destination = self._wanted(words)
         if self.soft_limits:
-            self._clamp(place)
+            self._clamp(destination)
         if not extrude:
-            self.modes.offset[5] += place[5] - self.place[5]
-            place[5] = self.place[5]
-        return place
+            self.modes.offset[5] += destination[5] - self.position[5]
+            destination[5] = self.position[5]
+        return destination
 
-    def _clamp(self, place: list[float]) -> None:
+    def _clamp(self, destination: list[float]) -> None:
         """Marlin stops at soft limits without a word, on axes that were homed; on others what the program meant is counted."""
         for axis, (low, high) in enumerate(self.limits):
             limited = axis in self.homed or not self._starts_at_home
-            coordinate = place[axis] + (0.0 if limited else self.modes.offset[axis])
+            coordinate = destination[axis] + (0.0 if limited else self.modes.offset[axis])
             if not low - SLACK <= coordinate <= high + SLACK:
                 self.clamped += 1
-                place[axis] = min(max(place[axis], low), high) if limited else place[axis]
+                destination[axis] = min(max(destination[axis], low), high) if limited else destination[axis]
 
     def turned(self, angles_deg: Mapping[int, float]) -> list[float]:
         """Where a turn of single axes to the program's coordinates leads."""
-        place = self.place[:]
+        destination = self.position[:]
         for axis, angle in angles_deg.items():
-            place[axis] = angle - self.modes.offset[axis]
+            destination[axis] = angle - self.modes.offset[axis]
         if self.soft_limits:
-            self._clamp(place)
-        return place
+            self._clamp(destination)
+        return destination
 
     def pushes(self, words: WordValues) -> bool:
         """Whether a move turns the extruder."""
-        return abs(self._wanted(words)[5] - self.place[5]) > TINY_MM
+        return abs(self._wanted(words)[5] - self.position[5]) > TINY_MM
 
     def unhomed(self, words: WordValues) -> list[float] | None:
         """The program's coordinates of a target that moves X, Y or Z before they are homed; None for any other."""
@@ -140,14 +140,14 @@ class Motion:
 
     def beyond(self, words: WordValues) -> list[float] | None:
         """The program's coordinates of a target outside the soft limits; None for one inside."""
-        place = self._wanted(words)
-        inside = all(low - SLACK <= p <= high + SLACK for p, (low, high) in zip(place, self.limits, strict=False))
-        return None if inside else [p + s for p, s in zip(place, self.modes.offset, strict=True)]
+        destination = self._wanted(words)
+        inside = all(low - SLACK <= p <= high + SLACK for p, (low, high) in zip(destination, self.limits, strict=False))
+        return None if inside else [p + s for p, s in zip(destination, self.modes.offset, strict=True)]
 
     def _wanted(self, words: WordValues) -> list[float]:
-        place = self.place[:]
-        self.modes.move(place, words.items())
-        return place
+        destination = self.position[:]
+        self.modes.move(destination, words.items())
+        return destination
 
     @property
     def feed_mm_s(self) -> float:
@@ -156,7 +156,7 @@ class Motion:
 
     def pieces(self, target: Sequence[float]) -> list[list[float]]:
         """Where the straight moves to a target end: one, but many when the firmware follows the turning table."""
-        here = self.place
+        here = self.position
         if not self.follows or target[3:5] == here[3:5]:
             return [list(target)]
         return _evenly(here, target, max(1, ceil(self._seconds(here, target) * SEGMENTS_PER_S)))
@@ -164,9 +164,9 @@ class Motion:
     def arc(self, words: WordValues, clockwise: bool, extrude: bool) -> list[list[float]]:
         """Where the chords of a G2 or G3 end; [] for what Marlin answers with "Bad arc parameters"."""
         scale = self.modes.unit_mm
-        start, end = self.place, self.target(words, extrude)
+        start, end = self.position, self.target(words, extrude)
         begin, finish = (start[0], start[1]), (end[0], end[1])
-        centre = told_centre(begin, finish, {letter: scale * words[letter] for letter in "RIJ" if letter in words}, clockwise)
+        centre = arc_centre(begin, finish, {letter: scale * words[letter] for letter in "RIJ" if letter in words}, clockwise)
         if centre is None or centre == begin:
             return []
         sweep = sweep_rad(begin, finish, centre, clockwise)
@@ -175,29 +175,29 @@ class Motion:
         rest = _evenly(start[2:], end[2:], count)
         return [[x, y, *others] for (x, y), others in zip(chords(begin, finish, centre, sweep, count), rest, strict=True)]
 
-    def reach(self, place: Sequence[float], now_s: float, feed_mm_s: float | None = None) -> None:
+    def reach(self, destination: Sequence[float], now_s: float, feed_mm_s: float | None = None) -> None:
         """Plan one straight move, at the speed that F asks for or at a given one."""
-        here, real = self.place, self._real
-        positions = self._tcp.positions(place) if self.follows else place[:5]
+        here, real = self.position, self._real
+        positions = self._tcp.positions(destination) if self.follows else destination[:5]
         end = [p + o for p, o in zip(positions, self._offset, strict=True)]
         self._meet_ends(end)
-        end.append(real[5] + (place[5] - here[5]) * self.flow_share)
+        end.append(real[5] + (destination[5] - here[5]) * self.flow_share)
         feed = self.feed_mm_s * self.feed_share if feed_mm_s is None else feed_mm_s
-        if self.follows and place[:5] != here[:5] and (seconds := self._seconds(here, place)) > 0.0:
+        if self.follows and destination[:5] != here[:5] and (seconds := self._seconds(here, destination)) > 0.0:
             feed = _length(real, end) / seconds
         strokes = end[5] != real[5]
         most_mm_s2 = self._printing if strokes else self._travelling
         speeds, accelerations = self.speeds, self.accelerations
         block = block_of(real, end, feed, speeds=speeds, accelerations=accelerations, most_mm_s2=most_mm_s2)
-        self.place, self._real = list(place), end
+        self.position, self._real = list(destination), end
         if block is not None:
             self.energised = True
             block.feed = self.feed_mm_s if feed_mm_s is None else feed_mm_s / self.feed_share
             self.planner.add(block, self.jerk_mm_s, now_s)
 
-    def _seconds(self, here: Sequence[float], place: Sequence[float]) -> float:
+    def _seconds(self, here: Sequence[float], destination: Sequence[float]) -> float:
         """How long F makes a followed move last."""
-        return _length(here, place) / (self.feed_mm_s * self.feed_share)
+        return _length(here, destination) / (self.feed_mm_s * self.feed_share)
 
     def _meet_ends(self, end: list[float]) -> None:
         """An axis that is driven against its end stays there, and the firmware does not know."""
@@ -231,10 +231,10 @@ class Motion:
         self._real = real
 
     def follow(self, on: bool) -> None:
-        """G43.4, G49: the place stays, as in the firmware that knows them; a turned table is believed elsewhere then."""
+        """G43.4, G49: the position stays, as in the firmware that knows them; a turned table is believed elsewhere then."""
         if on != self.follows:
             self.follows = on
-            positions = self._tcp.positions(self.place) if on else self.place[:5]
+            positions = self._tcp.positions(self.position) if on else self.position[:5]
             self._offset = [r - p for r, p in zip(self._real, positions, strict=False)]
 
     def accelerate(self, words: WordValues) -> None:
@@ -253,13 +253,13 @@ class Motion:
                 bounds[axis] = most
 
     def rename(self, words: WordValues) -> None:
-        """G92: the place where the axes stand gets these coordinates."""
+        """G92: the position of the axes gets these coordinates."""
         for axis, coordinate in self.modes.named(words.items()):
             self.set_coordinate(axis, coordinate)
 
     def set_coordinate(self, axis: int, coordinate: float) -> None:
-        """Call the place where one axis stands by another coordinate."""
-        self.modes.offset[axis] = coordinate - self.place[axis]
+        """Call the position of one axis by another coordinate."""
+        self.modes.offset[axis] = coordinate - self.position[axis]
 
     def halt(self, now_s: float) -> None:
         """Stop at once: later blocks never happen, the one under way ends where it is."""
@@ -271,14 +271,14 @@ class Motion:
         if cut is not None:
             self.executed.cut(cut, planned, planned_s)
         if stopped is not None:
-            self.place[5] += (stopped[5] - self._real[5]) / (self.flow_share or 1.0)
+            self.position[5] += (stopped[5] - self._real[5]) / (self.flow_share or 1.0)
             self._real = list(stopped)
             self._believe()
 
     def _believe(self) -> None:
-        """Work out the place from where the axes stand."""
+        """Work out the position from where the axes stand."""
         positions = [r - o for r, o in zip(self._real, self._offset, strict=False)]
-        self.place[:5] = self._tcp.place(positions) if self.follows else positions
+        self.position[:5] = self._tcp.tip(positions) if self.follows else positions
 
     def at(self, now_s: float) -> list[float]:
         """Where the axes really are now, X Y Z tilt turn."""
@@ -292,7 +292,7 @@ class Motion:
 
     def coordinates(self) -> list[float]:
         """Where the program believes to be when all planned moves are over."""
-        return [p + s for p, s in zip(self.place, self.modes.offset, strict=True)]
+        return [p + s for p, s in zip(self.position, self.modes.offset, strict=True)]
 
 
 def _evenly(here: Sequence[float], target: Sequence[float], count: int) -> list[list[float]]:

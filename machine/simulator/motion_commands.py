@@ -39,9 +39,9 @@ def _pushes(board: Board, words: WordValues) -> bool:
     return False
 
 
-def _coordinates(place: Sequence[float]) -> str:
+def _coordinates(coordinates: Sequence[float]) -> str:
     """Coordinates as Klipper writes them: x y z [filament]."""
-    x, y, z, *_, filament = place
+    x, y, z, *_, filament = coordinates
     return f"{x:.3f} {y:.3f} {z:.3f} [{filament:.3f}]"
 
 

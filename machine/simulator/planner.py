@@ -14,7 +14,7 @@ from machine.firmware.marlin import FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S
 
 TINY = 1e-9
 
-Place = Sequence[float]
+Axes = Sequence[float]  # X Y Z tilt turn E
 ROW = 15  # numbers of a move: 6 where it begins, 6 where it ends, feed, begin, duration
 EXTRUDES_MM = 1e-9  # differences of running filament totals below this are rounding
 
@@ -23,9 +23,9 @@ EXTRUDES_MM = 1e-9  # differences of running filament totals below this are roun
 class Block:
     """A straight move of six axes; speeds along what F measures (0: X Y Z, 1: rotary, 2: filament)."""
 
-    start: Place
-    end: Place
-    direction: Place
+    start: Axes
+    end: Axes
+    direction: Axes
     feed: float
     length: float
     measure: int
@@ -183,8 +183,8 @@ class Planner:
         if self._current is not None:
             begin_s, v0 = self._current.begin_s + self._current.duration_s, self._current.v1
         timed = []
-        for place, block in enumerate(self._waiting):
-            block.settle(begin_s, v0, self._waiting[place + 1].entry2 if place + 1 < len(self._waiting) else 0.0)
+        for index, block in enumerate(self._waiting):
+            block.settle(begin_s, v0, self._waiting[index + 1].entry2 if index + 1 < len(self._waiting) else 0.0)
             begin_s, v0 = begin_s + block.duration_s, block.v1
             timed.append(block)
         return timed
@@ -193,21 +193,21 @@ class Planner:
         """The block that has begun and not ended."""
         return self._current
 
-    def halt(self, now_s: float) -> Place | None:
+    def halt(self, now_s: float) -> Axes | None:
         """Stop at once, forget what waits; where the axes are then, None when nothing was planned.
 
         The block under way is cut short: its end and duration are changed.
         """
         self.run(now_s)
         cut, self._current, self._last, self.ended_s = self._current, None, None, now_s
-        place = self._waiting[0].start if self._waiting else None
+        stop = self._waiting[0].start if self._waiting else None
         self._waiting.clear()
         if cut is not None:
-            cut.end = place = cut.at(now_s)
+            cut.end = stop = cut.at(now_s)
             cut.duration_s = now_s - cut.begin_s
-        return place
+        return stop
 
-    def at(self, now_s: float, idle: Place) -> Place:
+    def at(self, now_s: float, idle: Axes) -> Axes:
         """Where the axes are; idle: where they are when nothing is planned."""
         if self._current is not None:
             return self._current.at(now_s)
@@ -242,7 +242,7 @@ def corner2(before: Block, after: Block, jerk: float) -> float:
     return v * v
 
 
-def block_of(start: Place, end: Place, feed: float, *, speeds: Place, accelerations: Place, most_mm_s2: float) -> Block | None:
+def block_of(start: Axes, end: Axes, feed: float, *, speeds: Axes, accelerations: Axes, most_mm_s2: float) -> Block | None:
     """A block from place to place; None when nothing moves. most_mm_s2: acceleration set for moves of X Y Z."""
     deltas = [b - a for a, b in zip(start, end, strict=True)]
     x, y, z, tilt, turn, filament = deltas

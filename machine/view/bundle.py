@@ -24,7 +24,7 @@ def bundle(entry: Path) -> str:
 
 
 def _imported(file: Path, text: str) -> list[Path]:
-    return [(file.parent / place).resolve() for _, place in IMPORT.findall(text)]
+    return [(file.parent / name).resolve() for _, name in IMPORT.findall(text)]
 
 
 def _module(file: Path, text: str) -> str:

@@ -119,10 +119,10 @@ def _parts(
     records = []
     for index in parsed.parts or (0,):
         rows = np.flatnonzero(parsed.part == index)
-        place = np.searchsorted(shown, rows[[0, -1]] + [0, 1]) if len(rows) else np.zeros(2, dtype=np.int64)
+        shown_rows = np.searchsorted(shown, rows[[0, -1]] + [0, 1]) if len(rows) else np.zeros(2, dtype=np.int64)
         figures = {
-            "first_row": int(place[0]),
-            "rows": int(place[1] - place[0]),
+            "first_row": int(shown_rows[0]),
+            "rows": int(shown_rows[1] - shown_rows[0]),
             "layers": int((parsed.part[by_layer.first] == index).sum()),
             "time_s": float(seconds[rows].sum()),
             "filament_mm": float(parsed.e_mm[rows].sum()),

@@ -25,16 +25,16 @@ def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[n
     records = []
     for finding in relevant_findings(run, known):
         row = _row(program, finding)
-        place = min(int(np.searchsorted(shown, row)), len(shown) - 1) if row < len(program.line) else -1
-        places: dict[str, Any] = {"workpiece_mm": None, "machine_mm": None}
-        if place >= 0:
+        shown_row = min(int(np.searchsorted(shown, row)), len(shown) - 1) if row < len(program.line) else -1
+        points: dict[str, Any] = {"workpiece_mm": None, "machine_mm": None}
+        if shown_row >= 0:
             at = program.end[row : row + 1]
-            places = {"workpiece_mm": workpiece_path(machine, at)[0].tolist(), "machine_mm": at[0, :3].tolist()}
+            points = {"workpiece_mm": workpiece_path(machine, at)[0].tolist(), "machine_mm": at[0, :3].tolist()}
         records.append(
             {
                 "severity": finding.severity, "code": finding.code, "message": finding.message, "line": finding.line,
-                "part": finding.part, "layer": finding.layer, "row": place,
-            } | places
+                "part": finding.part, "layer": finding.layer, "row": shown_row,
+            } | points
         )  # fmt: skip
     return records
 

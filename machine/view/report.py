@@ -132,7 +132,7 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
     """
     program, kind = run.program, page_kinds(run.program)
     groups: list[tuple[str, NDArray[np.bool_]]] = [
-        (name or UNTOLD, (kind == MoveKind.EXTRUDE) & (program.type == place)) for place, name in enumerate(program.types)
+        (name or UNTOLD, (kind == MoveKind.EXTRUDE) & (program.type == index)) for index, name in enumerate(program.types)
     ]
     groups += [(name, kind == number) for number, name in MOVES.items()]
     spent = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]

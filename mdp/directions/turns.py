@@ -7,7 +7,7 @@ import numpy as np
 from mdp.mesh import Floats
 from mdp.pose import about
 
-DECIMALS = 9  # of an angle that a person can type: what rounding leaves of right angles is gone
+DECIMALS = 9  # of an angle as a file or a person says it: off by less than a tenth of a micrometre over a metre
 LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
 
 

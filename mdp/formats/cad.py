@@ -35,13 +35,13 @@ def read(path: Path) -> list[Surface]:
 @contextmanager
 def _silence() -> Iterator[None]:
     """What a compiled library says on standard output and error goes nowhere: results go there."""
-    kept = [os.dup(descriptor) for descriptor in (1, 2)]
+    duplicates = [os.dup(descriptor) for descriptor in (1, 2)]
     try:
         with open(os.devnull, "wb") as nowhere:
             for descriptor in (1, 2):
                 os.dup2(nowhere.fileno(), descriptor)
         yield
     finally:
-        for descriptor, own in zip((1, 2), kept, strict=True):
+        for descriptor, own in zip((1, 2), duplicates, strict=True):
             os.dup2(own, descriptor)
             os.close(own)

@@ -15,7 +15,7 @@ from mdp.formats.surface import Surface, check_meshes, check_placed, check_surfa
 from mdp.mesh import Floats
 from profiles.errors import MeshError
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # "glTF", "JSON" and "BIN" read as little-endian numbers
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 TRIANGLES = 4  # primitive mode
 DEEPEST = 64  # nodes within nodes
@@ -33,7 +33,7 @@ def read_scene(path: Path, content: bytes) -> list[Surface]:
     """The same for the content of such a file; path: what messages name."""
     document, binary = _chunks(path, content)
     try:
-        surfaces = _place_all(path, document, binary)
+        surfaces = _scene_meshes(path, document, binary)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {str(error)[:200]})") from None
     if not surfaces:
@@ -48,11 +48,11 @@ def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
     if len(content) < length:
         raise MeshError(f"{path}: is cut short: it holds {len(content)} of the {length} bytes that its header announces")
     chunks: dict[int, bytes] = {}
-    place = 12
-    while place + 8 <= length:
-        size, kind = struct.unpack("<II", content[place : place + 8])
-        chunks.setdefault(kind, content[place + 8 : place + 8 + size])
-        place += 8 + size
+    offset = 12
+    while offset + 8 <= length:
+        size, kind = struct.unpack("<II", content[offset : offset + 8])
+        chunks.setdefault(kind, content[offset + 8 : offset + 8 + size])
+        offset += 8 + size
     try:
         return json.loads(chunks.get(JSON_CHUNK, b"")), chunks.get(BINARY_CHUNK, b"")
     except RecursionError:
@@ -68,7 +68,7 @@ def _roots(document: Any) -> list[int]:
     return [number for number in range(len(document.get("nodes", []))) if number not in children]
 
 
-def _place_all(path: Path, document: Any, binary: bytes) -> list[Surface]:
+def _scene_meshes(path: Path, document: Any, binary: bytes) -> list[Surface]:
     """The primitives of all nodes of the scene, parents before children, in the order of the file."""
     pending = [(number, np.eye(4), 0) for number in reversed(_roots(document))]
     surfaces: list[Surface] = []

@@ -60,13 +60,13 @@ def read(path: Path) -> list[Surface]:
     order, elements, body = _header(path, content)
     columns: dict[str, dict[str, Any]] = {}
     words = content[body:].split() if order == "" else []
-    place = body if order else 0
+    position = body if order else 0
     for element in elements:
         try:
             if order:
-                columns[element.name], place = _binary_rows(content, place, element, order)
+                columns[element.name], position = _binary_rows(content, position, element, order)
             else:
-                columns[element.name], place = _ascii_rows(words, place, element)
+                columns[element.name], position = _ascii_rows(words, position, element)
         except (ValueError, IndexError, OverflowError):
             raise MeshError(f"{path}: is cut short or malformed in its {element.count} rows of `{element.name}`") from None
     plain = {(table.name, column.name) for table in elements for column in table.properties if not column.length}
@@ -102,8 +102,8 @@ def _corner_colours(colours: Indices | None, polygons: list[list[int]] | Indices
         return None
 
     def colour_of(corners: list[int]) -> int:
-        each = {int(colours[corner]) for corner in corners if 0 <= corner < len(colours)}
-        return each.pop() if len(each) == 1 else NO_COLOUR
+        at_corners = {int(colours[corner]) for corner in corners if 0 <= corner < len(colours)}
+        return at_corners.pop() if len(at_corners) == 1 else NO_COLOUR
 
     if not isinstance(polygons, np.ndarray):
         return np.array([colour_of(corners) for corners in polygons], dtype=np.int64)
@@ -142,19 +142,19 @@ def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
     return order, elements, body
 
 
-def _binary_rows(content: bytes, place: int, element: Element, order: str) -> tuple[dict[str, Any], int]:
+def _binary_rows(content: bytes, offset: int, element: Element, order: str) -> tuple[dict[str, Any], int]:
     """Rows read in one piece when all lists are as long as the first row's, else one by one."""
-    lengths = _first_lengths(content, place, element, order) if element.count else {}
+    lengths = _first_lengths(content, offset, element, order) if element.count else {}
     fields: list[Any] = []
     for column in element.properties:
         if column.length:
             fields.append((f"{column.name} length", order + column.length))
         fields.append((column.name, order + column.kind, *([(lengths.get(column.name, 0),)] if column.length else [])))
     record = np.dtype(fields)
-    if len(content) - place >= record.itemsize * element.count:
-        rows = np.frombuffer(content, record, element.count, place)
+    if len(content) - offset >= record.itemsize * element.count:
+        rows = np.frombuffer(content, record, element.count, offset)
         if all((rows[f"{name} length"] == length).all() for name, length in lengths.items()):
-            return _columns(rows, element), place + record.itemsize * element.count
+            return _columns(rows, element), offset + record.itemsize * element.count
     if not lengths:
         raise ValueError("cut short")
     columns: dict[str, list[Any]] = {column.name: [] for column in element.properties}
@@ -162,12 +162,12 @@ def _binary_rows(content: bytes, place: int, element: Element, order: str) -> tu
         for column in element.properties:
             count = 1
             if column.length:
-                count = int(np.frombuffer(content, order + column.length, 1, place)[0])
-                place += np.dtype(column.length).itemsize
-            values = np.frombuffer(content, order + column.kind, count, place).tolist()
-            place += np.dtype(column.kind).itemsize * count
+                count = int(np.frombuffer(content, order + column.length, 1, offset)[0])
+                offset += np.dtype(column.length).itemsize
+            values = np.frombuffer(content, order + column.kind, count, offset).tolist()
+            offset += np.dtype(column.kind).itemsize * count
             columns[column.name].append(values if column.length else values[0])
-    return columns, place
+    return columns, offset
 
 
 def _columns(rows: Any, element: Element) -> dict[str, Any]:
@@ -178,32 +178,32 @@ def _columns(rows: Any, element: Element) -> dict[str, Any]:
     return {column.name: column_of(column) for column in element.properties}
 
 
-def _first_lengths(content: bytes, place: int, element: Element, order: str) -> dict[str, int]:
+def _first_lengths(content: bytes, offset: int, element: Element, order: str) -> dict[str, int]:
     lengths = {}
     for column in element.properties:
         count = 1
         if column.length:
-            count = int(np.frombuffer(content, order + column.length, 1, place)[0])
-            place += np.dtype(column.length).itemsize
+            count = int(np.frombuffer(content, order + column.length, 1, offset)[0])
+            offset += np.dtype(column.length).itemsize
             lengths[column.name] = count
-        place += np.dtype(column.kind).itemsize * count
+        offset += np.dtype(column.kind).itemsize * count
     return lengths
 
 
-def _ascii_rows(words: list[bytes], place: int, element: Element) -> tuple[dict[str, Any], int]:
+def _ascii_rows(words: list[bytes], index: int, element: Element) -> tuple[dict[str, Any], int]:
     width = len(element.properties)
     if not any(column.length for column in element.properties):
-        table = np.array(words[place : place + width * element.count]).astype(np.float64).reshape(element.count, width)
-        return {column.name: table[:, k] for k, column in enumerate(element.properties)}, place + width * element.count
+        table = np.array(words[index : index + width * element.count]).astype(np.float64).reshape(element.count, width)
+        return {column.name: table[:, k] for k, column in enumerate(element.properties)}, index + width * element.count
     columns: dict[str, list[Any]] = {column.name: [] for column in element.properties}
     for _ in range(element.count):
         for column in element.properties:
-            count = int(words[place]) if column.length else 1
-            place += 1 if column.length else 0
-            if place + count > len(words) or count < 0:
+            count = int(words[index]) if column.length else 1
+            index += 1 if column.length else 0
+            if index + count > len(words) or count < 0:
                 raise ValueError("cut short")
             number = float if column.kind in ("f4", "f8") else int
-            values = [number(word) for word in words[place : place + count]]
+            values = [number(word) for word in words[index : index + count]]
             columns[column.name].append(values if column.length else values[0])
-            place += count
-    return columns, place
+            index += count
+    return columns, index

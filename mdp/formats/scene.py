@@ -19,7 +19,7 @@ Z_UP_OF = {
     "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
     "Z_UP": np.eye(3),
 }
-MM = 1000.0
+MM = 1000.0  # in a metre, which the <unit> of COLLADA counts in
 
 
 def read(path: Path) -> list[Surface]:
@@ -57,13 +57,13 @@ def _to_mm_with_z_up(path: Path) -> Floats:
     asset = ElementTree.parse(path).find("{*}asset")
     unit = None if asset is None else asset.find("{*}unit")
     axis = "Y_UP" if asset is None else asset.findtext("{*}up_axis", "Y_UP").strip()
-    told = "1" if unit is None else unit.get("meter", "1")
+    meter = "1" if unit is None else unit.get("meter", "1")
     try:
-        metres = float(told)
+        metres = float(meter)
     except ValueError:
         metres = np.nan
     if not 0.0 < metres < np.inf:
-        raise MeshError(f"{path}: its <unit> is {told[:40]!r} m, it must be a number above 0")
+        raise MeshError(f"{path}: its <unit> is {meter[:40]!r} m, it must be a number above 0")
     if axis not in Z_UP_OF:
         raise MeshError(f"{path}: its <up_axis> is {axis[:40]!r}, it must be one of {', '.join(Z_UP_OF)}")
     return (1.0 if metres == 1.0 else MM * metres) * Z_UP_OF[axis]

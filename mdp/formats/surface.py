@@ -14,7 +14,7 @@ from profiles.errors import MeshError
 # What a file may place by reference: doubled at every level, a small file would place more than any memory holds.
 MOST_PLACED = 20_000  # objects, components and nodes
 MOST_PLACED_MESHES = 2_000  # those of them that are meshes, which are united where they touch
-MOST_PLACED_FACES = 20_000_000
+MOST_PLACED_FACES = 20_000_000  # as many as the largest file of facets holds (mdp.read.MOST_BYTES)
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,7 +76,7 @@ class Package:
         name = name.lstrip("/")
         if name not in self.models:
             root = self.parse(name)
-            objects = {each.get("id", ""): each for each in reversed(root.findall(f"{CORE}resources/{CORE}object"))}
+            objects = {element.get("id", ""): element for element in reversed(root.findall(f"{CORE}resources/{CORE}object"))}
             self.models[name] = Model(root, objects, _palettes(root))
         return self.models[name]
 
@@ -101,13 +101,13 @@ def read(path: Path) -> list[Surface]:
     except (zipfile.BadZipFile, struct.error, ValueError, NotImplementedError):
         raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
-        surfaces = _place_all(Package(path, archive))
+        surfaces = _built_meshes(Package(path, archive))
     if not surfaces:
         raise MeshError(f"{path}: its build places no mesh")
     return surfaces
 
 
-def _place_all(package: Package) -> list[Surface]:
+def _built_meshes(package: Package) -> list[Surface]:
     """The meshes of all build items and their components, in the order of the file."""
     start = _start_part(package)
     items = package.model(start).root.findall(f"{CORE}build/{CORE}item")
@@ -134,7 +134,8 @@ def _place_all(package: Package) -> list[Surface]:
             continue
         components = element.findall(f"{CORE}components/{CORE}component")
         pending += [
-            _placement(package, each, placement.part, placement.transform, placement.depth + 1) for each in reversed(components)
+            _placement(package, component, placement.part, placement.transform, placement.depth + 1)
+            for component in reversed(components)
         ]
     return surfaces
 
@@ -165,7 +166,7 @@ def _palettes(root: ElementTree.Element) -> dict[str, list[int]]:
     palettes = {}
     for kind, entry, attribute in ((f"{CORE}basematerials", f"{CORE}base", "displaycolor"), (*COLOUR_GROUP, "color")):
         for group in root.findall(f"{CORE}resources/{kind}"):
-            colours = (parse_colour(each.get(attribute, "")) for each in group.findall(entry))
+            colours = (parse_colour(element.get(attribute, "")) for element in group.findall(entry))
             palettes[group.get("id", "")] = [NO_COLOUR if colour is None else colour for colour in colours]
     return palettes
 
@@ -180,7 +181,9 @@ def _triangle_colours(triangles: list[ElementTree.Element], pid: str, palettes: 
         alike = {triangle.get(corner, first) for corner in ("p2", "p3")} == {first}
         return palette[int(first)] if alike and first.isdecimal() and int(first) < len(palette) else NO_COLOUR
 
-    colours = np.array([colour_of(each) for each in triangles], dtype=np.int64) if palettes else np.zeros(0, dtype=np.int64)
+    colours = (
+        np.array([colour_of(triangle) for triangle in triangles], dtype=np.int64) if palettes else np.zeros(0, dtype=np.int64)
+    )
     return colours if (colours != NO_COLOUR).any() else None
 
 

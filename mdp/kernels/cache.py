@@ -42,9 +42,9 @@ def note_trouble(reason: str) -> None:
         _troubles.append(reason)
 
 
-def note_unwritten(place: Path, error: OSError) -> None:
+def note_unwritten(folder: Path, error: OSError) -> None:
     """The same for a folder that cannot be written."""
-    note_trouble(f"{place} cannot be written: {(error.strerror or str(error)).lower()}")
+    note_trouble(f"{folder} cannot be written: {(error.strerror or str(error)).lower()}")
 
 
 def trouble() -> str:

@@ -48,7 +48,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
         config.CACHE_DIR = given
 
 
-def _forgive(compiled: Any, place: Path) -> None:
+def _forgive(compiled: Any, folder: Path) -> None:
     """A kernel that cannot be cached, on a full disk, is used all the same."""
     save = compiled._cache.save_overload
 
@@ -56,7 +56,7 @@ def _forgive(compiled: Any, place: Path) -> None:
         try:
             save(*overload)
         except OSError as error:
-            note_unwritten(place, error)
+            note_unwritten(folder, error)
 
     compiled._cache.save_overload = save_if_possible
 

@@ -24,18 +24,18 @@ def sort_into_bins(low: NDArray[Any], high: NDArray[Any], bins: int) -> tuple[ND
 
     Bin b holds items[first[b] : first[b + 1]], in rising order; first: (bins + 1,).
     """
-    first, place = longs(bins + 1, 0), longs(bins + 1, 0)
+    first, next_free = longs(bins + 1, 0), longs(bins + 1, 0)
     for k in range(len(low)):
         for b in range(low[k], high[k] + 1):
             first[b + 1] += 1
     for b in range(bins):
         first[b + 1] += first[b]
-        place[b + 1] = first[b + 1]
+        next_free[b + 1] = first[b + 1]
     items = longs(first[bins], 0)
     for k in range(len(low)):
         for b in range(low[k], high[k] + 1):
-            items[place[b]] = k
-            place[b] += 1
+            items[next_free[b]] = k
+            next_free[b] += 1
     return first, items
 
 

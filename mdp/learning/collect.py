@@ -21,7 +21,7 @@ from mdp.learning.collection.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
 from profiles.profile import DEFAULTS
 
-MOST_WIDE = 1000
+MOST_WIDE = 1000  # as search.beam_width allows
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,7 +62,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 def collect(arguments: Sequence[str] | None) -> None:
     """Make the records that are missing, and say what there is."""
     options = _options(arguments)
-    profiles = (_found(options.machine), _found(options.material), _found(options.process))
+    profiles = (_name_or_path(options.machine), _name_or_path(options.material), _name_or_path(options.process))
     settings = Settings(options.beam_width, options.faces, options.time_limit, *profiles, tuple(options.set))
     for terms in options.terms:
         settings.profile(terms)  # a wrong one is told before anything begins
@@ -79,7 +79,7 @@ def collect(arguments: Sequence[str] | None) -> None:
     _report(options.out, [rows[search] for search in wanted])
 
 
-def _found(profile: str) -> str:
+def _name_or_path(profile: str) -> str:
     """A profile's name, or where its file is, for workers start elsewhere."""
     return str(Path(profile).resolve()) if Path(profile).is_file() else profile
 

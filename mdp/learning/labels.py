@@ -17,7 +17,7 @@ from mdp.mesh import Floats, Ints
 
 BEST = 5  # so many candidates of a list are rated
 TIE = 1e-9  # outcomes (shares) that differ less are the same
-SMALLEST_RANGE = 1e-8
+SMALLEST_RANGE = 1e-8  # added to the range, which is 0 where all of a list have the same
 LEAST_OUTCOME = 0.05  # lists that can end with less count as if they ended with it, else the best of models would weigh most
 
 Singles = NDArray[np.float32]

@@ -13,7 +13,7 @@ from mdp.mesh import Floats, Ints
 from mdp.ranking.network import DECIMALS
 
 FULL = 50  # candidates of a full list: the beam width that the lists are collected with
-RESAMPLES = 2000
+RESAMPLES = 2000  # of a bootstrap: 50 of them lie beyond either end of 95 %
 
 Scores = Callable[[RatedList], Floats]
 Measure = Callable[[Floats, RatedList], float]

@@ -28,7 +28,7 @@ HEADS = (
     "core h",
     "late",
 )
-MOST_NAMES = 20
+MOST_NAMES = 20  # of searches that failed: about a screen
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

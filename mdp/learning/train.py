@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 Trained = tuple["Scores", Callable[[Mapping[str, str]], bytes]]  # what a ranker gives a list, and its file with metadata
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
-CUTS = (1, 2, 3, 4, 5)
-PLACES = (1, 2)
+CUTS = (1, 2, 3, 4, 5)  # of the NDCG, as the paper's table has them
+FIRST = (1, 2)  # candidates whose regret is said
 MOST_NETWORKS = 12  # of an ensemble: its file stays below 200 kB
 LOSSES = {"urank": "paper", "ranknet": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
 OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has its own
@@ -154,8 +154,8 @@ def judged(loss: str, scores: "Scores", lists: Sequence[RatedList]) -> dict[str,
     if loss == "regret":
         all_terms = sorted({rated.terms for rated in lists})
         kinds = {f"{terms}:": [rated for rated in lists if rated.terms == terms] for terms in all_terms}
-        measures = {f" regret@{first}": regret(first) for first in PLACES}
-        measures |= {f" best in first {first}": best_within(first) for first in PLACES}
+        measures = {f" regret@{first}": regret(first) for first in FIRST}
+        measures |= {f" best in first {first}": best_within(first) for first in FIRST}
     for kind, some in kinds.items():
         for name, measure in measures.items() if some else ():
             figures[f"{kind}{name}".strip()] = round(sum(measure(scores(rated), rated) for rated in some) / len(some), 4)

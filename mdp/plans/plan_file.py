@@ -46,7 +46,7 @@ from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
 
-VERSION = 1
+VERSION = 1  # of what a plan's keys mean
 GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
 ZONE_KINDS = ("keep", "no_seam", "no_support")  # as mdp.zone.Zones has them
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "front")

@@ -27,9 +27,10 @@ from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
 from profiles.toml_text import read_toml
 
-MOST_BYTES = 10_000_000
-MOST_ZONES = 1000
-LEAST_NORMAL, MOST_NORMAL, MOST_MM = 1e-6, 1e6, 1e5
+MOST_BYTES = 10_000_000  # far more than the workbench writes; a file as large is refused unread
+MOST_ZONES = 1000  # of a kind: every face is asked for each
+LEAST_NORMAL, MOST_NORMAL = 1e-6, 1e6  # lengths of a normal; what lies beyond is a slip of the pen
+MOST_MM = 1e5  # fifty times what any printer makes (mdp.read.MOST_MM)
 UNIT = 1e-12  # a normal whose length differs less from 1 is left as it is, so that a plan gives the same bits again
 
 

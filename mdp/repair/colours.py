@@ -19,11 +19,11 @@ def carry_colours(surfaces: list[Surface], solid: Surface) -> Indices | None:
     painted = given.colours != NO_COLOUR
     corners, colours = given.vertices[given.faces[painted]], given.colours[painted]
     wanted = solid.vertices[solid.faces]
-    found = _same_corners(corners, colours, wanted)
-    rest = np.flatnonzero(found == NO_COLOUR)
+    carried_colours = _same_corners(corners, colours, wanted)
+    rest = np.flatnonzero(carried_colours == NO_COLOUR)
     if len(rest) and len(corners):
-        found[rest] = _pieces(corners, colours, wanted[rest])
-    return found
+        carried_colours[rest] = _pieces(corners, colours, wanted[rest])
+    return carried_colours
 
 
 def _same_faces(given: Surface, solid: Surface) -> bool:
@@ -33,13 +33,13 @@ def _same_faces(given: Surface, solid: Surface) -> bool:
 def _same_corners(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
     """Colours of the triangles that have the corners of a painted one, in any order."""
     both = np.concatenate([corners, wanted]) + 0.0  # -0.0 and 0.0 are one place
-    _, place = np.unique(both.reshape(-1, 3), axis=0, return_inverse=True)
-    _, group = np.unique(np.sort(place.reshape(-1, 3), axis=1), axis=0, return_inverse=True)
+    _, vertex_of = np.unique(both.reshape(-1, 3), axis=0, return_inverse=True)
+    _, group = np.unique(np.sort(vertex_of.reshape(-1, 3), axis=1), axis=0, return_inverse=True)
     group = group.ravel()
     by_group = np.full(len(both), NO_COLOUR, dtype=np.int64)
     by_group[group[: len(corners)][::-1]] = colours[::-1]
-    found: Indices = by_group[group[len(corners) :]]
-    return found
+    matched: Indices = by_group[group[len(corners) :]]
+    return matched
 
 
 def _pieces(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
@@ -52,15 +52,15 @@ def _pieces(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
     middles = wanted.mean(axis=1)
     first = np.searchsorted(low, middles[:, 0] - widest - near_mm)
     end = np.searchsorted(low, middles[:, 0] + near_mm, side="right")
-    found = np.full(len(wanted), NO_COLOUR, dtype=np.int64)
+    colour_of = np.full(len(wanted), NO_COLOUR, dtype=np.int64)
     for row, (begin, stop) in enumerate(zip(first.tolist(), end.tolist(), strict=True)):
         away = np.einsum("ij,ij->i", normals[begin:stop], middles[row] - corners[begin:stop, 0])
         parallel = np.abs(normals[begin:stop] @ mine[row]) > SAME_DIRECTION
         near = begin + np.flatnonzero(parallel & (np.abs(away) <= near_mm))
         on = near[_holds(corners[near], normals[near], middles[row])]
         if len(on):
-            found[row] = colours[on[np.argmin(np.abs(away[on - begin]))]]
-    return found
+            colour_of[row] = colours[on[np.argmin(np.abs(away[on - begin]))]]
+    return colour_of
 
 
 def _holds(corners: Floats, normals: Floats, point: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -65,17 +65,17 @@ def rim_loops(surface: Surface) -> list[Indices]:
     loops: list[Indices] = []
     for first in edges.ends[numbers].tolist():
         path = [first]
-        place = {first: 0}
+        index_on_path = {first: 0}
         while onward.get(path[-1]):
             vertex = onward[path[-1]].pop()
-            if vertex not in place:
-                place[vertex] = len(path)
+            if vertex not in index_on_path:
+                index_on_path[vertex] = len(path)
                 path.append(vertex)
                 continue
-            loops.append(np.array(path[place[vertex] :], dtype=np.int64))
-            for left in path[place[vertex] + 1 :]:
-                del place[left]
-            del path[place[vertex] + 1 :]
+            loops.append(np.array(path[index_on_path[vertex] :], dtype=np.int64))
+            for left in path[index_on_path[vertex] + 1 :]:
+                del index_on_path[left]
+            del path[index_on_path[vertex] + 1 :]
     return loops
 
 

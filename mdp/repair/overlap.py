@@ -9,7 +9,7 @@ from mdp.mesh import Floats
 if TYPE_CHECKING:
     import manifold3d as m3
 
-SECTIONS = 23
+SECTIONS = 23  # an overlap missed by all of them reaches over less than a 24th of the height
 EXCESS = 1e-3  # of the area of all sections; folds of less are left alone, since mending them would re-triangulate the model
 DEEPEST, TOGETHER = 5, 8  # halvings, and pieces that are united at once
 LEAST_MOST, MOST_GROWTH = 1000, 2  # faces that a union may have, and for each face of its pieces

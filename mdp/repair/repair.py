@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 WELD_SHARES = (1e-6, 1e-5, 1e-4)  # of the model's size: the rounding of ASCII files first, gaps of 0.01 mm in 100 mm last
 SHRINK = 0.01  # of the model's size: what a repair may take off its box
-SAME_VOLUME = 1e-5
+SAME_VOLUME = 1e-5  # share that two readings of one surface may differ by: float32 files move corners by 6e-8 of a size
 MOST_CHANGED = 0.01  # of the volume: what the reading of edges that many faces share may change
-MOST_READINGS = 5
+MOST_READINGS = 5  # each pairs edges anew; a surface that has not settled by then is judged by what it is
 SHARED = 0.5  # of the volume: a body that counts half of itself twice is not understood
 
 

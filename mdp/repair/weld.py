@@ -16,9 +16,9 @@ def merge_vertices(surface: Surface) -> Surface:
     order = np.lexsort(vertices.T)
     fresh = np.ones(len(vertices), dtype=bool)
     fresh[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
-    place = np.empty(len(vertices), dtype=np.int64)
-    place[order] = np.cumsum(fresh) - 1
-    return drop_unused_vertices(Surface(vertices[order[fresh]], drop_collapsed_faces(place[surface.faces])))
+    merged = np.empty(len(vertices), dtype=np.int64)
+    merged[order] = np.cumsum(fresh) - 1
+    return drop_unused_vertices(Surface(vertices[order[fresh]], drop_collapsed_faces(merged[surface.faces])))
 
 
 def merge_rim_vertices(surface: Surface, distance: float) -> Surface:
@@ -51,8 +51,8 @@ def drop_collapsed_faces(faces: Indices) -> Indices:
 
 def drop_unused_vertices(surface: Surface) -> Surface:
     """The surface without unused vertices, the others in order of first use."""
-    used, first, place = np.unique(surface.faces.ravel(), return_index=True, return_inverse=True)
+    used, first, sorted_row = np.unique(surface.faces.ravel(), return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return Surface(surface.vertices[used[order]], rank[place].reshape(-1, 3))
+    return Surface(surface.vertices[used[order]], rank[sorted_row].reshape(-1, 3))

@@ -46,11 +46,11 @@ def _match_around_edge(angles: Floats, forward: object, normals: Floats) -> Indi
     while len(ring) >= 2:
         ring_on = ring[1:] + ring[:1]
         gaps = [
-            (bool(directions[a] == directions[b]), float((angles[b] - angles[a]) % (2 * np.pi)), place)
-            for place, (a, b) in enumerate(zip(ring, ring_on, strict=True))
+            (bool(directions[a] == directions[b]), float((angles[b] - angles[a]) % (2 * np.pi)), at)
+            for at, (a, b) in enumerate(zip(ring, ring_on, strict=True))
         ]
-        place = min(gaps)[2]
-        a, b = ring[place], ring_on[place]
+        at = min(gaps)[2]
+        a, b = ring[at], ring_on[at]
         pairs.append((a, b))
         ring = [k for k in ring if k not in (a, b)]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -112,8 +112,8 @@ def split_touching_fans(surface: Surface) -> Surface:
         np.concatenate([first, _next(first)]),
         np.concatenate([np.where(same, second, _next(second)), np.where(same, _next(second), second)]),
     )
-    corner, place = np.unique(corners, return_inverse=True)
-    return drop_unused_vertices(Surface(surface.vertices[surface.faces.ravel()[corner]], place.reshape(-1, 3)))
+    corner, vertex_of = np.unique(corners, return_inverse=True)
+    return drop_unused_vertices(Surface(surface.vertices[surface.faces.ravel()[corner]], vertex_of.reshape(-1, 3)))
 
 
 def split_shared_edges(surface: Surface) -> Surface:

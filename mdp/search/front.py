@@ -151,8 +151,7 @@ def choose(rows: Sequence[FrontRow], worth: Worth, most_longer: float = inf) -> 
     if not worth or all(rows[place].time_s is None for place in places):
         return Choice(places[scars], reason)
     allowed = [place for place in places if _is_quick(rows[place], rows[0], most_longer)]
-    prices = [worth.of_row(rows[place]) or 0.0 for place in allowed]
-    totals = [rows[place].cost_mm2 + price - min(prices) for place, price in zip(allowed, prices, strict=True)]
+    totals = [rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in allowed]
     taken = _first_alike(totals)
     if allowed[taken] == places[scars]:
         return Choice(places[scars], reason)

@@ -4,7 +4,7 @@ Orientations that differ by a symmetry only count once. The rest are ranked by a
 search, and the most promising one by the whole search: that takes as long as three searches at most.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil, inf
 
@@ -12,8 +12,9 @@ from mdp.cost.cost import weight_of_stairs
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.mesh import Mesh
-from mdp.search.front import EQUAL, Price, Pricing, Worth
+from mdp.search.front import EQUAL, Price, Pricing, Worth, front_row, price_row
 from mdp.search.parts import one_piece
+from mdp.search.problem import Problem
 from mdp.search.search import decompose
 from profiles.profile import Profile
 
@@ -21,6 +22,7 @@ RESTING = 20  # orientations that are ranked, those that a symmetry makes alike 
 PRICED, SEARCHED = 6, 2  # of them whose bare time is looked at, and that a narrow search cuts
 COARSER = 3  # fewer directions in the narrow search
 CLEARLY = 0.95  # of the cost: estimates are not good enough to turn a model over for less
+ALIKE = 1.03  # of the cost: nobody cuts a model for less who may lay it down in one piece
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
 PricingBy = Callable[[Profile], Pricing]
@@ -39,19 +41,24 @@ class Lying:
 
 def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[[Mesh], Decomposition]) -> Lying:
     """The orientation whose decomposition costs least with its time; as it stands unless another one saves search.turning_mm2 and
-    more than estimates are wrong.
+    more than estimates are wrong, or costs as much in one piece as this one in several parts.
 
     search: the whole search of a mesh; pricing: what parts take to print by a profile.
     """
     worth, upright = Worth.of(profile), search(mesh)
     best = Lying(None, upright, total_mm2(upright.chosen, worth), upright.chosen)
     limit_mm2 = min(CLEARLY * best.total_mm2, best.total_mm2 - profile.search.turning_mm2)
-    orientation = _most_promising(mesh, profile, pricing, limit_mm2)
-    if orientation is None:
+    glimpses = _glimpses(mesh, profile, pricing)
+    promising = _most_promising(glimpses, profile, limit_mm2)
+    if promising is None and len(upright.parts) > 1:
+        limit_mm2 = ALIKE * best.total_mm2
+        promising = _whole(glimpses, profile, pricing, limit_mm2)
+    if promising is None:
         return best
-    decomposition = search(standing_still(mesh, orientation.rotation))
-    lying = Lying(orientation, decomposition, total_mm2(decomposition.chosen, worth), upright.chosen)
-    return lying if lying.total_mm2 < limit_mm2 else best
+    decomposition = search(promising.mesh)
+    lying = Lying(promising.orientation, decomposition, total_mm2(decomposition.chosen, worth), upright.chosen)
+    fewer = len(decomposition.parts) < len(upright.parts) or limit_mm2 < best.total_mm2
+    return lying if fewer and lying.total_mm2 < limit_mm2 else best
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +72,10 @@ class _Glimpse:
     whole_mm2: float
 
 
-def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2: float) -> Orientation | None:
-    """The orientation that is likely to cost least when it is cut; None where none is likely to cost less than the limit."""
-    worth = Worth.of(profile)
-    scar_mm2 = 1.0 + worth.second_mm2 * SUPPORT_S_MM2  # of a mm2 that needs support, with the time that this takes
-    stair_mm2 = weight_of_stairs(profile)
-    glimpses = []
+def _glimpses(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[_Glimpse]:
+    """The first orientations in which a model can be printed, the one that costs least in one piece first."""
+    worth, stair_mm2 = Worth.of(profile), weight_of_stairs(profile)
+    scar_mm2, glimpses = _scar_mm2(worth), []
     for orientation in distinct_orientations(mesh, profile)[:PRICED]:
         turned = standing_still(mesh, orientation.rotation)
         bare = _price_bare(turned, profile, pricing)
@@ -78,22 +83,42 @@ def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2:
             bare_mm2 = worth.of_print(bare.time_s, bare.filament_mm)
             whole_mm2 = bare_mm2 + scar_mm2 * orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2
             glimpses.append(_Glimpse(orientation, turned, bare_mm2, whole_mm2))
-    best = min(glimpses, key=lambda glimpse: glimpse.whole_mm2, default=None)
-    if best is None:
+    return sorted(glimpses, key=lambda glimpse: glimpse.whole_mm2)
+
+
+def _scar_mm2(worth: Worth) -> float:
+    """What a mm2 that needs support counts, with the time that this takes."""
+    return 1.0 + worth.second_mm2 * SUPPORT_S_MM2
+
+
+def _most_promising(glimpses: Sequence[_Glimpse], profile: Profile, limit_mm2: float) -> _Glimpse | None:
+    """The one that is likely to cost least when it is cut; None where none is likely to cost less than the limit."""
+    if not glimpses:
         return None
-    chosen = None
+    (best, *others), chosen = glimpses, None
     if best.whole_mm2 < limit_mm2:
-        chosen, limit_mm2 = best.orientation, best.whole_mm2
-    others = [glimpse for glimpse in glimpses if glimpse is not best and glimpse.bare_mm2 < limit_mm2]
+        chosen, limit_mm2 = best, best.whole_mm2
+    others = [glimpse for glimpse in others if glimpse.bare_mm2 < limit_mm2]
     if chosen is not None and not others:
         return chosen  # in one piece already it costs less than the others may
     quick = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER))
-    for glimpse in sorted([best, *others], key=lambda glimpse: glimpse.whole_mm2)[:SEARCHED]:
+    more_mm2 = _scar_mm2(Worth.of(profile)) - 1.0
+    for glimpse in [best, *others][:SEARCHED]:
         rows = decompose(glimpse.mesh, "", quick).front
-        cost_mm2 = glimpse.bare_mm2 + min(row.cost_mm2 + (scar_mm2 - 1.0) * row.support_area_mm2 for row in rows)
+        cost_mm2 = glimpse.bare_mm2 + min(row.cost_mm2 + more_mm2 * row.support_area_mm2 for row in rows)
         if cost_mm2 < limit_mm2:
-            chosen, limit_mm2 = glimpse.orientation, cost_mm2
+            chosen, limit_mm2 = glimpse, cost_mm2
     return chosen
+
+
+def _whole(glimpses: Sequence[_Glimpse], profile: Profile, pricing: PricingBy, limit_mm2: float) -> _Glimpse | None:
+    """The first of the best that costs less than the limit in one piece."""
+    for glimpse in glimpses[:SEARCHED]:
+        problem = Problem(glimpse.mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
+        row = price_row(front_row(problem.root), (one_piece(glimpse.mesh, profile.machine),), pricing(profile))
+        if row.time_s is not None and total_mm2(row, Worth.of(profile)) < limit_mm2:
+            return glimpse
+    return None
 
 
 def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:

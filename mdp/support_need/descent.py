@@ -25,7 +25,7 @@ MOST_STEPS = 1000  # over faces, about a vertex or down; never reached by a soun
 class View(NamedTuple):
     """A surface along a direction (3,): the heights of its vertices (n,), the cosines of its faces' normals with the direction
     (m,), the number of the patch that each face belongs to (m,), and the height up to which it rests on something.
-    place: room for a point."""
+    point: (3,) mm, where the way down has come to; written by it."""
 
     surface: LinkedFaces
     direction: Floats
@@ -33,7 +33,7 @@ class View(NamedTuple):
     cosines: Floats
     number: Ints
     base_mm: float
-    place: Floats
+    point: Floats
 
 
 @part
@@ -48,7 +48,7 @@ def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
             return ANCHORED
         if view.cosines[f] ** 2 >= 1.0 - LEVEL**2:
             return _end_on_face(view, f, own)
-        corner, share = _leave(surface, view.direction, view.place, f)
+        corner, share = _leave(surface, view.direction, view.point, f)
         if corner >= 0 and END < share < 1.0 - END:
             height = _put(view, f, corner, share)
             g = surface.neighbours[f, corner]
@@ -67,7 +67,7 @@ def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
             v = w
         f, height = g, heights[v]
         for axis in range(3):
-            view.place[axis] = surface.vertices[axis, v]
+            view.point[axis] = surface.vertices[axis, v]
     return LOOSE
 
 
@@ -101,13 +101,13 @@ def _put(view: View, f: int, corner: int, share: float) -> float:
     a, b = view.surface.faces[f, corner], view.surface.faces[f, (corner + 1) % 3]
     for axis in range(3):
         begin = view.surface.vertices[axis, a]
-        view.place[axis] = begin + share * (view.surface.vertices[axis, b] - begin)
+        view.point[axis] = begin + share * (view.surface.vertices[axis, b] - begin)
     return float(view.heights[a] + share * (view.heights[b] - view.heights[a]))
 
 
 @part
-def _leave(surface: LinkedFaces, d: Floats, place: Floats, f: int) -> tuple[int, float]:
-    """The edge, by the corner it begins at, over which water at the place leaves a face, and where on it; -1: none."""
+def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int, float]:
+    """The edge, by the corner it begins at, over which water at a point leaves a face, and where on it; -1: none."""
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     nx, ny, nz = normals[0, f], normals[1, f], normals[2, f]
     cosine = nx * d[0] + ny * d[1] + nz * d[2]
@@ -119,10 +119,10 @@ def _leave(surface: LinkedFaces, d: Floats, place: Floats, f: int) -> tuple[int,
         p, q, r = _across(x, y, z, nx, ny, nz)
         out = -(d[0] * p + d[1] * q + d[2] * r)
         if out > ASIDE * np.sqrt(p * p + q * q + r * r):
-            way = ((ax - place[0]) * p + (ay - place[1]) * q + (az - place[2]) * r) / out
+            way = ((ax - point[0]) * p + (ay - point[1]) * q + (az - point[2]) * r) / out
             if way < nearest:
                 fx, fy, fz = cosine * nx - d[0], cosine * ny - d[1], cosine * nz - d[2]
-                along = (place[0] + way * fx - ax) * x + (place[1] + way * fy - ay) * y + (place[2] + way * fz - az) * z
+                along = (point[0] + way * fx - ax) * x + (point[1] + way * fy - ay) * y + (point[2] + way * fz - az) * z
                 nearest, way_out, share = way, corner, along / (x * x + y * y + z * z)
     return way_out, min(max(share, 0.0), 1.0)
 

@@ -11,8 +11,8 @@ from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import LinkedFaces
 
 DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
-ROUNDING_MM = 1e-6
-UNSEEN = -1
+ROUNDING_MM = 1e-6  # bottoms whose heights differ by less are as low
+UNSEEN = -1  # no vertex
 
 
 class Pool(NamedTuple):
@@ -67,6 +67,6 @@ def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool,
 
 
 @part
-def _leads_out(other: int, bottom: int, heights: Floats) -> bool:
+def _leads_out(seen_bottom: int, bottom: int, heights: Floats) -> bool:
     """Whether another bottom as low, which has a way out, has been found."""
-    return bool(other != UNSEEN and other != bottom and abs(heights[other] - heights[bottom]) <= ROUNDING_MM)
+    return bool(seen_bottom != UNSEEN and seen_bottom != bottom and abs(heights[seen_bottom] - heights[bottom]) <= ROUNDING_MM)

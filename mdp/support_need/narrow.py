@@ -6,7 +6,7 @@ from mdp.mesh import Floats, Ints
 from mdp.support_need.spans import Sides
 
 FINE_MM = 0.1  # between two places that are looked at, neither of them too far from an anchor
-ROUNDING_MM = 1e-6
+ROUNDING_MM = 1e-6  # a place just as far from a side as it may be
 DEEP = 64  # halvings of a triangle, one within the other
 
 

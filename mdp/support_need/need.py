@@ -15,7 +15,7 @@ from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Lim
 from mdp.topology.linked_faces import LinkedFaces, flat_places, link
 from profiles.process import Process
 
-MOST_KEPT = 256  # single directions whose classes are kept; a polished plane comes back to the same few again and again
+MOST_CACHED = 256  # single directions whose classes are cached; a polished plane comes back to the same few again and again
 LEVEL_LAYERS = 2.0  # a patch no higher than this is printed as one bridge
 NO_BASE_MM = -np.inf
 COARSE = spread(37, 0.0)  # directions over the half sphere, some 24 degrees apart
@@ -50,7 +50,7 @@ class SupportNeed:
     surface: LinkedFaces
     process: Process
     weight: float
-    _kept: dict[bytes, Classes] = field(default_factory=dict)
+    _cached: dict[bytes, Classes] = field(default_factory=dict)
     _tables: dict[bytes, Classes] = field(default_factory=dict)
 
     @classmethod
@@ -75,14 +75,14 @@ class SupportNeed:
         return np.stack(rows) if rows else np.zeros((0, len(self.surface.faces)), np.uint8)
 
     def _row(self, direction: Floats) -> Classes:
-        """(m,) for one direction; kept for a while."""
+        """(m,) for one direction; cached for a while."""
         key = direction.tobytes()
-        row = self._kept.get(key)
+        row = self._cached.get(key)
         if row is None:
             row = self._classes(direction[None])[0]
-            if len(self._kept) >= MOST_KEPT:
-                self._kept.clear()
-            self._kept[key] = row
+            if len(self._cached) >= MOST_CACHED:
+                self._cached.clear()
+            self._cached[key] = row
         return row
 
     def _classes(self, directions: Floats) -> Classes:

@@ -93,7 +93,7 @@ def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
 
 
 @part
-def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, place: int, counts: Counts) -> None:
+def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: int, counts: Counts) -> None:
     """Look down from those places of a raster that lie on a face, one row after the other."""
     a, b, c = face[0], face[1], face[2]
     ux, uy, uz = seen[b, 0] - seen[a, 0], seen[b, 1] - seen[a, 1], seen[b, 2] - seen[a, 2]
@@ -114,8 +114,8 @@ def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, place: in
             for i in range(int(np.ceil(begin / RASTER - ASIDE)), int(np.ceil(end / RASTER - ASIDE))):
                 x = (i + ASIDE) * RASTER
                 z = seen[a, 2] + slope_x * (x - seen[a, 0]) + slope_y * (y - seen[a, 1])
-                counts.sampled[place] += 1.0
-                counts.airy[place] += int(_is_airy(lowest, x, y, z - slack_mm))
+                counts.sampled[patch] += 1.0
+                counts.airy[patch] += int(_is_airy(lowest, x, y, z - slack_mm))
 
 
 @part

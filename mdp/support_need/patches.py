@@ -17,13 +17,13 @@ from mdp.mesh import Floats, Ints
 from mdp.support_need.descent import SAFE, View
 from mdp.support_need.dips import UNSEEN, Pool, begins_in_air
 from mdp.support_need.narrow import is_near_anchors, triangles_room
-from mdp.support_need.sides import UNKNOWN, Patches, find_sides, is_rim, place_across, rests
+from mdp.support_need.sides import UNKNOWN, Patches, find_sides, is_rim, rests, seen_along
 from mdp.support_need.spans import ROUNDING_MM as SPAN_ROUNDING_MM
 from mdp.support_need.spans import Sides, spans
 from mdp.topology.linked_faces import LinkedFaces
 
 Classes = NDArray[np.uint8]
-CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2
+CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2  # classes of faces, the dearer the higher
 NARROW = 2.0  # line widths from an anchor that lines hold on to their neighbours
 UNNUMBERED = -1  # faces that belong to no patch yet
 ROUNDING_MM, ROUNDING_MM2 = 1e-6, 1e-6  # of a patch just as high or as large as it may be
@@ -59,13 +59,13 @@ class Patch(NamedTuple):
 def classify(begin_row: int, end_row: int, surface: LinkedFaces, along: FramedDirections, limits: Limits, out: Classes) -> None:
     """For each of k directions put CARRIES_ITSELF where it holds among the classes of the faces, (k, m)."""
     count, size = surface.normals.shape[1], surface.vertices.shape[1]
-    risky, place = ints(count + 1, 0), floats(3, 0.0)
+    risky, point = ints(count + 1, 0), floats(3, 0.0)
     patches = Patches(ints(count, 0), ints(count + 2, 0), ints(count + 2, 0), ints(count + 2, 0))
     pool = Pool(ints(size, 0), ints(size, 0))
     heights, cosines, number = floats(size, 0.0), floats(count, 0.0), ints(count, 0)
     for row in range(begin_row, end_row):
         d = along.directions[row]
-        view = View(surface, d, heights, cosines, number, limits.base_mm, place)
+        view = View(surface, d, heights, cosines, number, limits.base_mm, point)
         dot(surface.vertices[0], surface.vertices[1], surface.vertices[2], d, heights)
         dot(surface.normals[0], surface.normals[1], surface.normals[2], d, cosines)
         for v in range(size):
@@ -131,8 +131,8 @@ def _measure(view: View, patches: Patches, own: int, frame: Floats) -> Patch:
             height = heights[corners[f, corner]]
             low, high = min(low, height), max(high, height)
             if is_rim(neighbours, number, f, corner):
-                ax, ay = place_across(vertices, corners[f, corner], frame)
-                bx, by = place_across(vertices, corners[f, (corner + 1) % 3], frame)
+                ax, ay = seen_along(vertices, corners[f, corner], frame)
+                bx, by = seen_along(vertices, corners[f, (corner + 1) % 3], frame)
                 around += np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
     return Patch(own, faces, frame, area, high - low, around)
 
@@ -169,7 +169,7 @@ def _is_narrow(surface: LinkedFaces, patch: Patch, sides: Sides, reach_mm: float
     todo, triangle, nearest = triangles_room(), floats(6, 0.0), 0
     for f in patch.faces:
         for corner in range(3):
-            x, y = place_across(surface.vertices, surface.faces[f, corner], patch.frame)
+            x, y = seen_along(surface.vertices, surface.faces[f, corner], patch.frame)
             triangle[2 * corner], triangle[2 * corner + 1] = x, y
         nearest = is_near_anchors(sides, reach_mm, triangle, todo, nearest)
         if nearest < 0:

@@ -18,7 +18,7 @@ STEP_MM = 0.5  # between the places of a side at which one looks down
 END_MM = 0.01  # of a side, within which the first and the last of them lie
 SHORT_MM = 0.1  # a side no longer has only one
 HALVINGS = 6  # until the end of an anchor between two of them is found
-UNKNOWN, HELD, UNHELD = 0, 1, 2
+UNKNOWN, HELD, UNHELD = 0, 1, 2  # what is known of a patch
 
 
 class Patches(NamedTuple):
@@ -39,7 +39,7 @@ def is_rim(neighbours: Ints, number: Ints, f: int, corner: int) -> bool:
 
 
 @part
-def place_across(vertices: Floats, v: int, frame: Floats) -> tuple[float, float]:
+def seen_along(vertices: Floats, v: int, frame: Floats) -> tuple[float, float]:
     """A vertex seen along the direction."""
     x: float = vertices[0, v] * frame[0, 0] + vertices[1, v] * frame[0, 1] + vertices[2, v] * frame[0, 2]
     y: float = vertices[0, v] * frame[1, 0] + vertices[1, v] * frame[1, 1] + vertices[2, v] * frame[1, 2]
@@ -54,22 +54,22 @@ def find_sides(view: View, patches: Patches, own: int, frame: Floats, at_best: b
     for f in faces:
         for corner in range(3):
             if is_rim(neighbours, view.number, f, corner):
-                count += 1 if at_best else _count_places(view, f, corner)
+                count += 1 if at_best else _count_samples(view, f, corner)
     ends, anchored, line, count = table(count, 4), ints(count, 0), floats(4, 0.0), 0
     for f in faces:
         for corner in range(3):
             if not is_rim(neighbours, view.number, f, corner):
                 continue
             _see_edge(view, f, corner, frame, line)
-            begin, places, state = 0.0, 1, at_best and _may_anchor(view, f, corner)
+            begin, samples, state = 0.0, 1, at_best and _may_anchor(view, f, corner)
             if not at_best:
-                places = _count_places(view, f, corner)
-                state = _is_anchored(view, patches, f, corner, _share(view, f, corner, 0, places))
-            for k in range(1, places):
-                share = _share(view, f, corner, k, places)
+                samples = _count_samples(view, f, corner)
+                state = _is_anchored(view, patches, f, corner, _share(view, f, corner, 0, samples))
+            for k in range(1, samples):
+                share = _share(view, f, corner, k, samples)
                 after = _is_anchored(view, patches, f, corner, share)
                 if after != state:
-                    end = _find_change(view, patches, f, corner, _share(view, f, corner, k - 1, places), share)
+                    end = _find_change(view, patches, f, corner, _share(view, f, corner, k - 1, samples), share)
                     anchored[count] = int(state)
                     count = _add(ends, count, line, begin, end)
                     begin, state = end, after
@@ -82,8 +82,8 @@ def find_sides(view: View, patches: Patches, own: int, frame: Floats, at_best: b
 def _see_edge(view: View, f: int, corner: int, frame: Floats, line: Floats) -> None:
     """An edge seen along the direction, x, y, x, y."""
     vertices, faces = view.surface.vertices, view.surface.faces
-    line[0], line[1] = place_across(vertices, faces[f, corner], frame)
-    line[2], line[3] = place_across(vertices, faces[f, (corner + 1) % 3], frame)
+    line[0], line[1] = seen_along(vertices, faces[f, corner], frame)
+    line[2], line[3] = seen_along(vertices, faces[f, (corner + 1) % 3], frame)
 
 
 @part
@@ -105,7 +105,7 @@ def _length(view: View, f: int, corner: int) -> float:
 
 
 @part
-def _count_places(view: View, f: int, corner: int) -> int:
+def _count_samples(view: View, f: int, corner: int) -> int:
     """At how many places of an edge of the rim one looks down: both its ends and no further than STEP_MM apart."""
     g = view.surface.neighbours[f, corner]
     if not _may_anchor(view, f, corner) or rests(view.surface.faces, view.heights, g, view.base_mm):
@@ -115,12 +115,12 @@ def _count_places(view: View, f: int, corner: int) -> int:
 
 
 @part
-def _share(view: View, f: int, corner: int, k: int, places: int) -> float:
+def _share(view: View, f: int, corner: int, k: int, samples: int) -> float:
     """Where on an edge the place k lies at which one looks down; those at its ends a little within it."""
-    if places == 1:
+    if samples == 1:
         return 0.5
     inside = END_MM / _length(view, f, corner)
-    return min(max(k / (places - 1), inside), 1.0 - inside)
+    return min(max(k / (samples - 1), inside), 1.0 - inside)
 
 
 @part
@@ -181,9 +181,9 @@ def _is_held(view: View, patches: Patches, asked: int) -> bool:
             for k in range(patches.starts[patch], patches.starts[patch + 1]):
                 f = patches.faces[k]
                 for corner in range(3):
-                    places = _count_places(view, f, corner) if is_rim(neighbours, view.number, f, corner) and not held else 0
-                    for place in range(places):
-                        end = _look_down(view, f, corner, _share(view, f, corner, place, places))
+                    samples = _count_samples(view, f, corner) if is_rim(neighbours, view.number, f, corner) and not held else 0
+                    for sample in range(samples):
+                        end = _look_down(view, f, corner, _share(view, f, corner, sample, samples))
                         if end == ANCHORED or (end > 0 and patches.held[end] == HELD):
                             held = True
                             break

@@ -68,9 +68,9 @@ def _angles(ends: Floats) -> Floats:
     angles = floats(TURNS + 4, 0.0)
     for own in range(2):
         b = 0
-        for other in range(1, BINS):
-            if length[other] > length[b]:
-                b = other
+        for candidate in range(1, BINS):
+            if length[candidate] > length[b]:
+                b = candidate
         angle = turned[b] / length[b] if length[b] > 0.0 else 0.1 * own
         angles[2 * own], angles[2 * own + 1] = angle + 0.5 * np.pi, angle
         length[b] = 0.0

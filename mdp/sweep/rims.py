@@ -111,17 +111,21 @@ def _share_columns(ahead: float, block: Block, share: Floats) -> None:
 def _add_stairs(block: Block, shares: Floats, up: Floats, along: Floats, sums: Floats) -> None:
     """Add stairs printed straight up and along the direction: those of faces wholly above, and of the shares of those crossed."""
     low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
+    column, crossed = block.column, block.crossed
     for k in range(len(low)):
-        b = np.uint32(block.column[k])
-        sums[b, 0] += up[k]
-        sums[b, 1] += along[k]
-        for ahead in range(min(AHEAD, block.crossed[k])):
-            sums[b + ahead, 2] += up[k] * shares[ahead, k]
-            sums[b + ahead, 3] += along[k] * shares[ahead, k]
-        for ahead in range(AHEAD, block.crossed[k]):
+        b, p, q = np.uint32(column[k]), up[k], along[k]
+        sums[b, 0] += p
+        sums[b, 1] += q
+        sums[b, 2] += p * shares[0, k]
+        sums[b, 3] += q * shares[0, k]
+        sums[b + 1, 2] += p * shares[1, k]
+        sums[b + 1, 3] += q * shares[1, k]
+        sums[b + 2, 2] += p * shares[2, k]
+        sums[b + 2, 3] += q * shares[2, k]
+        for ahead in range(AHEAD, crossed[k]):
             share = share_above(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
-            sums[b + ahead, 2] += up[k] * share
-            sums[b + ahead, 3] += along[k] * share
+            sums[b + ahead, 2] += p * share
+            sums[b + ahead, 3] += q * share
 
 
 @part

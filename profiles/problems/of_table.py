@@ -56,33 +56,33 @@ def _rounds(
             value = model.model_validate(given, context=context)
         except ValidationError as error:
             problems |= dict.fromkeys(sentences(error.errors(), model, prefix))
-            places = {_place(problem) for problem in error.errors()}
-            if not isinstance(given, dict) or () in places or places <= mended:
+            key_paths = {_key_path(problem) for problem in error.errors()}
+            if not isinstance(given, dict) or () in key_paths or key_paths <= mended:
                 break
-            for place in places:
-                _mend(given, place, sound)
-            mended |= places
-    return list(problems), frozenset(prefix + ".".join(place) for place in mended), value
+            for key_path in key_paths:
+                _mend(given, key_path, sound)
+            mended |= key_paths
+    return list(problems), frozenset(prefix + ".".join(key_path) for key_path in mended), value
 
 
-def _place(problem: Any) -> tuple[str, ...]:
+def _key_path(problem: Any) -> tuple[str, ...]:
     """Where to mend a problem: lists are replaced as a whole."""
-    place: list[str] = []
+    path: list[str] = []
     for step in problem["loc"]:
         if isinstance(step, int):
             break
-        place.append(step)
-    return tuple(place)
+        path.append(step)
+    return tuple(path)
 
 
-def _mend(given: dict[str, Any], place: tuple[str, ...], sound: Mapping[str, Any]) -> None:
+def _mend(given: dict[str, Any], key_path: tuple[str, ...], sound: Mapping[str, Any]) -> None:
     """Put the sound value where the wrong one stands, or take it out where there is none."""
     inner, value = given, sound
-    for step in place[:-1]:
+    for step in key_path[:-1]:
         if not isinstance(inner.get(step), dict):
             return
         inner, value = inner[step], value.get(step, {})
-    if place[-1] in value:
-        inner[place[-1]] = deepcopy(value[place[-1]])
+    if key_path[-1] in value:
+        inner[key_path[-1]] = deepcopy(value[key_path[-1]])
     else:
-        inner.pop(place[-1], None)
+        inner.pop(key_path[-1], None)

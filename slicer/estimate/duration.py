@@ -8,7 +8,7 @@ from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 
-TINY = 1e-9
+TINY = 1e-9  # mm, mm/s or a cosine, instead of a division by 0
 
 
 @part

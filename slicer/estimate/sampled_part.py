@@ -67,10 +67,10 @@ class SampledPart:
 
     def _model(self, layer: int) -> Polygons | None:
         """The islands of the model to which a layer belongs; None where no other part touches it."""
-        other = self.others.get(layer, Polygons())
-        if other.is_empty() or layer >= len(self.heights.tip_mm):
-            return None if other.is_empty() else other
-        return joined(self.sections[layer], self.sections[layer], other)
+        of_others = self.others.get(layer, Polygons())
+        if of_others.is_empty() or layer >= len(self.heights.tip_mm):
+            return None if of_others.is_empty() else of_others
+        return joined(self.sections[layer], self.sections[layer], of_others)
 
     def _ceiling(self, layer: int) -> Polygons:
         """What parts printed later take of the layers above, as far as they need a floor."""

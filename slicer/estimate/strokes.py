@@ -78,8 +78,8 @@ def shell_strokes(shell: Shell, process: Process, speeds: LayerSpeeds) -> list[S
         kind, own = (Kind.INNER_WALL, width) if level else (Kind.OUTER_WALL, outer_wall_width_mm(process))
         flow = 1.0 if level else bulge_flow(own, height, 1, process.outer_bulge * own)
         strokes += loop_strokes(kind, loops, bead_area_mm2(own, height) * flow, process.small_wall_mm, speeds)
-    for level, place in enumerate(shell.narrow):
-        strokes += _narrow_strokes(Kind.INNER_WALL if level else Kind.OUTER_WALL, place, speeds)
+    for level, extent in enumerate(shell.narrow):
+        strokes += _narrow_strokes(Kind.INNER_WALL if level else Kind.OUTER_WALL, extent, speeds)
     if shell.ending.area_mm2 > 0.0:
         total = shell.ending.area_mm2 / spacing_mm(width, height)
         count = max(1, shell.ending.pieces) * max(1, process.walls - process.interface_walls)
@@ -150,13 +150,13 @@ def support_strokes(support: ThickSupport, z_mm: float, process: Process, speeds
     return strokes + line_strokes(Kind.SUPPORT_INTERFACE, roof, speeds, density=density, width_mm=width, angle_deg=angle)
 
 
-def _narrow_strokes(kind: Kind, place: Extent, speeds: LayerSpeeds) -> list[Strokes]:
+def _narrow_strokes(kind: Kind, extent: Extent, speeds: LayerSpeeds) -> list[Strokes]:
     """Single strokes along the middle of narrow places."""
-    if place.area_mm2 <= 0.0:
+    if extent.area_mm2 <= 0.0:
         return []
-    total = 0.5 * place.boundary_mm
-    count = max(float(place.pieces), total / NARROW_STROKE_MM)
-    return _single_strokes(kind, total, place.area_mm2 * speeds.height_mm, count, speeds)
+    total = 0.5 * extent.boundary_mm
+    count = max(float(extent.pieces), total / NARROW_STROKE_MM)
+    return _single_strokes(kind, total, extent.area_mm2 * speeds.height_mm, count, speeds)
 
 
 def _skin_gaps(skin: Extent, width_mm: float, speeds: LayerSpeeds) -> list[Strokes]:

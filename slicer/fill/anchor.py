@@ -52,7 +52,7 @@ class _BorderPoint(NamedTuple):
 
     edge: int
     contour: int
-    place_mm: float
+    way_mm: float
 
 
 def anchor_lines(pieces: Pieces, border: Border, limits: Limits, group: Indices | None = None) -> list[Floats]:
@@ -83,23 +83,23 @@ def _way(edges: Floats) -> Floats:
 
 
 @part
-def _places(pieces: _Pieces, border: _Border) -> Floats:
+def _ways_along_border(pieces: _Pieces, border: _Border) -> Floats:
     """(2 k,) way along all contours to each end."""
     points, bounds, ends, edges, way = pieces.points, pieces.bounds, pieces.ends, border.edges, border.way
-    place: Floats = floats(2 * len(ends), 0.0)
+    along_border: Floats = floats(2 * len(ends), 0.0)
     for k in range(len(ends)):
         for side in range(2):
             p, e = bounds[k + 1] - 1 if side else bounds[k], ends[k, side]
             along = np.hypot(points[p, 0] - edges[e, 0], points[p, 1] - edges[e, 1])
-            place[2 * k + side] = min(way[e] + along, way[e + 1])
-    return place
+            along_border[2 * k + side] = min(way[e] + along, way[e + 1])
+    return along_border
 
 
 @part
-def _next_ends(place: Floats, contour: Indices, border: _Border) -> tuple[Indices, Floats]:
+def _next_ends(along_border: Floats, contour: Indices, border: _Border) -> tuple[Indices, Floats]:
     """Of each end the next one on its contour, which may be itself, and how far it is."""
-    order = argsort(place)
-    after, gap = longs(len(place), 0), floats(len(place), 0.0)
+    order = argsort(along_border)
+    after, gap = longs(len(along_border), 0), floats(len(along_border), 0.0)
     i = 0
     while i < len(order):
         c, j = contour[order[i]], i
@@ -108,7 +108,7 @@ def _next_ends(place: Floats, contour: Indices, border: _Border) -> tuple[Indice
         for k in range(i, j):
             here, there = order[k], order[k + 1 if k + 1 < j else i]
             after[here] = there
-            gap[here] = place[there] - place[here]
+            gap[here] = along_border[there] - along_border[here]
             if k + 1 == j:
                 gap[here] += border.way[border.offsets[c + 1]] - border.way[border.offsets[c]]
         i = j
@@ -184,7 +184,7 @@ def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border:
     edges, way = border.edges, border.way
     e, first, end = since.edge, border.offsets[since.contour], border.offsets[since.contour + 1]
     left, forward = abs(length), length > 0.0
-    at = since.place_mm - way[e] if forward else way[e + 1] - since.place_mm
+    at = since.way_mm - way[e] if forward else way[e + 1] - since.way_mm
     step = way[e + 1] - way[e]
     corner = 2 if forward else 0
     while left > step - at:
@@ -223,8 +223,8 @@ def _reverse(out: Floats, first: int, end: int) -> None:
 @kernel
 def _lay_lines(pieces: _Pieces, border: _Border, limits: Limits, out: Floats, starts: Indices) -> tuple[int, int]:
     """Fills in the lines and where each begins; returns the number of points and of lines."""
-    place = _places(pieces, border)
-    after, gap = _next_ends(place, pieces.contour, border)
+    along_border = _ways_along_border(pieces, border)
+    after, gap = _next_ends(along_border, pieces.contour, border)
     partner, sense = _join_ends(after, gap, pieces.group, limits.most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, limits))
     done = flags(len(pieces.ends))
@@ -238,7 +238,7 @@ def _lay_lines(pieces: _Pieces, border: _Border, limits: Limits, out: Floats, st
         starts[count] = n
         count += 1
         if runs[end] != 0.0:
-            since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], place[end])
+            since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], along_border[end])
             first, n = n, _append_run(out, n, since, runs[end], border)
             _reverse(out, first, n)
         while True:
@@ -246,7 +246,7 @@ def _lay_lines(pieces: _Pieces, border: _Border, limits: Limits, out: Floats, st
             n = _append_piece(out, n, pieces, end)
             end ^= 1
             if runs[end] != 0.0:
-                since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], place[end])
+                since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], along_border[end])
                 n = _append_run(out, n, since, runs[end], border)
             if partner[end] < 0:
                 break

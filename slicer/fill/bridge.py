@@ -30,12 +30,12 @@ GAIN = 0.01  # a direction is better only by this share, more than where the lin
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """place: what hangs; angle_deg: direction of its lines, 0 to 180.
+    """hanging: what it spans; angle_deg: direction of its lines, 0 to 180.
 
     longest_mm: the longest span; loose: share of the lines' length that is not held at both ends.
     """
 
-    place: Polygons
+    hanging: Polygons
     angle_deg: float
     longest_mm: float
     loose: float
@@ -68,20 +68,20 @@ def find_bridges(hanging: Polygons, anchors: Floats, width_mm: float) -> list[Br
     bridges: list[Bridge] = []
     left = [hanging]
     while left:
-        place = left.pop()
-        bridge = find_bridge(place, anchors, width_mm)
-        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(place, anchors, width_mm)
+        piece = left.pop()
+        bridge = find_bridge(piece, anchors, width_mm)
+        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(piece, anchors, width_mm)
         if held is None:
             bridges += [bridge] if bridge is not None else []
         else:
             bridges.append(held)
-            left += islands(opening(place - held.place, 0.25 * width_mm))
+            left += islands(opening(piece - held.hanging, 0.25 * width_mm))
     return bridges
 
 
-def _held_piece(place: Polygons, anchors: Floats, width_mm: float) -> Bridge | None:
+def _held_piece(hanging: Polygons, anchors: Floats, width_mm: float) -> Bridge | None:
     """What of a place has lines held at both ends in the direction that has most of them; None where that is next to nothing."""
-    sides = edges(place)
+    sides = edges(hanging)
     angles, near = np.array(_angles(sides)), _edges_near(anchors, sides)
     held_mm = _least_sag(sides, near, angles, width_mm)[3]
     angle = float(angles[int(np.argmax(held_mm))])
@@ -90,7 +90,7 @@ def _held_piece(place: Polygons, anchors: Floats, width_mm: float) -> Bridge | N
         return None
     cos, sin = np.cos(angle), np.sin(angle)
     ends = rows[:, [0, 2, 1, 2]].reshape(-1, 2, 2) @ np.array([[cos, sin], [-sin, cos]])
-    piece = opening(strips(list(ends), 0.5 * width_mm + RIM_MM) ^ place, 0.5 * width_mm)
+    piece = opening(strips(list(ends), 0.5 * width_mm + RIM_MM) ^ hanging, 0.5 * width_mm)
     if piece.area() < LEAST * width_mm**2:
         return None
     return Bridge(piece, float(np.degrees(angle)), float((rows[:, 1] - rows[:, 0]).max()), 0.0)
@@ -178,8 +178,8 @@ def _held_rows(sides: Floats, anchors: Floats, angle: float, width_mm: float) ->
 
 def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
     """Where the lines of a bridge run: over what hangs of a layer's inside, and onto the anchors as far as the inside reaches."""
-    open_place = opening(span.place ^ inside, 0.5 * width_mm)
-    return open_place if open_place.is_empty() else offset(open_place, REACH * width_mm) ^ inside
+    wide = opening(span.hanging ^ inside, 0.5 * width_mm)
+    return wide if wide.is_empty() else offset(wide, REACH * width_mm) ^ inside
 
 
 def bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:
@@ -194,11 +194,11 @@ def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float)
     """
     if solid.is_empty() or sparse_below.is_empty():
         return Polygons()
-    place = solid ^ sparse_below
-    if place.area() < (NARROW * width_mm) ** 2:
+    spanned = solid ^ sparse_below
+    if spanned.area() < (NARROW * width_mm) ** 2:
         return Polygons()
-    open_place = opening(place, 0.5 * NARROW * width_mm)
-    return open_place if open_place.is_empty() else offset(open_place, REACH * width_mm) ^ solid
+    wide = opening(spanned, 0.5 * NARROW * width_mm)
+    return wide if wide.is_empty() else offset(wide, REACH * width_mm) ^ solid
 
 
 def infill_bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:

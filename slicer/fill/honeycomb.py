@@ -10,7 +10,7 @@ import numpy as np
 
 from slicer.fill.pattern import Box, LinePattern, Lines, PatternLayer, grid_numbers
 
-TURN_DEG = 60.0
+TURN_DEG = 60.0  # a third of the half turn after which lines are themselves again
 
 
 def honeycomb(layer: PatternLayer) -> LinePattern:

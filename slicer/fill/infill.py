@@ -14,7 +14,7 @@ from slicer.geometry.clip import border_of, merge_pieces
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.paths import Kind
 
-RANK = 3
+RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 SAMPLES = 6  # layers from which the plastic of anchors is judged
 MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border

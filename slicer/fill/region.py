@@ -90,14 +90,14 @@ def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process
     """
     width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
     footings = [
-        opening((place ^ section) - inside, 0.5 * BESIDE * width_mm) if not place.is_empty() else place
-        for place, section, inside in zip(sparse, cover.sections[1:], cover.insides[1:], strict=False)
+        opening((area ^ section) - inside, 0.5 * BESIDE * width_mm) if not area.is_empty() else area
+        for area, section, inside in zip(sparse, cover.sections[1:], cover.insides[1:], strict=False)
     ]
     left = list(sparse)
-    for i, place in enumerate(sparse):
+    for i, area in enumerate(sparse):
         begun = [footing for footing in footings[i : i + deep] if not footing.is_empty()]
-        if begun and not place.is_empty():
-            left[i] = _large(opening(place - offset(union(begun), ANCHOR * width_mm), width_mm), process)
+        if begun and not area.is_empty():
+            left[i] = _large(opening(area - offset(union(begun), ANCHOR * width_mm), width_mm), process)
     return left
 
 

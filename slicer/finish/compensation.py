@@ -28,7 +28,7 @@ def compensate(
     if process.outline_compensation_mm == 0.0 and process.hole_compensation_mm == 0.0:
         return list(outlines)
     beside = sections_of(later, part, cuts_mm) if later else [Polygons()] * len(outlines)
-    planes = [plane_in_frame_of(part, other.base.normal, other.base.offset_mm) for other in later]
+    planes = [plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in later]
     below = [[(-x, -y, distance - z * cut_mm) for x, y, z, distance in planes] for cut_mm in cuts_mm.tolist()]
     return [compensated(*layer, process=process) for layer in zip(outlines, beside, below, strict=True)]
 

@@ -15,7 +15,7 @@ from slicer.paths import Kind, bead_area_mm2
 from slicer.sections import Sections
 
 RANK = 100  # after all else of an island
-LEAST_MM2 = 2.0
+LEAST_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
 
 
 def ironed_areas(sections: Sections, regions: Sequence[Region]) -> list[Polygons]:

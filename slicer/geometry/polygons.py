@@ -17,7 +17,7 @@ Polygons: TypeAlias = CrossSection
 RESOLUTION_MM = 0.004  # finer detail no printer shows; keeps outer walls within 0.005 mm and the area of a layer within 0.05 mm2
 CLOSING_MM = 0.018  # so far plastic may reach over a section, 4 % of a usual line, where a slit of twice that is closed
 MITRE = 3.0  # times the distance: corners sharper than 39 degrees are cut off
-ARC_SEGMENTS = 32
+ARC_SEGMENTS = 32  # of a full turn: a corner of half a line, 0.2 mm, is round to a micrometre
 
 
 def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:

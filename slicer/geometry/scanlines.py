@@ -64,12 +64,12 @@ def join_lines(rows: Floats, fence: Floats, reach_mm: float) -> tuple[Floats, ND
             n += 2
             x, line = rows[at, side], int(rows[at, 3]) + 1
             best, best_side, nearest = -1, 0, reach_mm
-            for other in range(begin[line], begin[line + 1]):
-                if used[other]:
+            for row in range(begin[line], begin[line + 1]):
+                if used[row]:
                     continue
                 for end in range(2):
-                    distance = np.hypot(rows[other, end] - x, rows[other, 2] - y)
-                    if distance < nearest and not crosses_any(Segment(x, y, rows[other, end], rows[other, 2]), fence):
-                        best, best_side, nearest = other, 1 - end, distance
+                    distance = np.hypot(rows[row, end] - x, rows[row, 2] - y)
+                    if distance < nearest and not crosses_any(Segment(x, y, rows[row, end], rows[row, 2]), fence):
+                        best, best_side, nearest = row, 1 - end, distance
             at, side = best, best_side
     return points[:n], starts[:count]

@@ -33,11 +33,11 @@ def orientation(line: Segment, x: float, y: float) -> float:
 
 
 @part
-def crossing(segment: Segment, other: Segment) -> float:
+def crossing(segment: Segment, crossed: Segment) -> float:
     """Where (0..1) a segment crosses another one; -1 where it does not."""
-    if (orientation(segment, other.x0, other.y0) > 0.0) == (orientation(segment, other.x1, other.y1) > 0.0):
+    if (orientation(segment, crossed.x0, crossed.y0) > 0.0) == (orientation(segment, crossed.x1, crossed.y1) > 0.0):
         return -1.0
-    start, end = orientation(other, segment.x0, segment.y0), orientation(other, segment.x1, segment.y1)
+    start, end = orientation(crossed, segment.x0, segment.y0), orientation(crossed, segment.x1, segment.y1)
     if (start > 0.0) == (end > 0.0):
         return -1.0
     return float(start / (start - end))

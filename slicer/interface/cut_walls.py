@@ -51,10 +51,10 @@ def cut_walls(
     round_ = layer_walls(section, min(process.interface_walls, process.walls), process, height_mm, nozzle_mm)
     if process.interface_walls >= process.walls or round_.inside.is_empty():
         return CutWalls(round_, (), fewer.inside)
-    place = offset(round_.inside, REACH * width - 0.5 * spacing_mm(width, height_mm))
+    within = offset(round_.inside, REACH * width - 0.5 * spacing_mm(width, height_mm))
     loops, ending = [*round_.loops, *((),) * (process.interface_walls - len(round_.loops))], []
     for level in range(process.interface_walls, len(whole.loops)):
-        runs = [run for loop in whole.loops[level] for run in _within(loop, place) if length_mm(run) > width]
+        runs = [run for loop in whole.loops[level] for run in _within(loop, within) if length_mm(run) > width]
         loops.append(tuple(run[:-1] for run in runs if _is_closed(run)))
         ending += [Bead(Kind.INNER_WALL, run, width, wall_rank(level, process)) for run in runs if not _is_closed(run)]
     inside = round_.inside ^ whole.inside
@@ -70,9 +70,9 @@ def _is_closed(run: Floats) -> bool:
     return len(run) > 3 and bool((run[0] == run[-1]).all())
 
 
-def _within(loop: Floats, place: Polygons) -> list[Floats]:
-    """What of a loop (n, 2) lies in a place, as open or closed polylines."""
-    sides = edges(place)
+def _within(loop: Floats, area: Polygons) -> list[Floats]:
+    """What of a loop (n, 2) lies in an area, as open or closed polylines."""
+    sides = edges(area)
     if not len(sides):
         return []
     sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]), kind="stable")]

@@ -28,26 +28,26 @@ def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Pol
 
 def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Polygons]:
     """For every height in the part's frame the sections of other parts together."""
-    layers = [[clean(loops) for loops in cross_sections(_mesh_in_frame_of(part, other), cuts_mm)] for other in others]
+    layers = [[clean(loops) for loops in cross_sections(_mesh_in_frame_of(part, neighbour), cuts_mm)] for neighbour in others]
     return [union(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
 
 
 def touching(part: Part, others: Sequence[Part], reach_mm: float) -> list[Part]:
     """Those of other parts whose box, in the part's frame, comes as near to its own as that."""
     low, high = part.in_part_frame().bounds_mm
-    boxes = [_mesh_in_frame_of(part, other).bounds_mm for other in others]
+    boxes = [_mesh_in_frame_of(part, neighbour).bounds_mm for neighbour in others]
     near = [bool(np.all((box[0] < high + reach_mm) & (box[1] > low - reach_mm))) for box in boxes]
-    return [other for other, is_near in zip(others, near, strict=True) if is_near]
+    return [neighbour for neighbour, is_near in zip(others, near, strict=True) if is_near]
 
 
-def _mesh_in_frame_of(part: Part, other: Part) -> Mesh:
-    return other.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
+def _mesh_in_frame_of(part: Part, neighbour: Part) -> Mesh:
+    return neighbour.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
 
 
-def frame_change(part: Part, other: Part) -> tuple[Floats, Floats]:
+def frame_change(part: Part, to: Part) -> tuple[Floats, Floats]:
     """turn (3, 3) and shift (3,) that carry a point of a part's frame into the frame of another part: turn @ x + shift."""
-    turn = other.rotation @ part.rotation.T
-    return turn, turn[:, 2] * part.base.offset_mm - np.array([0.0, 0.0, other.base.offset_mm])
+    turn = to.rotation @ part.rotation.T
+    return turn, turn[:, 2] * part.base.offset_mm - np.array([0.0, 0.0, to.base.offset_mm])
 
 
 def plane_in_frame_of(part: Part, normal: Floats, offset_mm: float) -> Floats:
@@ -75,9 +75,9 @@ def interface_edges(sections: Sections) -> Floats:
     """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface."""
     part, below = sections.part, sections.plastic_below
     rims = [] if below is None else [np.insert(loop, 2, 0.0, axis=1) for loop in contours(sections.outlines[0] ^ below)]
-    for other in sections.later:
-        for loop in contours(clean(cross_sections(other.in_part_frame(), np.array([BELOW_MM]))[0])):
-            placed = np.insert(loop, 2, other.base.offset_mm, axis=1) @ other.rotation
+    for upper in sections.later:
+        for loop in contours(clean(cross_sections(upper.in_part_frame(), np.array([BELOW_MM]))[0])):
+            placed = np.insert(loop, 2, upper.base.offset_mm, axis=1) @ upper.rotation
             rims.append(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm]))
     segments = [np.hstack([rim, np.roll(rim, -1, axis=0)]) for rim in rims]
     return np.concatenate(segments) if segments else np.zeros((0, 6))

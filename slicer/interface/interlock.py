@@ -44,12 +44,12 @@ def cut_grooves(
 ) -> list[Polygons]:
     """The part's outlines without the grooves of the parts that will stand on it."""
     left = list(outlines)
-    for other in later if process.interlock_mm > 0.0 else ():
-        area = grooves(other, process)
+    for upper in later if process.interlock_mm > 0.0 else ():
+        area = grooves(upper, process)
         if area.is_empty():
             continue
         solid = m3.Manifold.extrude(area, 2.0 * process.interlock_mm).translate((0.0, 0.0, -process.interlock_mm))
-        loops = cross_sections(mesh_of(solid).transform(*frame_change(other, part)), cuts_mm)
+        loops = cross_sections(mesh_of(solid).transform(*frame_change(upper, part)), cuts_mm)
         left = [o - Polygons(cut) if cut else o for o, cut in zip(left, loops, strict=True)]
     return left
 

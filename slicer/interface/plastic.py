@@ -21,7 +21,7 @@ def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, fl
     """
     part, process, heights = sections.part, sections.process, sections.heights
     planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
-    planes |= {other.index: plane_in_frame_of(part, other.base.normal, other.base.offset_mm) for other in sections.later}
+    planes |= {upper.index: plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in sections.later}
     more = dict.fromkeys(planes, 0.0)
     for section, region, height_mm, z_mm in zip(sections.own, regions, heights.height_mm, heights.cut_mm, strict=True):
         if not planes or region.uncut.is_empty():
@@ -37,16 +37,16 @@ def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, fl
     return more
 
 
-def _nearest_areas(place: Polygons, distances: Sequence[Floats]) -> list[float]:
-    """mm2 of a place where each of several linear functions a x + b y + c of it is the least."""
+def _nearest_areas(whole: Polygons, distances: Sequence[Floats]) -> list[float]:
+    """mm2 of the whole where each of several linear functions a x + b y + c of it is the least."""
     if len(distances) == 1:
-        return [place.area()]
+        return [whole.area()]
     areas = []
     for k, mine in enumerate(distances):
-        nearer = place
-        for j, other in enumerate(distances):
+        nearer = whole
+        for j, distance in enumerate(distances):
             if j != k and not nearer.is_empty():
-                a, b, c = other - mine
+                a, b, c = distance - mine
                 nearer = half_plane(nearer, a, b, c)
         areas.append(nearer.area())
     return areas

@@ -49,7 +49,7 @@ def above_base_planes(part: Part, later: Sequence[Part], heights: Heights, gap_m
 
     While a part is printed the head moves above its base plane, so nothing may stand there, be it near that part or not.
     """
-    planes = [plane_in_frame_of(part, other.base.normal, other.base.offset_mm - gap_mm) for other in later]
+    planes = [plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm - gap_mm) for upper in later]
     return _above_planes(planes, heights, far_mm)
 
 

@@ -116,7 +116,11 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
 
 
 def _depths(branches: Sequence[Branch], borders: Floats) -> Floats:
-    """How deep the middles of branches lie inside an area with those edges."""
+    """How deep the middles of branches lie inside an area with those edges.
+
+    Of every edge, for there are but some 400 of them and 15 middles: a search tree made anew for every layer (shapely.STRtree)
+    takes 6 to 20 times as long, measured on tree, fan_support and deer.
+    """
     depths_mm: Floats = signed_distances(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
     return depths_mm
 

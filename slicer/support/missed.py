@@ -17,8 +17,8 @@ def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: 
     the part, nor has the part or the platform a layer's height below where support would end, nor is part of a mere ledge.
     """
     missed = []
-    for k, place in enumerate(wanted):
-        bare = place if place.is_empty() else _bare(k, place, printed, areas)
+    for k, hanging in enumerate(wanted):
+        bare = hanging if hanging.is_empty() else _bare(k, hanging, printed, areas)
         missed.append(bare if bare.is_empty() or not k else _without_near(k, bare, areas))
     return _drop_ledges(missed, printed, areas)
 
@@ -32,12 +32,12 @@ def _drop_ledges(missed: Sequence[Polygons], printed: Sequence[Polygons], areas:
             carrying = (outlines[k - 1] ^ bounding_box(bare, 2.0 * reach)) - above
             bare = bare - offset(carrying + _held(k, printed, areas), reach)
         beyond.append(bare)
-    large = [place for place in drop_small(beyond, process.support_least_mm2) if not place.is_empty()]
+    large = [area for area in drop_small(beyond, process.support_least_mm2) if not area.is_empty()]
     if not large:
         return [Polygons()] * len(missed)
     seen = offset(union(large), RIM_MM)
     wide = union([island for island in islands(above) if not (island ^ seen).is_empty()])
-    return [place if place.is_empty() else place ^ wide for place in missed]
+    return [area if area.is_empty() else area ^ wide for area in missed]
 
 
 def _held(k: int, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygons:
@@ -46,10 +46,10 @@ def _held(k: int, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygon
     return held if held.is_empty() else offset(held, 0.5 * areas.process.line_width_mm)
 
 
-def _bare(k: int, place: Polygons, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygons:
+def _bare(k: int, hanging: Polygons, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygons:
     """What of a hanging place lies over no support and does not span from there to the part."""
     held, distance_mm = _held(k, printed, areas), areas.process.support_distance_mm
-    bare = place - held
+    bare = hanging - held
     if k and not held.is_empty() and bare.area() >= LEAST_MM2:
         around = (held + areas.sections.outlines[k - 1]) ^ bounding_box(bare, 2.0 * distance_mm + 1.0)
         bare = bare - closing(around, 0.5 * distance_mm + RIM_MM)

@@ -21,7 +21,7 @@ from slicer.travel.islands import OUTSIDE
 
 ROOF_LAYERS = 3  # the first of them sags between the sparse lines, the last one is even
 DENSITY = 0.25  # of its inside: lines near enough for the roof to span, as a raft's base
-ABOVE_MM = 1e-3
+ABOVE_MM = 1e-3  # off the height itself, at which level faces lie
 
 
 def pedestal_layers(tip_mm: Floats, pedestal_mm: float) -> int:

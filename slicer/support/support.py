@@ -47,12 +47,12 @@ class Supports:
     @property
     def wanted_mm2(self) -> float:
         """Hanging area, seen from above, that needs support."""
-        return float(sum(place.area() for place in self.wanted))
+        return float(sum(hanging.area() for hanging in self.wanted))
 
     @property
     def unsupported_mm2(self) -> float:
         """Hanging area, seen from above, that none could reach."""
-        return float(sum(place.area() for place in self.missed))
+        return float(sum(hanging.area() for hanging in self.missed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
         return Supports(sections, nothing, nothing, nothing, nothing, nothing)
     unwanted = drop_small([overhang.unwanted for overhang in overhangs], process.support_least_mm2)
     wanted = drop_small(_drop_nearly_held(sections, overhangs), process.support_least_mm2)
-    count = max((k for k, place in enumerate(wanted) if not place.is_empty()), default=-1)
+    count = max((k for k, area in enumerate(wanted) if not area.is_empty()), default=-1)
     if count < 0:
         return Supports(sections, nothing, nothing, nothing, nothing, unwanted)
     blocked = blocked_areas(sections, sections.heights[:count], process.support_distance_mm, support_reach_mm(sections))
@@ -87,16 +87,16 @@ def _drop_nearly_held(sections: Sections, overhangs: Sequence[Overhang]) -> list
     """The hanging places without those that have plastic or the platform no farther below than support would be."""
     heights, outlines = sections.heights, sections.outlines
     free = []
-    for k, place in enumerate(overhang.hanging for overhang in overhangs):
-        if not place.is_empty():
+    for k, hanging in enumerate(overhang.hanging for overhang in overhangs):
+        if not hanging.is_empty():
             drop = float(heights.bottom_mm[k]) - sections.process.support_gap_mm
             near = list(outlines[int(np.searchsorted(heights.tip_mm, drop - EVEN_MM)) : max(k - 1, 0)])
             if k and drop <= EVEN_MM:
                 below = sections.plastic_below
-                place = Polygons() if below is None else place - union([*near, below])
+                hanging = Polygons() if below is None else hanging - union([*near, below])
             elif near:
-                place = place - union(near)
-        free.append(place)
+                hanging = hanging - union(near)
+        free.append(hanging)
     return free
 
 
@@ -109,22 +109,22 @@ def grow(wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: Reac
     grows: Columns | Tree = Tree(Growth.of(process, radius)) if process.support_style == "tree" else Columns(Polygons())
     bodies, contacts = [Polygons()] * count, [Polygons()] * count
     beginning: dict[int, list[tuple[Polygons, int]]] = {}
-    for k, place in enumerate(wanted):
+    for k, hanging in enumerate(wanted):
         layers = areas.carrying_layers(k)
-        if not place.is_empty() and len(layers):
-            beginning.setdefault(min(layers[0], count - 1), []).append((place, layers[-1]))
+        if not hanging.is_empty() and len(layers):
+            beginning.setdefault(min(layers[0], count - 1), []).append((hanging, layers[-1]))
     pending: list[tuple[Polygons, int]] = []
     for m in range(count - 1, -1, -1):
         pending += beginning.get(m, [])
         body = _body(grows.area, radius)
-        asked = [place for place, _ in pending] + ([begins[m]] if m in begins else [])
+        asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
             contact = _contact(union(asked), body, areas.reachable[m], radius)
             grows = grows.add_contact(contact, areas.reachable[m], float(areas.top_mm[m]))
             contacts[m] = _body(contact, radius)
             body = body + contacts[m]
-        left = [(place - body, last) for place, last in pending if last < m]
-        pending = [(place, last) for place, last in left if place.area() >= LEAST_MM2]
+        left = [(hanging - body, last) for hanging, last in pending if last < m]
+        pending = [(hanging, last) for hanging, last in left if hanging.area() >= LEAST_MM2]
         if not body.is_empty():
             bodies[m] = body
             grows = grows.lower(areas, m) if m else grows
@@ -136,9 +136,9 @@ def _body(area: Polygons, radius: float) -> Polygons:
     return area if area.is_empty() else dilate(area, radius).simplify(COARSE_MM)
 
 
-def _contact(place: Polygons, body: Polygons, reachable: Polygons, radius: float) -> Polygons:
+def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float) -> Polygons:
     """Reached places whose discs cover a hanging place as far as can be, beside the support already present."""
-    bare = drop_slivers(place - body)
+    bare = drop_slivers(hanging - body)
     if bare.area() < LEAST_MM2:
         return Polygons()
     bare = closing(bare, 3.0 * SMOOTH_MM).simplify(2.0 * SMOOTH_MM)
@@ -209,7 +209,7 @@ def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: Rea
             dense.append(area)
             continue
         over = [contact for contact in contacts[m : m + roofs] if not contact.is_empty()]
-        stands = [place for place in areas.placeable[max(m - floors + 1, 0) : m + 1] if not place.is_empty()]
-        near = union([*over, *(dilate(place, reach_mm) for place in stands)])
+        stands = [foot for foot in areas.placeable[max(m - floors + 1, 0) : m + 1] if not foot.is_empty()]
+        near = union([*over, *(dilate(foot, reach_mm) for foot in stands)])
         dense.append(opening(area ^ near, 0.45 * process.line_width_mm))
     return dense

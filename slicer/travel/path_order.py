@@ -14,10 +14,12 @@ from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 
 REACH = 200  # exchanges reach so far along the order, less far in an order of more than a thousand paths
+# Random lines of 1 to 8 mm on a plate of 100 mm, commit 5c72b83f: with up to 900 of them nothing is gained after 12 passes,
+# 4 leave the way 0.6 to 1 % longer for half the time, 1 leaves it 6 to 13 % longer; with 2,500 of them 4 leave it 0.3 % longer.
 PASSES, FEW_PASSES = 12, 4
-MANY = 1000
-GAIN_MM = 1e-6
-MOST_MOVED = 3
+MANY = 1000  # paths, from which on there are few passes
+GAIN_MM = 1e-6  # less is rounding, and an exchange back and forth would never end
+MOST_MOVED = 3  # as Or (1976); one leaves the same ways 0.3 to 0.8 % longer, four change them by -0.4 to +0.5 %
 
 Order = tuple[NDArray[np.int64], NDArray[np.bool_]]
 
@@ -69,9 +71,9 @@ def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y:
     order, flips = longs(len(starts), 0), flags(len(starts))
     for k in range(len(order)):
         order[k] = k
-    for place in range(len(order)):
-        best, flip, least = place, False, np.inf
-        for k in range(place, len(order)):
+    for step in range(len(order)):
+        best, flip, least = step, False, np.inf
+        for k in range(step, len(order)):
             i = order[k]
             distance = (starts[i, 0] - x) ** 2 + (starts[i, 1] - y) ** 2
             if distance < least or (distance == least and i < order[best]):
@@ -81,8 +83,8 @@ def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y:
                 if distance < least:
                     best, flip, least = k, True, distance
         i = order[best]
-        order[place], order[best] = i, order[place]
-        flips[place] = flip
+        order[step], order[best] = i, order[step]
+        flips[step] = flip
         x, y = (starts[i, 0], starts[i, 1]) if flip else (ends[i, 0], ends[i, 1])
     return order, flips
 

@@ -43,16 +43,16 @@ def order_lines(
         entries, exits = np.array([line[0] for line in begun]), np.array([line[-1] for line in begun])
         order, flips = order_paths(entries, exits, held, tip, goal)
         since = tip
-        for place, k in enumerate(order.tolist()):
+        for step, k in enumerate(order.tolist()):
             if freedom[k]:
-                after = order[place + 1] if place + 1 < len(order) else -1
-                to = begun[after][-1 if flips[place + 1] else 0] if after >= 0 else goal[0] if len(goal) else since
+                after = order[step + 1] if step + 1 < len(order) else -1
+                to = begun[after][-1 if flips[step + 1] else 0] if after >= 0 else goal[0] if len(goal) else since
                 at = _corner(lines[k], since, to, freedom[k] == CLOSED)
                 begun[k] = _begin_at(lines[k], at)
                 if freedom[k] == OPEN:
                     held[k], cut[k] = fixed[k] or at > 0, len(lines[k]) - at if at else 0
-                    flips[place] = False if at else _nearer_from_its_end(lines[k], since, to)
-            since = begun[k][0 if flips[place] else -1]
+                    flips[step] = False if at else _nearer_from_its_end(lines[k], since, to)
+            since = begun[k][0 if flips[step] else -1]
     return [
         Run(k, (begun[k][: cut[k]], begun[k][cut[k] :]) if cut[k] else (begun[k][::-1] if flip else begun[k],))
         for k, flip in zip(order.tolist(), flips.tolist(), strict=True)

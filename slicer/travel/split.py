@@ -22,22 +22,22 @@ SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
 
 
 def split(
-    placed: Sequence[Placed], place: Polygons, kinds: Sequence[Kind], shortest_mm: float, other: Callable[[Bead], Bead]
+    placed: Sequence[Placed], area: Polygons, kinds: Sequence[Kind], shortest_mm: float, change: Callable[[Bead], Bead]
 ) -> list[Placed]:
-    """The beads in the same order, those of some kinds in pieces; other() makes what lies within the place.
+    """The beads in the same order, those of some kinds in pieces; change() makes what lies within the area.
 
     The pieces of a bead follow each other without a travel, only the first one keeps its approach. No piece is shorter than
     shortest_mm.
     """
-    sides = edges(place)
+    sides = edges(area)
     sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]), kind="stable")]
     out: list[Placed] = []
     for bead in placed:
-        out += _split_bead(bead, sides, shortest_mm, other) if bead.bead.kind in kinds else [bead]
+        out += _split_bead(bead, sides, shortest_mm, change) if bead.bead.kind in kinds else [bead]
     return out
 
 
-def _split_bead(placed: Placed, sides: Floats, shortest_mm: float, other: Callable[[Bead], Bead]) -> list[Placed]:
+def _split_bead(placed: Placed, sides: Floats, shortest_mm: float, change: Callable[[Bead], Bead]) -> list[Placed]:
     points, within = cut_line(np.ascontiguousarray(placed.points), sides)
     if not within.any():
         return [placed]
@@ -49,7 +49,7 @@ def _split_bead(placed: Placed, sides: Floats, shortest_mm: float, other: Callab
     for a, b in pairwise(bounds):
         piece = points[a : b + 1] if len(bounds) > 2 else placed.points
         bead = replace(placed.bead, points=piece)
-        bead = other(bead) if within[a] else bead
+        bead = change(bead) if within[a] else bead
         pieces.append(
             replace(
                 placed, bead=bead, points=piece, retract=placed.retract and a == 0, approach=NOWHERE if a else placed.approach

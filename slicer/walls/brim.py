@@ -10,7 +10,7 @@ from slicer.geometry.polygons import Polygons, area_mm2, contours, edges, offset
 from slicer.paths import Kind
 from slicer.walls.seam import start_at_rear
 
-RANK = -2000
+RANK = -2000  # before all walls; the loops count down from it
 LEAST_MM2 = 1e-3  # areas smaller than this are rounding
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
 ADHESION_N_MM2 = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give

@@ -8,7 +8,7 @@ from slicer.paths import Kind
 from slicer.walls.variable.rule import SPLIT, Rule
 from slicer.walls.variable.variable import variable_walls
 
-RANK = 1
+RANK = 1  # behind walls, which have 0 and less
 LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
 MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie beside each other
 ROUNDS = 50  # beads round a place at most: as many as walls

@@ -32,8 +32,8 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
     """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
     least_mm = FEATURE * _least_mm(nozzle_mm, height_mm)
     pieces = [] if section.is_empty() else islands(section)
-    kept = [piece for piece in pieces if not _is_hair(piece, least_mm + HAIR_MM)]
-    return section if len(kept) == len(pieces) else Polygons.compose(kept) if kept else Polygons()
+    solid = [piece for piece in pieces if not _is_hair(piece, least_mm + HAIR_MM)]
+    return section if len(solid) == len(pieces) else Polygons.compose(solid) if solid else Polygons()
 
 
 def _is_hair(piece: Polygons, least_mm: float) -> bool:

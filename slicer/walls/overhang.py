@@ -17,18 +17,18 @@ SHORTEST = 2.0  # line widths: no stretch is split off for less, the speed would
 NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 
-def split_overhangs(placed: Sequence[Placed], section: Polygons, bank: Polygons | None, process: Process) -> list[Placed]:
+def split_overhangs(placed: Sequence[Placed], section: Polygons, below: Polygons | None, process: Process) -> list[Placed]:
     """The beads of a layer with its walls and gap lines split where less and less of their width lies on plastic.
 
-    bank: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside the bank has the
+    below: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the
     share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share.
     """
     out = list(placed)
-    if bank is None or process.overhang_share <= 0.0:
+    if below is None or process.overhang_share <= 0.0:
         return out
     shortest_mm = SHORTEST * process.line_width_mm
     for share in sorted({*STEPS, process.overhang_share}, reverse=True):
-        hanging = hanging_place(section, bank, share, process.line_width_mm)
+        hanging = hanging_area(section, below, share, process.line_width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:
             break
         kinds = SPLIT if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
@@ -36,9 +36,9 @@ def split_overhangs(placed: Sequence[Placed], section: Polygons, bank: Polygons 
     return out
 
 
-def hanging_place(section: Polygons, bank: Polygons, share: float, width_mm: float) -> Polygons:
-    """Where the centreline of a bead has less than a share of its width on the bank."""
-    return section - offset(bank, (0.5 - share) * width_mm + NOISE_MM)
+def hanging_area(section: Polygons, below: Polygons, share: float, width_mm: float) -> Polygons:
+    """Where the centreline of a bead has less than a share of its width on what is below."""
+    return section - offset(below, (0.5 - share) * width_mm + NOISE_MM)
 
 
 def _hanging(bead: Bead, share: float, process: Process) -> Bead:
@@ -46,19 +46,21 @@ def _hanging(bead: Bead, share: float, process: Process) -> Bead:
     return replace(bead, kind=kind, overhang=sum(step >= share for step in STEPS))
 
 
-def strengthen_overhangs(processes: Sequence[Process], sections: Sequence[Polygons], beneath: Polygons | None) -> list[Process]:
+def strengthen_overhangs(
+    processes: Sequence[Process], sections: Sequence[Polygons], first_below: Polygons | None
+) -> list[Process]:
     """The process of every layer, with overhang_extra_walls more walls where any of them overhangs.
 
-    beneath: plastic under the first layer; None: the platform.
+    first_below: plastic under the first layer; None: the platform.
     """
     if all(process.overhang_extra_walls == 0 for process in processes):
         return list(processes)
-    banks = [beneath, *sections[:-1]]
-    return [_strengthened(*row) for row in zip(processes, sections, banks, strict=True)]
+    lower = [first_below, *sections[:-1]]
+    return [_strengthened(*row) for row in zip(processes, sections, lower, strict=True)]
 
 
-def _strengthened(process: Process, section: Polygons, bank: Polygons | None) -> Process:
+def _strengthened(process: Process, section: Polygons, below: Polygons | None) -> Process:
     width = process.line_width_mm
-    if bank is None or not process.walls or hanging_place(section, bank, process.overhang_share, width).area() < width**2:
+    if below is None or not process.walls or hanging_area(section, below, process.overhang_share, width).area() < width**2:
         return process
     return process.model_copy(update={"walls": process.walls + process.overhang_extra_walls})

@@ -26,10 +26,10 @@ SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, 
 SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
 ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
 NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
-NO_CORNER = (0.0, 0.0)
+NO_CORNER = (0.0, 0.0)  # no corner is worth a way
 SAMPLE_MM = 2.0  # straight sides are tried at this distance when their ends are too near an interface
-GOLDEN = 0.6180339887498949
-FORBIDDEN = 1e6
+GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
+FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
 NO_EDGES = np.zeros((0, 6))
 
 

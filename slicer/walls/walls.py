@@ -15,7 +15,7 @@ from slicer.walls.variable.variable import Wall
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner
 LEAST_REST = 0.12  # of the line width: narrower places without a core behind them are corners, which walls run into
-LEAST_REST_MM2 = 1e-3
+LEAST_REST_MM2 = 1e-3  # smaller areas are rounding
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
 
 

@@ -127,9 +127,9 @@ class Browser:
         for kind, (x, y) in (("mousePressed", start), *(("mouseMoved", way) for way in ways)):
             self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
-    def release(self, place: tuple[float, float]) -> None:
+    def release(self, point: tuple[float, float]) -> None:
         """The left button let go."""
-        self._send("Input.dispatchMouseEvent", type="mouseReleased", x=place[0], y=place[1], button="left", clickCount=1)
+        self._send("Input.dispatchMouseEvent", type="mouseReleased", x=point[0], y=point[1], button="left", clickCount=1)
 
     def touch(self, *moments: tuple[tuple[float, float], ...]) -> None:
         """Fingers put down at the places of the first moment, moved to those of the others, and lifted."""

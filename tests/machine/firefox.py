@@ -49,13 +49,13 @@ class Firefox:
         self._display, shown = _display()
         self._left = ExitStack()
         flags = ["--remote-debugging-port", "0", "--no-remote", *([] if shown else ["--headless"])]
-        with Path(self._folder.name, "told").open("wb") as told:
+        with Path(self._folder.name, "told").open("wb") as log:
             self._process = subprocess.Popen(
                 [str(FIREFOX), *flags, "--profile", self._folder.name, "about:blank"],
                 env={**os.environ, **shown},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                stderr=told,
+                stderr=log,
             )
         try:
             self._line = self._left.enter_context(connect(self._address() + "/session", max_size=None, proxy=None))
@@ -122,12 +122,12 @@ class Firefox:
         return picture
 
     def _address(self) -> str:
-        told, end_s = Path(self._folder.name, "told"), time.monotonic() + PATIENCE_S
-        while not (found := re.search(r"WebDriver BiDi listening on (ws://\S+)", told.read_text(errors="replace"))):
+        log, end_s = Path(self._folder.name, "told"), time.monotonic() + PATIENCE_S
+        while not (address := re.search(r"WebDriver BiDi listening on (ws://\S+)", log.read_text(errors="replace"))):
             if time.monotonic() > end_s or self._process.poll() is not None:
-                raise RuntimeError(f"Firefox does not begin: {told.read_text(errors='replace')[-800:]}")
+                raise RuntimeError(f"Firefox does not begin: {log.read_text(errors='replace')[-800:]}")
             time.sleep(0.02)
-        return found[1]
+        return address[1]
 
     def _begin(self, size: tuple[int, int]) -> None:
         self._send("session.new", capabilities={})
@@ -181,8 +181,8 @@ def _plain(value: dict[str, Any]) -> Any:
     """A value as BiDi sends it, plain."""
     match value["type"]:
         case "array":
-            return [_plain(each) for each in value["value"]]
+            return [_plain(entry) for entry in value["value"]]
         case "object":
-            return {key: _plain(each) for key, each in value["value"]}
+            return {key: _plain(entry) for key, entry in value["value"]}
         case _:
             return value.get("value")

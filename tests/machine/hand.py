@@ -42,15 +42,15 @@ def squares(piece: Part, profile: Profile, layers: int = 3) -> SlicedPart:
     """Two squares a layer along the part's bounding box: the outer one reached with a retraction, the inner one without."""
     process = profile.process
     lo, hi = piece.in_part_frame().bounds_mm
-    made = []
+    layers_made = []
     for k in range(layers):
         paths = []
         for kind, inset in ((Kind.OUTER_WALL, 0.5), (Kind.INNER_WALL, 1.5)):
             x0, y0, x1, y1 = lo[0] + inset * 0.45, lo[1] + inset * 0.45, hi[0] - inset * 0.45, hi[1] - inset * 0.45
             ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
             paths.append(Path(kind, ring, process.line_width_mm, 40.0, 1.0, NO_APPROACH, kind is Kind.OUTER_WALL))
-        made.append(Layer((k + 1) * 0.2, 0.2, tuple(paths), 0.0 if k == 0 else 1.0))
-    return SlicedPart(piece.index, tuple(made))
+        layers_made.append(Layer((k + 1) * 0.2, 0.2, tuple(paths), 0.0 if k == 0 else 1.0))
+    return SlicedPart(piece.index, tuple(layers_made))
 
 
 @cache

@@ -27,17 +27,17 @@ def unpacked(block: bytes) -> tuple[dict[str, Any], Arrays]:
     (length,) = struct.unpack("<I", raw[8:12])
     assert (12 + length) % 8 == 0
     header = json.loads(raw[12 : 12 + length])
-    return header, {name: _array(raw[12 + length :], told) for name, told in header["arrays"].items()}
+    return header, {name: _array(raw[12 + length :], form) for name, form in header["arrays"].items()}
 
 
-def text_of(header: dict[str, Any], found: Arrays) -> list[str]:
+def text_of(header: dict[str, Any], arrays: Arrays) -> list[str]:
     """The lines of the G-code."""
-    told, rows, end = header["text"], found["line"], np.rint(found["end"] * 1000).astype(int)
-    pushed = np.rint(found["filament"] * 1e5).astype(int)
+    packed_text, rows, end = header["text"], arrays["line"], np.rint(arrays["end"] * 1000).astype(int)
+    pushed = np.rint(arrays["filament"] * 1e5).astype(int)
 
     def line(number: int, pattern: str) -> str:
         last, before = int((rows <= number).sum()) - 1, int((rows < number).sum()) - 1
-        zero = ([0] + [zero for begin, zero in told["zeros"] if begin <= number])[-1]
+        zero = ([0] + [zero for begin, zero in packed_text["zeros"] if begin <= number])[-1]
 
         def number_of(match: re.Match[str]) -> str:
             letter, hole = match[1], ord(match[2])
@@ -51,25 +51,25 @@ def text_of(header: dict[str, Any], found: Arrays) -> list[str]:
 
         return re.sub("([A-Z])([\x01-\x06])", number_of, pattern)
 
-    return [line(k + 1, told["patterns"][int(place)]) for k, place in enumerate(found["text"])]
+    return [line(k + 1, packed_text["patterns"][int(pattern_index)]) for k, pattern_index in enumerate(arrays["text"])]
 
 
-def _array(raw: bytes, told: dict[str, Any]) -> NDArray[Any]:
-    assert told["offset"] % 8 == 0
-    rows, *rest = told["shape"]
+def _array(raw: bytes, form: dict[str, Any]) -> NDArray[Any]:
+    assert form["offset"] % 8 == 0
+    rows, *rest = form["shape"]
     columns = rest[0] if rest else 1
-    if told["coding"] == "plain":
-        kind = {"u8": "<u1", "u16": "<u2", "i32": "<i4", "f32": "<f4"}[told["type"]]
-        values = np.frombuffer(raw, kind, rows * columns, told["offset"]).reshape(rows, columns).astype(float)
+    if form["coding"] == "plain":
+        kind = {"u8": "<u1", "u16": "<u2", "i32": "<i4", "f32": "<f4"}[form["type"]]
+        values = np.frombuffer(raw, kind, rows * columns, form["offset"]).reshape(rows, columns).astype(float)
     else:
         values = np.zeros((rows, columns))
         for column in range(columns):
-            start = told["offset"] + 4 * rows * column
+            start = form["offset"] + 4 * rows * column
             planes = [np.frombuffer(raw, "u1", rows, start + k * rows).astype(np.uint64) for k in range(4)]
             word = planes[0] | planes[1] << np.uint64(8) | planes[2] << np.uint64(16) | planes[3] << np.uint64(24)
             step = np.where(word & np.uint64(1), -(word // 2).astype(np.int64) - 1, (word // 2).astype(np.int64))
             values[:, column] = np.cumsum(step)
-    return (values if rest else values[:, 0]) * told["scale"]
+    return (values if rest else values[:, 0]) * form["scale"]
 
 
 def turned_back(axis: dict[str, Any], value_deg: float, point: NDArray[np.float64]) -> NDArray[np.float64]:

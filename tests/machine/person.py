@@ -34,10 +34,10 @@ class Person:
     def see(self, text: str) -> None:
         """Wait until something is shown, after what was seen before."""
         end_s = time.monotonic() + PATIENCE_S
-        while (place := self.seen.find(text, self._looked)) < 0:
+        while (begin := self.seen.find(text, self._looked)) < 0:
             if not self._read() or time.monotonic() > end_s:
                 raise AssertionError(f"{text!r} was never seen, only {self.seen[-2000:]!r}")
-        self._looked = place + len(text)
+        self._looked = begin + len(text)
 
     def press(self, keys: str) -> None:
         """Press keys."""

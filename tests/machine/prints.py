@@ -56,11 +56,11 @@ class PrintPage:
         self.do(command, print=self.print["number"], **given)
 
     def hear(self, end_s: float) -> None:
-        told = json.loads(self._socket.recv(max(0.0, end_s - time.monotonic())))
-        if "problem" in told:
-            self.problem = told["problem"]
+        message = json.loads(self._socket.recv(max(0.0, end_s - time.monotonic())))
+        if "problem" in message:
+            self.problem = message["problem"]
         else:
-            self.state = told
+            self.state = message
 
     def until(self, condition: Any) -> dict[str, Any]:
         """The first state of the newest print that fulfils a condition."""

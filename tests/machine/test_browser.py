@@ -139,8 +139,8 @@ def test_readouts_are_the_numbers_of_the_dry_run(page: Browser) -> None:
     for k in (0, 7, 23, 44, 61, 75, len(read.line) - 1):
         put(page, "position", k)
         places = [f"{value:.3f}" for value in [*(read.end[k] + 0.0), read.filament_mm[k]]]
-        told = [str(read.line[k]), *places, *(str(number or "–") for number in (read.part[k], read.layer[k]))]
-        assert [text(page, f"readout-{name}") for name in names] == told
+        expected = [str(read.line[k]), *places, *(str(number or "–") for number in (read.part[k], read.layer[k]))]
+        assert [text(page, f"readout-{name}") for name in names] == expected
 
 
 def test_a_row_that_extrudes_tells_its_type_its_bead_and_its_speed(page: Browser) -> None:
@@ -297,14 +297,14 @@ def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
 
 def test_findings_that_lie_together_share_a_marker_that_goes_through_them(browser: Browser, tmp_path: Path) -> None:
     profile, printed = program()
-    found = printed.run.findings[0]
-    crowd = tuple(replace(found, message=f"complaint {k}") for k in range(400))
+    finding = printed.run.findings[0]
+    crowd = tuple(replace(finding, message=f"complaint {k}") for k in range(400))
     page = opened(browser, tmp_path, print_page("crowd", replace(printed, run=replace(printed.run, findings=crowd)), profile))
     page.value(PICTURE)
     assert page.value("[...document.querySelectorAll('#markers button')].map((e) => e.textContent)") == ["99+"]
-    for told in ("complaint 0", "complaint 1"):
+    for message in ("complaint 0", "complaint 1"):
         page.click("#markers button")
-        assert told in page.value("document.querySelector('#findings .chosen').textContent")
+        assert message in page.value("document.querySelector('#findings .chosen').textContent")
 
 
 def test_a_long_print_is_drawn_coarsely_at_once_and_then_every_move(browser: Browser, tmp_path: Path) -> None:

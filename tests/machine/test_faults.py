@@ -50,7 +50,7 @@ def _post(profile: Profile, low_mm: float = 26.0) -> Decomposition:
 
 
 @cache
-def _made(name: str) -> tuple[Profile, Decomposition, tuple[SlicedPart, ...], MachineProgram]:
+def _planned(name: str) -> tuple[Profile, Decomposition, tuple[SlicedPart, ...], MachineProgram]:
     profile = load(machine=name, settings=LIGHT)
     decomposition = _post(profile)
     sliced = _sliced(decomposition, profile)
@@ -64,12 +64,12 @@ def _sliced(decomposition: Decomposition, profile: Profile) -> tuple[SlicedPart,
 
 @cache
 def _text(name: str) -> tuple[str, ...]:
-    profile, _, _, program = _made(name)
+    profile, _, _, program = _planned(name)
     return tuple(write_gcode(program, profile))
 
 
 def _errors(lines: list[str], name: str) -> list[str]:
-    return [f.code for f in dry_run(lines, _made(name)[0]).findings if f.severity == "error"]
+    return [f.code for f in dry_run(lines, _planned(name)[0]).findings if f.severity == "error"]
 
 
 @EVERY
@@ -79,7 +79,7 @@ def test_without_a_fault_there_is_no_error(machine: str) -> None:
 
 @EVERY
 def test_an_axis_over_its_limit_is_found(machine: str) -> None:
-    lines, most = list(_text(machine)), _made(machine)[0].machine.x.limits_mm[1]
+    lines, most = list(_text(machine)), _planned(machine)[0].machine.x.limits_mm[1]
     k = next(k for k, line in enumerate(lines) if re.match(r"G[01] X", line))
     lines[k] = re.sub(r"X-?[0-9.]+", f"X{most + 5:.3f}", lines[k])
     assert "axis-limit" in _errors(lines, machine)
@@ -87,7 +87,7 @@ def test_an_axis_over_its_limit_is_found(machine: str) -> None:
 
 @EVERY
 def test_a_plane_cut_too_low_for_the_head_is_found(machine: str) -> None:
-    profile = _made(machine)[0]
+    profile = _planned(machine)[0]
     bare = profile.model_copy(update={"machine": _bare(profile.machine)})
     low = _post(bare, 3.0)
     program = plan(low, _sliced(low, bare), bare)
@@ -102,7 +102,7 @@ def _bare(machine: Machine) -> Machine:
 
 @EVERY
 def test_swapped_parts_are_found(machine: str) -> None:
-    profile, decomposition, sliced, _ = _made(machine)
+    profile, decomposition, sliced, _ = _planned(machine)
     codes = _errors(list(write_gcode(plan(decomposition, sliced[::-1], profile), profile)), machine)
     assert {"order", "air"} <= set(codes)
 
@@ -120,11 +120,11 @@ def test_a_lost_retraction_is_found(machine: str) -> None:
 
 @EVERY
 def test_a_shifted_centre_is_found(machine: str) -> None:
-    profile, decomposition, sliced, _ = _made(machine)
+    profile, decomposition, sliced, _ = _planned(machine)
     x, y, z = profile.machine.tilt.point_mm
     tilt = profile.machine.tilt.model_copy(update={"point_mm": (x + 2.0, y + 2.0, z + 2.0)})
-    other = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": tilt})})
-    assert "centre" in _errors(list(write_gcode(plan(decomposition, sliced, other), other)), machine)
+    changed = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": tilt})})
+    assert "centre" in _errors(list(write_gcode(plan(decomposition, sliced, changed), changed)), machine)
 
 
 @EVERY
@@ -137,19 +137,19 @@ def test_a_deleted_heater_off_is_found(machine: str) -> None:
 
 @EVERY
 def test_a_flipped_sign_of_the_tilt_is_found(machine: str) -> None:
-    profile, decomposition, sliced, _ = _made(machine)
+    profile, decomposition, sliced, _ = _planned(machine)
     tilt = profile.machine.tilt.model_copy(update={"sign": -profile.machine.tilt.sign, "limits_deg": (-360.0, 360.0)})
-    other = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": tilt})})
+    changed = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": tilt})})
     program = MachineProgram("flipped", plan(decomposition, sliced, profile).moves)
-    codes = _errors(list(write_gcode(program, other)), machine)
+    codes = _errors(list(write_gcode(program, changed)), machine)
     assert "sign" in codes
 
 
 @EVERY
 def test_a_tilt_word_of_the_other_sign_is_found(machine: str) -> None:
-    lines, letter = list(_text(machine)), _made(machine)[0].machine.tilt.letter
-    pose = [m for m in _made(machine)[3].moves if isinstance(m, BeginPart)][1].pose
-    assert pose != level(_made(machine)[0].machine)
+    lines, letter = list(_text(machine)), _planned(machine)[0].machine.tilt.letter
+    pose = [m for m in _planned(machine)[3].moves if isinstance(m, BeginPart)][1].pose
+    assert pose != level(_planned(machine)[0].machine)
     word = f"{pose.tilt_deg:.4f}"
     flipped = [
         line if line.startswith(";") else line.replace(f"{letter}{word}", f"{letter}{-pose.tilt_deg:.4f}") for line in lines

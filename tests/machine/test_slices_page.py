@@ -171,8 +171,8 @@ def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(b
 
 def slice_with_errors(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "box.stl", stl(box(20, 20, 2)))
-    with bench.line() as other:
-        other.do("set", key="machine.gcode.start", value=f"{load().machine.gcode.start}\nM104 S120 ; not hot any more")
+    with bench.line() as page:
+        page.do("set", key="machine.gcode.start", value=f"{load().machine.gcode.start}\nM104 S120 ; not hot any more")
     browser.wait("document.querySelector('[data-key=\"machine.gcode.start\"].changed')")
     slice_it(browser)
 
@@ -184,8 +184,8 @@ def test_a_finding_leads_to_its_place_and_errors_are_saved_only_on_demand(browse
     where = (
         "[document.querySelector('#findings .chosen b').textContent, Number(document.getElementById('readout-line').textContent)]"
     )
-    told, line = browser.value(in_frame(browser, where))
-    assert told == "error: cold-extrusion"
+    chosen, line = browser.value(in_frame(browser, where))
+    assert chosen == "error: cold-extrusion"
     assert f"line {line}" in browser.value("document.querySelector('#sliced-findings .error small').textContent")
     browser.click("#leave-print")
     browser.click("#save")
@@ -207,9 +207,9 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
     browser.click("#port-other")
     browser.click("#check")
     browser.wait("!$('print-problem').hidden && !$('force-line').hidden")
-    told = browser.value("$('print-problem').textContent")
-    assert told.startswith("the dry run found 2 errors, the first: ")
-    assert told.endswith("(simulate lists all, --force goes on)")
+    problem = browser.value("$('print-problem').textContent")
+    assert problem.startswith("the dry run found 2 errors, the first: ")
+    assert problem.endswith("(simulate lists all, --force goes on)")
     assert browser.value("$('run').hidden")  # nobody has been asked who is there
     browser.click("#undo")
     browser.wait("$('check').disabled && $('force-line').hidden && $('print-problem').hidden")

@@ -187,16 +187,16 @@ def test_firefox_saves_what_the_workbench_has_byte_by_byte(
 
 
 def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(firefox: Firefox, bench: Running) -> None:
-    with prints_line(bench, "other") as other:
+    with prints_line(bench, "other") as second_page:
         firefox.click("#tab-printing")
         put(firefox, "$('sim-speed')", 10)
         firefox.click("#check")
         firefox.wait("!$('run-ask').hidden")
         firefox.click("#begin")
-        other.until(lambda one: one["progress"])
-        other.command("pause")
-        assert other.refused() == "another page commands this print: take the command over first"
-        other.command("take")
+        second_page.until(lambda state: state["progress"])
+        second_page.command("pause")
+        assert second_page.refused() == "another page commands this print: take the command over first"
+        second_page.command("take")
         firefox.wait("!$('held').hidden && $('run-commands').hidden")
         assert "Another page commands this print; this one watches." in firefox.value("$('held-told').textContent")
         firefox.click("#take")

@@ -38,7 +38,7 @@ def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser
     open_model(browser, bench, "dragged.stl", stl(tee()))
     browser.wait("!$('rings').hasAttribute('hidden')")
     standing = area(browser)
-    start, end = (tuple(place) for place in browser.value(RING_Y))
+    start, end = (tuple(point) for point in browser.value(RING_Y))
     browser.hold(start, end)
     live, angle = area(browser), told_by(browser, "y")
     browser.release(end)

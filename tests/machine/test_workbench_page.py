@@ -91,13 +91,13 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     assert browser.value("$('legend').textContent") != ""
     drag_slider(browser, "front", 0, "input")
     assert browser.value("$('front-told').querySelector('dd').textContent") == "1"
-    with bench.line() as other:  # whose news moves neither the slider nor the picture under the hand
-        other.do("set", key="process.infill_density", value="1")
-        other.until(lambda state: not state["priced"])
-        told = other.until(lambda state: state["priced"])
-        browser.wait(f"Number(document.documentElement.dataset.version) >= {told['version']}")
+    with bench.line() as second_page:  # whose news moves neither the slider nor the picture under the hand
+        second_page.do("set", key="process.infill_density", value="1")
+        second_page.until(lambda state: not state["priced"])
+        priced = second_page.until(lambda state: state["priced"])
+        browser.wait(f"Number(document.documentElement.dataset.version) >= {priced['version']}")
     assert browser.value("$('front').value") == "0"
-    metres = f"{told['front'][0]['filament_mm'] / 1000:.1f} m"
+    metres = f"{priced['front'][0]['filament_mm'] / 1000:.1f} m"
     assert browser.value("$('front-told').textContent").endswith(f"plastic{metres}")
     assert browser.value("$('legend').querySelectorAll('span.swatch').length") == 1
     sent = "function (text) { sending.call(this, text.replace('\"parts\":1', '\"parts\":99')); }"
@@ -198,8 +198,8 @@ def test_a_broken_model_is_told_and_the_one_before_it_stays(browser: Browser, be
     open_model(browser, bench, "tee.stl", stl(tee()))
     choose(browser, "<img onerror=alert(1)>.stl", stl(tee())[:400])
     browser.wait("!$('problem').hidden")
-    told = "is cut short: it holds 6 of the 28 facets that its header announces"
-    assert browser.value("$('problem').textContent") == f"<img onerror=alert(1)>.stl: {told}"
+    problem = "is cut short: it holds 6 of the 28 facets that its header announces"
+    assert browser.value("$('problem').textContent") == f"<img onerror=alert(1)>.stl: {problem}"
     assert browser.value("$('title').textContent") == "tee.stl"
 
 

@@ -58,9 +58,10 @@ def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(b
         page.do("move", part=2, **LEVEL, offset_mm=5.0)
         page.until(lambda state: state["undo"] == "move a plane")
         page.do("neck", part=2)
-        told = page.until(lambda state: state["problem"])["problem"]
+        problem = page.until(lambda state: state["problem"])["problem"]
         assert (
-            told == "there is no neck near the plane of part 2: within 10 mm and 25 degrees no rim is shorter than all around it"
+            problem
+            == "there is no neck near the plane of part 2: within 10 mm and 25 degrees no rim is shorter than all around it"
         )
 
 
@@ -79,8 +80,8 @@ def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_aw
         assert [cut["offset_mm"] for cut in state["cuts"]] == [20.0]
         page.do("lock", part=2, locked=True)
         page.do("mark", kind="keep", min_mm=[-2, -2, 19], max_mm=[2, 2, 21])
-        told = page.until(lambda state: "locked" in state["problem"])["problem"]
-        assert told.startswith("the plane of part 2 is locked and would be in the way: its plane would pass through zone 2")
+        problem = page.until(lambda state: "locked" in state["problem"])["problem"]
+        assert problem.startswith("the plane of part 2 is locked and would be in the way: its plane would pass through zone 2")
         Path("plan.toml").write_bytes(bench.ask("plan.toml")[1])
         plan = Path("plan.toml").read_text()
         assert all(
@@ -123,8 +124,10 @@ def test_an_order_that_cannot_be_is_refused_with_what_comes_in_the_way(bench: Ru
         opened(page, bench, "tee.stl")
         added(page, 20.0, 35.0)
         page.do("reorder", part=2, to=3)
-        told = page.until(lambda state: state["problem"])["problem"]
-        assert told.startswith("part 2 cannot be printed as number 3, for then part 2 cannot be cut off: nothing is left above")
+        problem = page.until(lambda state: state["problem"])["problem"]
+        assert problem.startswith(
+            "part 2 cannot be printed as number 3, for then part 2 cannot be cut off: nothing is left above"
+        )
         assert [cut["offset_mm"] for cut in page.state["cuts"]] == [20.0, 35.0]
 
 
@@ -167,7 +170,7 @@ def test_a_model_on_a_pedestal_is_drawn_on_it_and_has_the_figures_of_the_search(
         assert page.until(lambda state: state["pedestal"])["overhang_mm2"] == pytest.approx(300.0)
         added(page, 50.0)
         trial = page.until(lambda state: state["trial"] and state["trial"]["cuts"])["trial"]
-        given = [each.removeprefix("--set=") for each in QUICK if each != "--set"]
+        given = [setting.removeprefix("--set=") for setting in QUICK if setting != "--set"]
         plan = PlanFile("", parts=(PlannedPart((0.0, 0.0, 1.0), 50.0),))
         row = cut_by_plan(tee(), "tee", load(settings=[*given, "search.pedestal_mm=12"]), plan).chosen
         assert row is not None

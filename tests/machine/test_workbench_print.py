@@ -28,9 +28,9 @@ PRINTING, VIEW = "document.documentElement.dataset.printing", "$('print-page').c
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("box")
-    (made / "box.stl").write_bytes(stl(box(12.0, 12.0, 8.0)))
-    return made
+    parent = tmp_path_factory.mktemp("box")
+    (parent / "box.stl").write_bytes(stl(box(12.0, 12.0, 8.0)))
+    return parent
 
 
 @pytest.fixture(scope="module")
@@ -102,18 +102,18 @@ def test_fifty_pages_that_read_nothing_leave_the_print_what_the_command_line_sen
         for _ in range(50):
             stack.enter_context(listen_to_nothing(sliced))
         page.do("check", port="sim")
-        page.until(lambda one: one["phase"] == "ready")
+        page.until(lambda seen: seen["phase"] == "ready")
         page.command("begin")
-        done = page.until(lambda one: one["phase"] == "over")
+        done = page.until(lambda seen: seen["phase"] == "over")
         page.command("forget")
-        page.until(lambda one: not one["phase"])
+        page.until(lambda seen: not seen["phase"])
     assert done["sentence"] == "the print is done"
     assert commands_sent(Path(done["log"])) == commands_sent(folder / "own.log")
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_machine(sliced: Running) -> None:
-    with Browser((1000, 700)) as browser, prints_line(sliced, "other") as other:
+    with Browser((1000, 700)) as browser, prints_line(sliced, "other") as second_page:
         browser.open(sliced.address)
         browser.click("#tab-printing")
         browser.wait("document.documentElement.dataset.line === 'open' && $('unsliced').hidden")
@@ -121,36 +121,36 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.click("#check")
         browser.wait("!$('run-ask').hidden")
         assert "no error" in browser.value("$('run-checks').textContent")
-        other.do("check", port="sim")
-        assert other.refused() == "port sim prints already: wait until that is done, or cancel it"
-        other.until(lambda one: one["phase"] == "ready")
-        other.command("begin")
-        assert other.refused() == "another page commands this print: take the command over first"
+        second_page.do("check", port="sim")
+        assert second_page.refused() == "port sim prints already: wait until that is done, or cancel it"
+        second_page.until(lambda seen: seen["phase"] == "ready")
+        second_page.command("begin")
+        assert second_page.refused() == "another page commands this print: take the command over first"
 
         browser.click("#begin")
         browser.wait(f"{PRINTING} === 'printing' && $('run-told').textContent.includes('layer')")
         browser.value("{ $('feed').value = 20; $('feed').dispatchEvent(new Event('change')); }")
-        assert other.until(lambda one: one["progress"].get("feed_percent") == 20.0)["holder"] != "other"
+        assert second_page.until(lambda seen: seen["progress"].get("feed_percent") == 20.0)["holder"] != "other"
         browser.click("#pause")
         browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
         browser.click("#pause")
         browser.wait(f"{PRINTING} === 'printing'")
 
-        other.command("take")
+        second_page.command("take")
         browser.wait("!$('held').hidden && $('run-commands').hidden")
         assert "Another page has taken over" in browser.value("$('notice').textContent")
         browser.open(sliced.address)  # the page that has begun it is gone, the print is not
         browser.wait(f"{PRINTING} === 'printing' && !$('print-bar').hidden")
         assert json.loads(browser.value("JSON.stringify([$('run-commands').hidden, $('held').hidden])")) == [True, False]
         browser.click("#tab-printing")
-        other.command("pause")  # so that it is not done before it is stopped, however slow this computer
+        second_page.command("pause")  # so that it is not done before it is stopped, however slow this computer
         browser.wait(f"{PRINTING} === 'paused'")
-        other.do("check", port="/dev/none")
+        second_page.do("check", port="/dev/none")
         browser.wait("$('which').options.length === 2")
         assert browser.value(PRINTING) == "paused"  # the print that is looked at stays, and so does the one that the button stops
-        other.until(lambda one: one["phase"] == "over")
-        other.command("forget")
-        other.until(lambda one: one["phase"] == "printing")
+        second_page.until(lambda seen: seen["phase"] == "over")
+        second_page.command("forget")
+        second_page.until(lambda seen: seen["phase"] == "printing")
         browser.value("{ $('printer-field').open = true; $('port-typed').focus(); }")
         browser.key("e")  # a letter of the port's name
         assert browser.value("$('port-typed').value") == "e"
@@ -174,9 +174,9 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert browser.value("$('run-state').textContent").startswith("emergency stop: the printer has halted")
         heat = browser.value("[...$('run-told').querySelectorAll('dd.old')].map((each) => each.textContent)")
         assert len(heat) == 2
-        assert all(re.fullmatch(r"[\d.]+ of \d+ °C, as last known \d+ s ago", told) for told in heat)
-        assert "M112" in commands_sent(Path(other.until(lambda one: one["phase"] == "over")["log"]))
-        other.command("forget")
+        assert all(re.fullmatch(r"[\d.]+ of \d+ °C, as last known \d+ s ago", text) for text in heat)
+        assert "M112" in commands_sent(Path(second_page.until(lambda seen: seen["phase"] == "over")["log"]))
+        second_page.command("forget")
         browser.wait(f"{PRINTING} === ''")
         assert browser.value("$('stop-words').checkVisibility()")  # until it is noted, whatever becomes of the print
         assert browser.complaints == []
@@ -191,7 +191,7 @@ def type_port(browser: Browser, port: str) -> None:
 def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printing_and_follows_it_again(
     sliced: Running, browser: Browser
 ) -> None:
-    with stand_in("octoprint") as (job, address), prints_line(sliced, "other") as other:
+    with stand_in("octoprint") as (job, address), prints_line(sliced, "other") as second_page:
         job.steps = 200
         browser.open(sliced.address)
         browser.click("#tab-printing")
@@ -212,9 +212,9 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
         browser.wait("$('feed-told').textContent === '150 %'")  # although this server does not tell it
-        other.until(lambda one: one.get("port") == address and one["phase"] == "printing")
-        other.command("resume")
-        assert other.refused() == "another page commands this print: take the command over first"
+        second_page.until(lambda seen: seen.get("port") == address and seen["phase"] == "printing")
+        second_page.command("resume")
+        assert second_page.refused() == "another page commands this print: take the command over first"
 
         browser.open(sliced.address)
         browser.wait(f"{PRINTING} === 'paused' && !$('print-bar').hidden")
@@ -246,7 +246,7 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         browser.wait(f"{PRINTING} === 'over'")
         assert (browser.value("$('run-state').textContent"), job.state) == (f"box.stl.gcode waits on {address}", "cancelled")
         assert job.files["box.stl.gcode"] == sliced.ask("print.gcode")[1]
-        assert KEY not in json.dumps(other.state)
+        assert KEY not in json.dumps(second_page.state)
         assert browser.complaints == []
 
 
@@ -260,9 +260,9 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
     cut = Fault("reset", at=265, unit="line")  # not in a lifted travel: its height would be in doubt
     with SimulatedPrinter(load().machine, faults=[cut]) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
-        page.until(lambda one: one["phase"] == "ready")
+        page.until(lambda seen: seen["phase"] == "ready")
         page.command("begin")
-        ended = page.until(lambda one: one["phase"] == "over")
+        ended = page.until(lambda seen: seen["phase"] == "over")
         assert "the printer restarted in the middle of the print" in ended["sentence"]
         browser.open(sliced.address)
         browser.click("#tab-printing")
@@ -285,14 +285,14 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         assert browser.value("$('run-state').textContent") == "nothing was moved or heated"
         assert homed(printer) == ["homed XYZ"]
 
-        page.until(lambda one: one["end"] == "left")
+        page.until(lambda seen: seen["end"] == "left")
         page.do("go_on", journal=ended["journal"], port=printer.path)
-        page.until(lambda one: one["phase"] == "ready")
+        page.until(lambda seen: seen["phase"] == "ready")
         page.command("begin")
-        rest = page.until(lambda one: one["phase"] == "over")
+        rest = page.until(lambda seen: seen["phase"] == "over")
         assert rest["sentence"] == "the print is done"
         assert homed(printer) == ["homed XYZ", "homed XY"]
-    first, second = (read_journal(Path(each["journal"])) for each in (ended, rest))
+    first, second = (read_journal(Path(ended_print["journal"])) for ended_print in (ended, rest))
     assert (first.continued_in, second.finished) == (rest["journal"], True)
     assert browser.complaints == []
 
@@ -301,11 +301,11 @@ def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced
     """The last one: it ends the workbench of the others."""
     with SimulatedPrinter(load().machine, speed=20.0) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
-        page.until(lambda one: one["phase"] == "ready")
+        page.until(lambda seen: seen["phase"] == "ready")
         page.command("begin")
-        page.until(lambda one: one["progress"].get("nozzle_target_c"))
+        page.until(lambda seen: seen["progress"].get("nozzle_target_c"))
         sliced.process.send_signal(signal.SIGINT)
-        ended = page.until(lambda one: one["phase"] == "over")
+        ended = page.until(lambda seen: seen["phase"] == "over")
         assert sliced.process.wait(60.0) == 0
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
     assert ended["said"][-2].endswith("; heaters off")

@@ -53,10 +53,10 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     put(browser, "process.walls", 5)
     browser.wait(changed("process.walls"))
     assert browser.value("$('settings-part').selectedOptions[0].text") == "part 1 (1 of its own)"
-    told = browser.value("$('command-line').textContent")
+    command_line = browser.value("$('command-line').textContent")
     assert (
         "--set 'machine.tilt.limits_deg=[-45, 45]' --set process.top_layers=7 --parts 1 --as-is --part 1:walls=5"
-        " -o settings.gcode" in told
+        " -o settings.gcode" in command_line
     )
     browser.click("#reset-settings")
     browser.wait("$('reset-settings').disabled && $('settings-part').selectedOptions[0].text === 'part 1'")
@@ -82,9 +82,9 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
     browser.wait(changed("machine.gcode.before_part"))
     field = "document.querySelector('[data-key=\"machine.gcode.after_part\"] textarea')"
     browser.value(f"{{ {field}.focus(); {field}.value = 'M300'; {field}.dispatchEvent(new Event('input')); }}")
-    with bench.line() as other:  # of whose news a field that is typed in hears nothing
-        other.do("set", key="machine.gcode.after_part", value="M18")
-        other.until(lambda state: state["undo"] == "set machine.gcode.after_part")
+    with bench.line() as second_page:  # of whose news a field that is typed in hears nothing
+        second_page.do("set", key="machine.gcode.after_part", value="M18")
+        second_page.until(lambda state: state["undo"] == "set machine.gcode.after_part")
     browser.wait("$('command-line').textContent.includes('M18')")
     assert browser.value(f"{field}.value") == "M300"
     browser.value(f"{field}.dispatchEvent(new Event('blur'))")
@@ -100,7 +100,7 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
         "machine.head.silhouette_mm=[[0.5, 0], [9, 12]]",
     ]
     mine = tmp_path / "mine.toml"
-    assert main(["profiles", "save", "generic_ac", *(f"--set={each}" for each in settings), "-o", str(mine)]) == 0
+    assert main(["profiles", "save", "generic_ac", *(f"--set={setting}" for setting in settings), "-o", str(mine)]) == 0
     assert saved(browser, "#save-machine") == mine.read_text()
     assert load(machine=str(mine)).machine == load(settings=settings).machine
     choose(browser, "mine.toml", mine.read_bytes())

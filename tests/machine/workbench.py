@@ -17,7 +17,7 @@ from websockets.sync.client import ClientConnection, connect
 
 PATIENCE_S = 60.0
 COARSE = ("layer_height_mm=0.4", "first_layer_height_mm=0.4", "line_width_mm=0.8")
-QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2", *(f"--set=process.{each}" for each in COARSE))
+QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2", *(f"--set=process.{setting}" for setting in COARSE))
 QUICK += ("--set=search.stair_weight=0.01",)  # else so coarse a T, whose arms show high stairs, would be printed in one piece
 
 
@@ -42,9 +42,9 @@ class Running:
         return self.ask(f"file?name={file.name}", "POST", file.read_bytes(), Origin=f"http://127.0.0.1:{self.port}")
 
     @contextmanager
-    def line(self, origin: str | None = None, place: str | None = None) -> Iterator["Page"]:
+    def line(self, origin: str | None = None, path: str | None = None) -> Iterator["Page"]:
         """A page's line; origin: of the page, None: one of this server."""
-        address = f"ws://127.0.0.1:{self.port}{self.place if place is None else place}line"
+        address = f"ws://127.0.0.1:{self.port}{self.place if path is None else path}line"
         with connect(address, origin=origin or f"http://127.0.0.1:{self.port}", max_size=None, proxy=None) as socket:
             yield Page(socket)
 
@@ -74,8 +74,8 @@ class Page:
             try:
                 self.state = json.loads(self._socket.recv(max(0.0, end_s - time.monotonic())))
             except TimeoutError:
-                told = {key: self.state[key] for key in ("problem", "busy", "undo", "parts", "search", "slicing")}
-                raise AssertionError(f"that never came, only {told}") from None
+                last = {key: self.state[key] for key in ("problem", "busy", "undo", "parts", "search", "slicing")}
+                raise AssertionError(f"that never came, only {last}") from None
         return self.state
 
 

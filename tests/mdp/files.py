@@ -22,9 +22,9 @@ def placed(x: float, y: float, z: float, at: tuple[float, float, float] = (0.0, 
     return from_manifold(m3.Manifold.cube((x, y, z)).translate(at))
 
 
-def both(one: Mesh, other: Mesh) -> Mesh:
+def both(a: Mesh, b: Mesh) -> Mesh:
     """Two meshes as one list of triangles."""
-    return Mesh(np.concatenate([one.vertices, other.vertices]), np.concatenate([one.faces, other.faces + len(one.vertices)]))
+    return Mesh(np.concatenate([a.vertices, b.vertices]), np.concatenate([a.faces, b.faces + len(a.vertices)]))
 
 
 def inside_out(mesh: Mesh) -> Mesh:

@@ -41,13 +41,13 @@ def area_vectors_above(mesh: Mesh, plane: Plane) -> Floats:
     vectors = np.zeros((len(mesh.faces), 3))
     for f, corners in enumerate(mesh.vertices[mesh.faces]):
         heights = plane.heights_mm(corners)
-        kept = []
+        polygon = []
         for k in range(3):
             a, b, low, high = corners[k], corners[(k + 1) % 3], heights[k], heights[(k + 1) % 3]
             if low > 0:
-                kept.append(a)
+                polygon.append(a)
             if (low > 0) != (high > 0):
-                kept.append(a + (b - a) * (low / (low - high)))
-        for p, q in pairwise(kept[1:]):
-            vectors[f] += 0.5 * np.cross(p - kept[0], q - kept[0])
+                polygon.append(a + (b - a) * (low / (low - high)))
+        for p, q in pairwise(polygon[1:]):
+            vectors[f] += 0.5 * np.cross(p - polygon[0], q - polygon[0])
     return vectors

@@ -42,7 +42,7 @@ class _Box:
         corners = product((0, 1), repeat=3)
         self.places = {corner: [side * at for side, at in zip(sides, corner, strict=True)] for corner in corners}
         self.vertices = {
-            corner: self.entities.add("VERTEX_POINT", "''", self.entities.point(place)) for corner, place in self.places.items()
+            corner: self.entities.add("VERTEX_POINT", "''", self.entities.point(point)) for corner, point in self.places.items()
         }
         self.edges: dict[tuple[Corner, Corner], tuple[str, str]] = {}
 

@@ -40,7 +40,7 @@ def meet(machine: Machine, pose: Pose) -> bool:
     box = machine.cradle[0]
     post = corners(box.min_mm, box.max_mm) @ rotation(machine, tilted).T + shift(machine, tilted)
     swept = [(tips[:, None] + outline(body)[None]).reshape(-1, 3) for body in bodies(machine)]
-    return any((m3.Manifold.hull_points(each) ^ m3.Manifold.hull_points(post)).volume() > 1e-6 for each in swept)
+    return any((m3.Manifold.hull_points(hull) ^ m3.Manifold.hull_points(post)).volume() > 1e-6 for hull in swept)
 
 
 @given(st.floats(-140, 140), st.floats(5, 120))

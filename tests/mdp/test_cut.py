@@ -23,9 +23,9 @@ def test_the_halves_are_those_that_one_split_makes(seed: int, height: int, aroun
     plane = Plane(normal, float(heights.min() + share / 1000.0 * np.ptp(heights)))
     whole = solid_of(mesh)
     expected = whole.split_by_plane(tuple(float(x) for x in normal), plane.offset_mm)
-    for mine, other in zip(cut(whole, plane), expected, strict=True):
-        assert mine.volume() == pytest.approx(other.volume(), rel=1e-9, abs=1e-6)
-        assert mine.surface_area() == pytest.approx(other.surface_area(), rel=1e-9, abs=1e-6)
+    for mine, split_half in zip(cut(whole, plane), expected, strict=True):
+        assert mine.volume() == pytest.approx(split_half.volume(), rel=1e-9, abs=1e-6)
+        assert mine.surface_area() == pytest.approx(split_half.surface_area(), rel=1e-9, abs=1e-6)
 
 
 def test_a_plane_beside_the_solid_leaves_one_half_empty() -> None:

@@ -32,37 +32,37 @@ def _rod(cells: int) -> m3.Manifold:
 
 def test_a_lattice_of_thousands_of_handles_is_cut_into_parts_that_hang_together() -> None:
     solid = _lattice(11)
-    found = _decomposed(
+    decomposition = _decomposed(
         shapes.standing(solid), "clearance=false", "objective=risky"
     )  # its struts are bridges that need no support
     assert solid.genus() > 3000
-    assert len(found.parts) == 3
-    assert len(solid_of(found.parts[0].mesh).decompose()) == 1
-    assert sum(solid_of(part.mesh).volume() for part in found.parts) == pytest.approx(solid.volume(), rel=1e-9)
+    assert len(decomposition.parts) == 3
+    assert len(solid_of(decomposition.parts[0].mesh).decompose()) == 1
+    assert sum(solid_of(part.mesh).volume() for part in decomposition.parts) == pytest.approx(solid.volume(), rel=1e-9)
 
 
 @pytest.mark.parametrize("mesh", [shapes.standing(m3.Manifold.cylinder(20, 0, 10, 48)), shapes.octahedron(15.0)])
 def test_a_steep_model_on_its_point_needs_no_support_and_says_so(mesh: Mesh) -> None:
-    found = _decomposed(mesh, "clearance=false")
-    assert len(found.parts) == 1
-    assert found.notes == ("no face needs support: the model is printed straight up as one part",)
+    decomposition = _decomposed(mesh, "clearance=false")
+    assert len(decomposition.parts) == 1
+    assert decomposition.notes == ("no face needs support: the model is printed straight up as one part",)
 
 
 def test_a_ball_on_its_point_is_cut_and_every_part_stands_on_the_ones_before() -> None:
-    found = _decomposed(shapes.ball(), "clearance=false")
-    assert len(found.parts) == 3
-    assert found.reduction > 0.3
-    assert found.parts[0].mesh.bounds_mm[0, 2] == 0.0
+    decomposition = _decomposed(shapes.ball(), "clearance=false")
+    assert len(decomposition.parts) == 3
+    assert decomposition.reduction > 0.3
+    assert decomposition.parts[0].mesh.bounds_mm[0, 2] == 0.0
 
 
 @pytest.mark.parametrize("least_mm2", [0, 4])
 def test_no_part_stands_on_air_where_a_piece_of_the_model_floats(least_mm2: int) -> None:
     bits = m3.Manifold.cube((10, 10, 10), True).translate((25, 0, 30))
     mesh = mesh_of(m3.Manifold.cube((10, 10, 10), True).translate((0, 0, 5)) + bits)
-    found = _decomposed(mesh, "clearance=false", f"least_interface_mm2={least_mm2}")
-    assert len(found.parts) == 1
-    assert found.residual_area_mm2 == pytest.approx(100.0)
-    assert "hang on too small an area" in found.notes[0]
+    decomposition = _decomposed(mesh, "clearance=false", f"least_interface_mm2={least_mm2}")
+    assert len(decomposition.parts) == 1
+    assert decomposition.residual_area_mm2 == pytest.approx(100.0)
+    assert "hang on too small an area" in decomposition.notes[0]
 
 
 def test_pieces_that_float_are_reported_and_voids_are_not() -> None:
@@ -76,9 +76,9 @@ def test_pieces_that_float_are_reported_and_voids_are_not() -> None:
 
 
 def test_a_model_without_a_feasible_cut_is_one_part_and_every_candidate_has_its_reason() -> None:
-    found = _decomposed(shapes.tee(height=12.0, arm=14.0), "least_volume_share=0.5")
-    assert len(found.parts) == 1
-    counts = [int(word) for word in found.notes[0].replace(":", " ").split() if word.isdigit()]
+    decomposition = _decomposed(shapes.tee(height=12.0, arm=14.0), "least_volume_share=0.5")
+    assert len(decomposition.parts) == 1
+    counts = [int(word) for word in decomposition.notes[0].replace(":", " ").split() if word.isdigit()]
     assert counts[0] == sum(counts[1:]) > 0
 
 

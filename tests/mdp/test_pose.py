@@ -46,7 +46,7 @@ def least_of_all(options: list[list[Pose]], most_deg: float) -> float:
 @given(LEANING, st.sampled_from([180.0, 270.0, 400.0]))
 def test_no_combination_of_branches_and_turns_rotates_less(leaning: list[tuple[float, float]], most_deg: float) -> None:
     machine = wound((-most_deg, most_deg))
-    options = [[Pose(0.0, 0.0)], *(poses(machine, direction(*each)) for each in leaning)]
+    options = [[Pose(0.0, 0.0)], *(poses(machine, direction(*angles)) for angles in leaning)]
     chosen = least_rotation(machine, options)
     assert abs(total(chosen) - least_of_all(options, most_deg + 1e-9)) < 1e-6
 
@@ -57,12 +57,12 @@ def test_every_pose_stays_inside_limits_and_cables_and_brings_its_direction_upri
     leaning: list[tuple[float, float]], limits_deg: tuple[float, float], budget_deg: float | None
 ) -> None:
     machine = wound(limits_deg, budget_deg)
-    reached = [each for each in leaning if poses(machine, direction(*each))]
-    chosen = least_rotation(machine, [[Pose(0.0, 0.0)], *(poses(machine, direction(*each)) for each in reached)])
+    reached = [angles for angles in leaning if poses(machine, direction(*angles))]
+    chosen = least_rotation(machine, [[Pose(0.0, 0.0)], *(poses(machine, direction(*angles)) for angles in reached)])
     least, most = machine.turn.reach_deg
     assert all(least - 1e-6 <= pose.turn_deg <= most + 1e-6 for pose in chosen)
-    for pose, each in zip(chosen[1:], reached, strict=True):
-        assert_same_direction(machine, pose, direction(*each))
+    for pose, angles in zip(chosen[1:], reached, strict=True):
+        assert_same_direction(machine, pose, direction(*angles))
 
 
 def test_a_cable_is_unwound_before_it_is_used_up() -> None:
@@ -81,7 +81,7 @@ def test_a_part_printed_level_keeps_the_turn_of_the_part_before() -> None:
 
 def test_a_part_printed_level_turns_where_the_kept_turn_does_not_fit() -> None:
     options = [[Pose(0.0, 0.0)], [Pose(30.0, 80.0)], [Pose(0.0, 0.0)], [Pose(30.0, 90.0)]]
-    chosen = least_rotation(wound(), options, lambda place, pose: place != 2)
+    chosen = least_rotation(wound(), options, lambda part, pose: part != 2)
     assert [pose.turn_deg for pose in chosen] == [0.0, 80.0, 0.0, 90.0]
 
 

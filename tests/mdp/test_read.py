@@ -16,8 +16,8 @@ from tests.shapes import box, tee
 
 def test_the_same_file_gives_the_same_bytes_twice(tmp_path: Path) -> None:
     path = files.written(tmp_path / "two.stl", files.both(files.placed(10, 10, 10), files.placed(10, 10, 10, (5, 5, 5))))
-    one, other = read_mesh(path)[0], read_mesh(path)[0]
-    assert one.vertices.tobytes() + one.faces.tobytes() == other.vertices.tobytes() + other.faces.tobytes()
+    first, second = read_mesh(path)[0], read_mesh(path)[0]
+    assert first.vertices.tobytes() + first.faces.tobytes() == second.vertices.tobytes() + second.faces.tobytes()
 
 
 def test_scale_comes_before_rotation_and_rotation_about_x_before_z(tmp_path: Path) -> None:

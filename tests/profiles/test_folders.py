@@ -16,9 +16,9 @@ from profiles.folders import cache_folder, settings_folder, state_folder
 @pytest.fixture(autouse=True)
 def temporary(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder for temporary files that is empty."""
-    place = tmp_path_factory.mktemp("temporary")
-    monkeypatch.setattr(tempfile, "tempdir", str(place))
-    return place / f"tiltprint-{os.geteuid()}"
+    folder = tmp_path_factory.mktemp("temporary")
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder / f"tiltprint-{os.geteuid()}"
 
 
 def forget_home(monkeypatch: pytest.MonkeyPatch) -> None:

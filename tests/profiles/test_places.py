@@ -118,9 +118,9 @@ def test_a_missing_parent_does_not_hide_the_other_problems() -> None:
 def test_checking_a_machine_tells_every_block_that_cannot_be_filled_in(capsys: pytest.CaptureFixture[str]) -> None:
     file = keep("machine", "bad", 'inherits = "generic_ac"\n[machine.gcode]\nstart = "M104 S{heat}"\nend = "G1 {tlit}0"\n')
     assert main(["profiles", "check", str(file)]) == 1
-    told = capsys.readouterr().err
-    assert "machine.gcode.start: placeholder {heat} is not known" in told
-    assert "machine.gcode.end: placeholder {tlit} is not known" in told
+    errors = capsys.readouterr().err
+    assert "machine.gcode.start: placeholder {heat} is not known" in errors
+    assert "machine.gcode.end: placeholder {tlit} is not known" in errors
 
 
 def test_what_is_shown_of_a_machine_tells_where_each_number_comes_from(capsys: pytest.CaptureFixture[str]) -> None:

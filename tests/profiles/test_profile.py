@@ -245,8 +245,8 @@ def test_any_text_without_a_key_is_refused_as_a_setting(text: str) -> None:
 
 
 def test_setting_one_key_leaves_all_others_alone() -> None:
-    one, other = load(), load(settings=["machine.tilt.speed_deg_s=11"])
-    changed = [a for a, b in zip(rows("machine", one.machine), rows("machine", other.machine), strict=True) if a != b]
+    default, with_speed = load(), load(settings=["machine.tilt.speed_deg_s=11"])
+    changed = [a for a, b in zip(rows("machine", default.machine), rows("machine", with_speed.machine), strict=True) if a != b]
     assert [key for key, _, _ in changed] == ["machine.tilt.speed_deg_s"]
 
 
@@ -372,7 +372,7 @@ def test_every_number_of_a_shipped_machine_has_a_source_or_is_called_uncalibrate
     covered = (*machine.sources, *machine.uncalibrated)  # type: ignore[attr-defined]
     for key, value in _leaves("machine", said["machine"]):
         if not isinstance(value, str) and not key.startswith(("machine.uncalibrated", "machine.arcs")):
-            assert any(key == place or key.startswith(f"{place}.") for place in covered), key
+            assert any(key == path or key.startswith(f"{path}.") for path in covered), key
 
 
 def _leaves(prefix: str, table: dict[str, object]) -> Iterator[tuple[str, object]]:

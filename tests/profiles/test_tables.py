@@ -48,8 +48,8 @@ def test_the_recipe_of_the_page_finds_the_tilt_axis(y_mm: float, z_mm: float, an
     machine = load(settings=[f"machine.tilt.point_mm=[0,{y_mm!r},{z_mm!r}]"]).machine
     _, y, z = machine_points(machine, Pose(angle_deg, 0.0), np.zeros((1, 3)))[0]
     c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
-    found = ((1 - c) * y - s * z) / (2 * (1 - c)), (s * y + (1 - c) * z) / (2 * (1 - c))
-    assert found == pytest.approx((y_mm, z_mm), abs=1e-6)
+    axis = ((1 - c) * y - s * z) / (2 * (1 - c)), (s * y + (1 - c) * z) / (2 * (1 - c))
+    assert axis == pytest.approx((y_mm, z_mm), abs=1e-6)
 
 
 def test_positive_values_turn_the_table_as_the_page_says() -> None:

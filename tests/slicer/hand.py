@@ -111,6 +111,6 @@ def ragged(seed: int) -> Polygons:
     random = np.random.default_rng(seed)
     turn = np.sort(random.uniform(0, 2 * np.pi, 25))
     star = Polygons([np.column_stack([np.cos(turn), np.sin(turn)]) * random.uniform(8, 30, (25, 1))])
-    for place in random.uniform(-15, 15, (6, 2)):
-        star = star - Polygons.circle(random.uniform(1, 4), 12).translate(place)
+    for centre in random.uniform(-15, 15, (6, 2)):
+        star = star - Polygons.circle(random.uniform(1, 4), 12).translate(centre)
     return star + Polygons.circle(0.8, 8)

@@ -55,12 +55,12 @@ def test_what_another_part_touches_stays_where_it_is_and_the_parts_overlap_nowhe
     whole, right_half = plate(), Polygons.square((20.0, 40.0)).translate((0.0, -20.0))
     right, left = whole ^ right_half, whole - right_half
     asked = process(outline_mm, hole_mm)
-    own, other = (
+    own, neighbour = (
         as_shapely(compensated(part, rest, [below], process=asked))
         for part, rest, below in ((left, right, (-1.0, 0.0, 0.0)), (right, left, (1.0, 0.0, 0.0)))
     )
-    assert own.intersection(other).area == pytest.approx(0.0, abs=1e-6)
-    assert own.union(other).symmetric_difference(as_shapely(compensated(whole, NOTHING, (), process=asked))).area < 0.05
+    assert own.intersection(neighbour).area == pytest.approx(0.0, abs=1e-6)
+    assert own.union(neighbour).symmetric_difference(as_shapely(compensated(whole, NOTHING, (), process=asked))).area < 0.05
     assert own.intersection(as_shapely(right)).area == pytest.approx(0.0, abs=1e-6)
 
 

@@ -45,9 +45,9 @@ def test_every_path_is_drawn_in_the_group_of_its_kind_at_its_width() -> None:
     drawn = groups(layer_svg(sliced, 152))
     for kind in Kind:
         paths = [p for p in sliced.layers[151].paths if p.kind is kind]
-        found = lines(drawn[kind.value]) if paths else []
-        assert len(found) == len(paths)
-        for path, (points, element) in zip(paths, found, strict=True):
+        elements = lines(drawn[kind.value]) if paths else []
+        assert len(elements) == len(paths)
+        for path, (points, element) in zip(paths, elements, strict=True):
             assert points == pytest.approx(path.points, abs=6e-4)
             assert float(element.attrib["stroke-width"]) == pytest.approx(path.width_mm, abs=6e-5)
 

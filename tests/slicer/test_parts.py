@@ -26,10 +26,10 @@ def test_processes_side_by_side_give_the_same_bytes_as_one_after_the_other() -> 
 def test_progress_rises_to_all_layers(processes: int) -> None:
     reports: list[SlicingProgress] = []
     sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), reports.append, processes)
-    layers = [sum(each.layers) for each in reports]
+    layers = [sum(progress.layers) for progress in reports]
     assert layers == sorted(layers)
     assert reports[-1].layers == tuple(len(piece.layers) for piece in sliced)
-    shares = [each.share for each in reports]
+    shares = [progress.share for progress in reports]
     assert shares == sorted(shares)
     assert (reports[-1].begun, shares[-1]) == (3, 1.0)
 
@@ -38,7 +38,7 @@ def test_progress_rises_to_all_layers(processes: int) -> None:
 def test_a_part_is_handed_over_as_soon_as_it_is_sliced(processes: int) -> None:
     reports: list[SlicingProgress] = []
     sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), reports.append, processes)
-    ready = [sum(piece is not None for piece in each.ready) for each in reports]
+    ready = [sum(piece is not None for piece in progress.ready) for progress in reports]
     assert ready == sorted(ready)
     assert ready[-1] == 3
     assert [piece and piece.index for piece in reports[-1].ready] == [piece.index for piece in sliced]

@@ -49,9 +49,9 @@ def test_the_wall_holds_as_much_plastic_as_it_is_long_with_half_of_it_in_the_fir
 def test_the_printed_vase_climbs_in_every_line_and_the_dry_run_has_nothing_against_it() -> None:
     asked = profile(*VASE)
     part = whole(cup())
-    one = Decomposition("cup", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
-    lines = tuple(write_gcode(plan(one, slice_parts((part,), asked), asked), asked))
-    assert [each.message for each in dry_run(lines, asked).findings if each.code != "uncalibrated"] == []
+    decomposition = Decomposition("cup", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    lines = tuple(write_gcode(plan(decomposition, slice_parts((part,), asked), asked), asked))
+    assert [finding.message for finding in dry_run(lines, asked).findings if finding.code != "uncalibrated"] == []
     climbing = lines[lines.index(";Z:3") : lines.index(";Z:3.2")]
     heights = [float(line.split("Z")[1].split()[0]) for line in climbing if line.startswith("G1 X") and " Z" in line]
     assert len(heights) > 90

@@ -48,10 +48,10 @@ def support_x_mm(sliced: SlicedPart) -> Floats:
 @pytest.mark.parametrize("zone", [BACK, BACK_BOX])
 def test_layers_begin_at_the_rear_unless_no_seam_is_wanted_there(zone: AnyZone) -> None:
     part = whole(box(20.0, 20.0, 4.0))
-    free, kept = (slice_part(each, profile(*BARE)) for each in (part, without_seam(part, zone)))
+    free, without = (slice_part(sliced, profile(*BARE)) for sliced in (part, without_seam(part, zone)))
     assert begins(free)[:, 1].min() > 9.0
-    assert begins(kept)[:, 1].max() < 9.5
-    assert len(begins(free)) == len(begins(kept))
+    assert begins(without)[:, 1].max() < 9.5
+    assert len(begins(free)) == len(begins(without))
 
 
 @pytest.mark.parametrize("axes", [None, LEANING])
@@ -77,23 +77,25 @@ def test_boxes_that_share_a_leaning_part_share_its_walls(axes: tuple[Vector, Vec
 
 def test_a_wall_on_which_no_seam_is_wanted_anywhere_begins_inside() -> None:
     part = whole(box(20.0, 20.0, 4.0))
-    kept = slice_part(without_seam(part, Zone((-15.0, -15.0, -1.0), (15.0, 15.0, 9.0))), profile(*BARE))
-    assert np.abs(begins(kept)).max(axis=1).max() < 9.6
+    without = slice_part(without_seam(part, Zone((-15.0, -15.0, -1.0), (15.0, 15.0, 9.0))), profile(*BARE))
+    assert np.abs(begins(without)).max(axis=1).max() < 9.6
 
 
 @pytest.mark.parametrize("zone", [RIGHT_ARM, Grown((12.0, 0.0, 30.0), 1.0)])
 def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zone: AnyZone) -> None:
     part = whole(tee())
     (free,) = slice_parts([part], SUPPORTED)
-    (kept,) = slice_parts([replace(part, no_support=Marked.of(part.mesh, [zone]))], SUPPORTED)
+    (without,) = slice_parts([replace(part, no_support=Marked.of(part.mesh, [zone]))], SUPPORTED)
     assert support_x_mm(free).max() > 15.0
-    assert support_x_mm(kept).max() < 6.0
-    assert support_x_mm(kept).min() == pytest.approx(support_x_mm(free).min(), abs=0.5)
-    ((mm2, why),) = [(place.mm2, place.reason) for place in kept.unsupported]
+    assert support_x_mm(without).max() < 6.0
+    assert support_x_mm(without).min() == pytest.approx(support_x_mm(free).min(), abs=0.5)
+    ((mm2, why),) = [(missed.mm2, missed.reason) for missed in without.unsupported]
     assert (why, mm2) == ("no support is wanted there", pytest.approx(150.0, rel=0.05))
-    counted = [sum(area is not NOTHING for area in sample_part(each, SUPPORTED).support.areas) for each in (part, bare(part))]
+    counted = [
+        sum(area is not NOTHING for area in sample_part(variant, SUPPORTED).support.areas) for variant in (part, bare(part))
+    ]
     assert (counted[0] > 0, counted[1]) == (True, 0)
-    assert volume_mm3(kept, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
+    assert volume_mm3(without, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
 
 
 def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> None:

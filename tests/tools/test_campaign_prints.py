@@ -18,7 +18,7 @@ from tools.print_forms import FAMILIES, form, form_names, write_stl
 from tools.print_look import look_at
 
 SMALL = Run("forms", "stairs-001", "stairs-001")
-SAMPLE_MM = 20.0
+SAMPLE_MM = 15.0
 
 
 @pytest.mark.parametrize("name", form_names(2 * len(FAMILIES)))
@@ -45,7 +45,7 @@ def test_runs_have_one_order_whatever_else_there_is_and_a_share_of_them_varies()
 
 def test_settings_that_vary_are_decided_by_the_name_and_make_a_profile(tmp_path: Path) -> None:
     file = model_file(SMALL, tmp_path)
-    for run in [Run("forms", name, name, True) for name in form_names(300)]:
+    for run in [Run("forms", name, name, True) for name in form_names(100)]:
         options = options_of(run, file)
         assert options == options_of(run, file)
         words = dict(zip(options[0:4:2], options[1:4:2], strict=True))

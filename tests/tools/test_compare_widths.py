@@ -46,7 +46,7 @@ def test_a_learned_ranker_is_held_against_plain_beams_without_what_no_cut_can_sa
     def row(mesh: str, width: int, share: float, core_s: float, ranker: str = "classic") -> Row:
         return Row(mesh, "", "best", width, 9, 50.0, 50.0 * share, share, 3, core_s, 1.0, 9, "", ranker, floor=0.1)
 
-    plain = [row(mesh, *each) for mesh in "ab" for each in ((1, 0.6, 1.0), (2, 0.5, 2.0), (10, 0.3, 8.0))]
+    plain = [row(mesh, *figures) for mesh in "ab" for figures in ((1, 0.6, 1.0), (2, 0.5, 2.0), (10, 0.3, 8.0))]
     learned = [row("a", 2, 0.5, 2.0, "learned"), row("b", 2, 0.46, 2.0, "learned")]
     lines = rankers_table([*plain, *learned], "").splitlines()
     (cells,) = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("| learned | 2 |")]

@@ -44,16 +44,16 @@ def printed(lines: list[str]) -> VirtualPrinter:
 ])  # fmt: skip
 def test_a_doubled_a_lost_and_an_exchanged_line_are_seen(executed, words: str) -> None:  # type: ignore[no-untyped-def]
     text = program(40)
-    found = order(printed(executed(text)).record, wanted(text), whole=True)
-    assert found
-    assert words in found[0] or "strokes" in found[0]
+    problems = order(printed(executed(text)).record, wanted(text), whole=True)
+    assert problems
+    assert words in problems[0] or "strokes" in problems[0]
 
 
 def test_heaters_left_on_and_an_error_of_another_kind_are_seen() -> None:
     text = program(40)
     printer = printed(text[:20])
-    found = judged(text, FaultScript((Fault("drop", 5),)), printer, "no such error; the printer reports its heaters off")
-    assert found == ["not the right error: no such error; the printer reports its heaters off", "a heater is on"]
+    problems = judged(text, FaultScript((Fault("drop", 5),)), printer, "no such error; the printer reports its heaters off")
+    assert problems == ["not the right error: no such error; the printer reports its heaters off", "a heater is on"]
 
 
 @pytest.mark.parametrize(("instead", "words"), [

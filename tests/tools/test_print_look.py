@@ -56,8 +56,8 @@ def test_a_stretch_over_nothing_is_measured_where_no_bridge_is_told() -> None:
     look = look_at(block(l5=layer(5, beads)))
     assert look.air_mm.value == pytest.approx(25.0)
     assert look.suspect == [f"25.0 mm in the air that no bridge is, {look.air_mm.at}"]
-    told = look_at(block(l5=[*layer(5, strokes(0.0, 12.0, 20)), ";TYPE:Bridge infill", *strokes(30.0, 25.0, 1)]))
-    assert (told.told_mm, told.air_mm.value, told.suspect) == (pytest.approx(25.0), 0.0, [])
+    bridged = look_at(block(l5=[*layer(5, strokes(0.0, 12.0, 20)), ";TYPE:Bridge infill", *strokes(30.0, 25.0, 1)]))
+    assert (bridged.told_mm, bridged.air_mm.value, bridged.suspect) == (pytest.approx(25.0), 0.0, [])
 
 
 def test_a_stretch_over_sparse_infill_is_told_apart() -> None:
@@ -90,7 +90,7 @@ def test_a_layer_that_is_laid_twice_holds_plastic_twice() -> None:
     ("a layer at 80 % flow", "21% too much or too little plastic in part 1 layer 18")])  # fmt: skip
 def test_faults_planted_into_a_print_of_three_parts_are_seen_and_it_is_clean_without(fault: str, words: str) -> None:
     _, _, lines = bent("generic_ac")
-    planted = next(each for each in FAULTS if each.name == fault)
+    planted = next(kind for kind in FAULTS if kind.name == fault)
     assert look_at(lines).suspect == []
     assert any(words in reason for reason in look_at(planted.edit(list(lines))).suspect)
 
@@ -98,6 +98,6 @@ def test_faults_planted_into_a_print_of_three_parts_are_seen_and_it_is_clean_wit
 def test_both_looks_together_add_lengths_and_keep_the_worst() -> None:
     _, _, lines = bent("generic_ac")
     look = look_at(lines)
-    both = look.with_other(look)
+    both = look.merged_with(look)
     assert (both.strokes_mm, both.volume) == (2 * look.strokes_mm, look.volume)
-    assert look.with_other(Look()) == look
+    assert look.merged_with(Look()) == look

@@ -8,7 +8,7 @@ from machine.app.requests import CalibrationRequest
 from machine.app.terminal.plain import show
 from machine.calibration.fit import Calibration, calibrate
 from machine.calibration.program import calibration_lines, plan_touches
-from machine.calibration.saved import found_tables, own_profile
+from machine.calibration.saved import fitted_tables, own_profile
 from machine.calibration.sheet import Sheet, read_sheet, sheet_text
 from profiles.errors import OutputError, ProfileError
 from profiles.machine import Machine
@@ -99,7 +99,7 @@ def _calibrated(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> 
 
 def _save(request: CalibrationRequest, machine: Machine, calibration: Calibration, sheet: Sheet) -> None:
     """The found numbers in the user's own profile, and the file before beside it."""
-    tables = found_tables(machine, calibration, sheet.mark_angle_deg is not None)
+    tables = fitted_tables(machine, calibration, sheet.mark_angle_deg is not None)
     file, text = own_profile(request.save or Path(request.machine).stem, request.machine, tables)
     _refuse_to_overwrite(file, request.replace)
     own_folder("machine").mkdir(parents=True, exist_ok=True)
@@ -115,9 +115,9 @@ def _comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -
     for axis in ("tilt", "turn"):
         old, new = getattr(before, axis), getattr(calibration.machine, axis)
         sigma = max(value for key, value in calibration.sigma.items() if key.startswith(f"{axis}.point_mm"))
-        place = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", new.point_mm, strict=True))
+        point = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", new.point_mm, strict=True))
         was = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", old.point_mm, strict=True))
-        lines.append(f"{axis} {new.letter}: through {place} (+-{sigma:.3f} mm), was {was}")
+        lines.append(f"{axis} {new.letter}: through {point} (+-{sigma:.3f} mm), was {was}")
         lines.append(f"{axis} {new.letter}: sign {new.sign}, was {old.sign}")
         if axis == "tilt" or zero_of_turn:
             lines.append(f"{axis} {new.letter}: zero {new.zero_deg:.4f} deg, was {old.zero_deg:g}")

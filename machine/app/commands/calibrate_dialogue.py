@@ -47,16 +47,16 @@ def ask_touches(name: str, machine: Machine, height_mm: float, radius_mm: float 
     """
     sys.stdout.write(INTRO.format(machine=plain_line(machine.name)))
     answers: list[Answer] = [height_mm, None]
-    place, known, enough = 0, 1, -1
+    index, known, enough = 0, 1, -1
     while True:
         questions = _questions(machine, answers, radius_mm)
-        if place < len(questions) and place != enough:
+        if index < len(questions) and index != enough:
             before = answers[0]
-            place = _ask(questions, place, answers, known)
-            known = max(known, place)
+            index = _ask(questions, index, answers, known)
+            known = max(known, index)
             if answers[0] != before:  # then the touches are at other places
                 del answers[2:]
-                known = place
+                known = index
             continue
         sheet, numbers = _sheet(name, machine, answers, radius_mm)
         verdict = judge(sheet)
@@ -64,52 +64,52 @@ def ask_touches(name: str, machine: Machine, height_mm: float, radius_mm: float 
             return sheet
         doubtful = numbers[verdict - 1] if isinstance(verdict, int) else None
         sys.stdout.write(f"{verdict}\n" if doubtful is None else f"look at touch {doubtful + 1} again\n")
-        place = 2 + 3 * (len(questions) // 3 - 1 if doubtful is None else doubtful)
-        enough = -1 if doubtful is None else place + 3
+        index = 2 + 3 * (len(questions) // 3 - 1 if doubtful is None else doubtful)
+        enough = -1 if doubtful is None else index + 3
 
 
-def _ask(questions: Sequence[Question], place: int, answers: list[Answer], known: int) -> int:
-    """Ask until a question has its answer; the place of the next one."""
-    question, doubted = questions[place], None
-    usual = answers[place] if place < known and place < len(answers) else question.usual
+def _ask(questions: Sequence[Question], index: int, answers: list[Answer], known: int) -> int:
+    """Ask until a question has its answer; the index of the next one."""
+    question, doubted = questions[index], None
+    usual = answers[index] if index < known and index < len(answers) else question.usual
     while True:
         reply = _read(f"{question.text}{'' if usual is None else f' [{usual:g}]'}: ")
         if reply in ("b", "s"):
-            return _aside(reply, place, answers)
+            return _aside(reply, index, answers)
         if not reply and (usual is not None or question.optional):
-            _store(answers, place, usual)
-            return place + 1
+            _store(answers, index, usual)
+            return index + 1
         numbers = _numbers(reply)
-        begins = place >= 2 and place % 3 == 2
+        begins = index >= 2 and index % 3 == 2
         if numbers is None or len(numbers) not in ((1, 3) if begins else (1,)):
             sys.stdout.write(f"  {reply!r} cannot be read: a number such as 12.5 is expected{', or X Y Z' if begins else ''}\n")
             continue
         for step, value in enumerate(numbers):
-            problem = questions[place + step].impossible(value)
-            doubt = "" if problem or reply == doubted else questions[place + step].doubtful(value)
+            problem = questions[index + step].impossible(value)
+            doubt = "" if problem or reply == doubted else questions[index + step].doubtful(value)
             if problem or doubt:
                 sys.stdout.write(f"  {problem or f'{doubt}; type it again to keep it'}\n")
                 break
         else:
             for step, value in enumerate(numbers):
-                _store(answers, place + step, value)
-            return place + len(numbers)
+                _store(answers, index + step, value)
+            return index + len(numbers)
         doubted = reply
 
 
-def _aside(reply: str, place: int, answers: list[Answer]) -> int:
+def _aside(reply: str, index: int, answers: list[Answer]) -> int:
     """Back to the question before, or on to the next touch without this one."""
-    if reply == "b" or place < 2:
-        return max(0, place - 1) if reply == "b" else place + 1
-    first = 2 + (place - 2) // 3 * 3
+    if reply == "b" or index < 2:
+        return max(0, index - 1) if reply == "b" else index + 1
+    first = 2 + (index - 2) // 3 * 3
     for k in range(first, first + 3):
         _store(answers, k, None)
     return first + 3
 
 
-def _store(answers: list[Answer], place: int, value: Answer) -> None:
-    answers.extend([None] * (place + 1 - len(answers)))
-    answers[place] = value
+def _store(answers: list[Answer], index: int, value: Answer) -> None:
+    answers.extend([None] * (index + 1 - len(answers)))
+    answers[index] = value
 
 
 def _read(prompt: str) -> str:
@@ -149,15 +149,15 @@ def _questions(machine: Machine, answers: Sequence[Answer], radius_mm: float | N
         return questions
     touches = plan_touches(machine, answers[0], radius_mm)
     return questions + [
-        _coordinate(machine, touches, place, axis, answers) for place in range(len(touches.poses)) for axis in range(3)
+        _coordinate(machine, touches, touch, axis, answers) for touch in range(len(touches.poses)) for axis in range(3)
     ]
 
 
-def _coordinate(machine: Machine, touches: TouchPlan, place: int, axis: int, answers: Sequence[Answer]) -> Question:
-    pose = touches.poses[place]
-    near = _expected(machine, touches, place)[:, axis]
+def _coordinate(machine: Machine, touches: TouchPlan, touch: int, axis: int, answers: Sequence[Answer]) -> Question:
+    pose = touches.poses[touch]
+    near = _expected(machine, touches, touch)[:, axis]
     least, most = (machine.x, machine.y, machine.z)[axis].limits_mm
-    level = [z for k, z in enumerate(answers[4::3]) if z is not None and k != place and _is_level(machine, touches.poses[k])]
+    level = [z for k, z in enumerate(answers[4::3]) if z is not None and k != touch and _is_level(machine, touches.poses[k])]
 
     def impossible(value: float) -> str:
         return "" if least <= value <= most else f"{AXES[axis]}{value:g} is out of reach: {least:g} to {most:g} mm is allowed"
@@ -170,13 +170,13 @@ def _coordinate(machine: Machine, touches: TouchPlan, place: int, axis: int, ans
         return ""
 
     stands = f"{machine.tilt.letter}{pose.tilt_deg:g} {machine.turn.letter}{pose.turn_deg:g}"
-    head = f"touch {place + 1} of {len(touches.poses)}, {stands}, " if axis == 0 else " " * 4
+    head = f"touch {touch + 1} of {len(touches.poses)}, {stands}, " if axis == 0 else " " * 4
     return Question(f"{head}{AXES[axis]} mm (near {_in_words(near)})", None, impossible, doubtful)
 
 
-def _expected(machine: Machine, touches: TouchPlan, place: int) -> np.ndarray:
+def _expected(machine: Machine, touches: TouchPlan, touch: int) -> np.ndarray:
     """(4, 3) X Y Z of a touch by the profile, whichever way the axes go where their signs are uncalibrated."""
-    pose, mark = touches.poses[place], np.array([touches.mark_mm])
+    pose, mark = touches.poses[touch], np.array([touches.mark_mm])
     points = []
     for tilt_sign, turn_sign in SIGNS:
         tilt = machine.tilt.zero_deg + tilt_sign * machine.tilt.sign * (pose.tilt_deg - machine.tilt.zero_deg)

@@ -43,10 +43,10 @@ def _origin(model: Frozen, key: str) -> str:
     if not isinstance(model, Machine):
         return ""
     steps = key.split(".")
-    places = [".".join(steps[:k]) for k in range(len(steps), 1, -1)]
-    if any(place in model.uncalibrated for place in places):
+    paths = [".".join(steps[:k]) for k in range(len(steps), 1, -1)]
+    if any(path in model.uncalibrated for path in paths):
         return "UNCALIBRATED"
-    return next((f"from: {model.sources[place]}" for place in places if place in model.sources), "")
+    return next((f"from: {model.sources[path]}" for path in paths if path in model.sources), "")
 
 
 def save(name: str, settings: Sequence[str], out: Path) -> int:

@@ -32,7 +32,7 @@ def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, 
     journal of the request is a new one.
     """
     cut_off = read_resumption(journal, printing, named)
-    for sentence in cut_off.told():
+    for sentence in cut_off.sentences():
         say(sentence)
 
     def agrees(question: str) -> bool:

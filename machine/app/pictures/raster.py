@@ -77,7 +77,7 @@ def draw(
     shadow, _ = z_buffer(lit, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS)
     light = Light(shadow, 2.5 / light_scale, light_axes[2])
     colour, bent = _shade(Triangles(screen, lit, normals, paint), face, light, axes)
-    _draw_edges(colour, face, group, depth, bent, 1.0 / scale)
+    _draw_edges(colour, np.where(face < 0, -1, group[face]), depth, bent, 1.0 / scale)
     fine = colour.reshape(size[1], SUPERSAMPLING, size[0], SUPERSAMPLING, 3).mean(axis=(1, 3))
     image: Image = np.clip(np.rint(fine), 0, 255).astype(np.uint8)
     return image
@@ -87,7 +87,7 @@ def corner_normals(mesh: Mesh) -> Floats:
     """(m, 3, 3) unit normal at each corner of each face: the faces around its vertex blended up to the crease angle."""
     order = np.argsort(mesh.faces, axis=None, kind="stable")
     first = np.searchsorted(mesh.faces.ravel()[order], np.arange(len(mesh.vertices) + 1))
-    blended: Floats = _blend(mesh.faces, order // 3, first, mesh.normals, mesh.areas_mm2, CREASE_COSINE)
+    blended: Floats = _blend(mesh.faces, order // 3, first, mesh.normals, mesh.areas_mm2)
     return blended
 
 
@@ -137,15 +137,14 @@ def _dot(a: Any, b: Any) -> float:
 
 
 @kernel
-def _blend(
-    faces: Ints, around: NDArray[np.int64], first: NDArray[np.int64], normals: Floats, areas: Floats, crease: float
-) -> Floats:
+def _blend(faces: Ints, around: NDArray[np.int64], first: NDArray[np.int64], normals: Floats, areas: Floats) -> Floats:
+    """As corner_normals; around: the faces of vertex v from first[v] on."""
     out = np.zeros((len(faces), 3, 3))
     for f in range(len(faces)):
         for k in range(3):
             v = faces[f, k]
             for g in around[first[v] : first[v + 1]]:
-                if _dot(normals[g], normals[f]) >= crease or g == f:
+                if _dot(normals[g], normals[f]) >= CREASE_COSINE or g == f:
                     out[f, k] += areas[g] * normals[g]
             length = np.sqrt(_dot(out[f, k], out[f, k]))
             out[f, k] = out[f, k] / length if length > 0 else normals[f]
@@ -225,30 +224,30 @@ def _shade(triangles: Triangles, face: Ints, light: Light, axes: Floats) -> tupl
 
 
 @kernel
-def _draw_edges(colour: Floats, face: Ints, group: NDArray[np.int64], depth: Floats, bent: Floats, pixel_mm: float) -> None:
-    """Darken pixels at outlines, creases and borders between meshes."""
-    height, width = face.shape
+def _draw_edges(colour: Floats, group: NDArray[np.int64], depth: Floats, bent: Floats, pixel_mm: float) -> None:
+    """Darken pixels at outlines, creases and borders between meshes. group: (h, w) the mesh that a pixel shows, -1: none."""
+    height, width = group.shape
     for row in range(height - 1):
         for column in range(width - 1):
-            f = face[row, column]
+            own = group[row, column]
             for k in range(2):
                 r, c = row + k, column + 1 - k
-                g = face[r, c]
-                if f < 0 and g < 0:
+                near = group[r, c]
+                if own < 0 and near < 0:
                     continue
                 strength = 1.0
-                if f >= 0 and g >= 0:
+                if own >= 0 and near >= 0:
                     n, m = bent[row, column], bent[r, c]
                     slope = (abs(n[0]) + abs(n[1])) / max(n[2], 0.08) + (abs(m[0]) + abs(m[1])) / max(m[2], 0.08)
                     step = abs(depth[row, column] - depth[r, c])
-                    if group[f] != group[g] or step > pixel_mm * (4.0 + 2.0 * slope):
+                    if own != near or step > pixel_mm * (4.0 + 2.0 * slope):
                         strength = 0.50
                     elif _dot(n, m) < 0.80:
                         strength = 0.68
                 else:
                     strength = 0.55
                 if strength < 1.0:
-                    if f >= 0:
+                    if own >= 0:
                         colour[row, column] *= strength
-                    if g >= 0:
+                    if near >= 0:
                         colour[r, c] *= strength

@@ -94,7 +94,7 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
     """A way with what its program comes to."""
     run = program.run
     filament_mm = float(np.max(run.program.filament_mm, initial=0.0))
-    supports = [place for place, kind in enumerate(run.program.types) if kind in SUPPORT]
+    supports = [number for number, kind in enumerate(run.program.types) if kind in SUPPORT]
     support_mm3 = float(run.segment_mm3[np.isin(run.program.type[run.segment_row], supports)].sum())
     seam_mm, stairs_mm2 = 0.0, 0.0
     if program.decomposition is not None:
@@ -107,7 +107,7 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
         support_mm3=support_mm3,
         risky_mm2=max(way.risky_mm2, 0.0),
         message=run.errors[0].message if run.errors else "",
-        unsupported_mm2=sum(place.mm2 for place in run.program.unsupported),
+        unsupported_mm2=sum(area.mm2 for area in run.program.unsupported),
         seam_mm=seam_mm,
         stairs_mm2=stairs_mm2,
         interface_mm3=program.interface_mm3,

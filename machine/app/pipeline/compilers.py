@@ -31,7 +31,7 @@ class Compilers:
         self._asked: set[str] = set()
         self._kernels = 0
         self._working = 0
-        self._told = False
+        self._announced = False
         self._changed = Condition()
 
     def begin(self, bundles: Iterable[str]) -> None:
@@ -50,8 +50,8 @@ class Compilers:
         self.begin(bundles)
         if self._ready(bundles):
             return
-        if not self._told:
-            self._told = True
+        if not self._announced:
+            self._announced = True
             say("compiling the kernels (only the first run that needs them does)")
         with nullcontext(report) if report is not None else reporting() as show:
             while not self._ready(bundles):

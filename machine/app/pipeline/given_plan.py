@@ -38,6 +38,15 @@ def lies_freely(profile: Profile) -> bool:
     return profile.search.effective.objective == "scar" and not any(profile.process.rotate_deg)
 
 
+def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
+    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it
+    lies; None: it was not turned."""
+    if orientation is None:
+        return profile
+    rotate_deg = turned_further(profile.process.rotate_deg, orientation)
+    return profile.model_copy(update={"process": profile.process.model_copy(update={"rotate_deg": rotate_deg})})
+
+
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
     """The profile with the settings that a plan has for single parts, under those of --part. Raises PlanError."""
     if given is None or not given.settings:
@@ -47,15 +56,6 @@ def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
     except ProfileError as error:
         raise PlanError(f"plan {given.name}: {error}") from None
     return with_part_settings(profile, given.settings)
-
-
-def as_it_lies(profile: Profile, orientation: Floats | None) -> Profile:
-    """The profile that reads the model as it lies after a (3, 3) turn; None: it was not turned. A G-code file holds it, so that
-    its plastic can be held against the model later."""
-    if orientation is None:
-        return profile
-    rotate_deg = turned_further(profile.process.rotate_deg, orientation)
-    return profile.model_copy(update={"process": profile.process.model_copy(update={"rotate_deg": rotate_deg})})
 
 
 def check_parts_named(profile: Profile, parts: int) -> None:

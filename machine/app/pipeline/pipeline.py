@@ -12,7 +12,7 @@ from machine.app.output import write_bytes
 from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
-from machine.app.pipeline.given_plan import as_it_lies, check_parts_named, lays_down, read_given_plan, with_plan_settings
+from machine.app.pipeline.given_plan import as_turned, check_parts_named, lays_down, read_given_plan, with_plan_settings
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.advice import laid_in_words
@@ -97,7 +97,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     for note in (*decomposition.notes, *notes):
         say(f"{request.name}: {note}")
     plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
-    decomposition, profile = in_copies(decomposition, request.copies, as_it_lies(profile, orientation))
+    decomposition, profile = in_copies(decomposition, request.copies, as_turned(profile, orientation))
     return Decomposed(decomposition, profile, plan, read_s, perf_counter() - began)
 
 

@@ -101,7 +101,7 @@ def follow_there(server: PrintServer, now: JobStatus, observers: Observers, pers
 
     Raises ServerError, FirmwareError after an emergency stop.
     """
-    progress = ProgressToldByServer()
+    progress = ReportedProgress()
     with _shown(person, observers, UnknownTimeline(), progress) as on_status:
         end = follow_print(server, now.file, 0, on_status=on_status, control=person.control, left=person.gone, running=now)
     _report_end(end, file_name(now), server.name, progress)
@@ -115,7 +115,7 @@ def file_name(status: JobStatus) -> str:
 
 @contextmanager
 def _shown(
-    person: ServerAttendance, observers: Observers, timeline: Timeline, progress: "ProgressToldByServer"
+    person: ServerAttendance, observers: Observers, timeline: Timeline, progress: "ReportedProgress"
 ) -> Iterator[OnStatus]:
     """Takes what the server tells, and shows it."""
     with person.show(observers, timeline) as display:
@@ -134,7 +134,7 @@ def _shown(
             raise
 
 
-def _report_end(end: End, file: str, server: str, progress: "ProgressToldByServer") -> None:
+def _report_end(end: End, file: str, server: str, progress: "ReportedProgress") -> None:
     if end is End.STOPPED:
         raise FirmwareError(f"{STOPPED.format(server=server)}{progress.last_known}")
     if end is End.DONE:
@@ -145,29 +145,29 @@ def _report_end(end: End, file: str, server: str, progress: "ProgressToldByServe
     say(f"tiltprint: interrupted; {said[end]}")
 
 
-class ProgressToldByServer:
+class ReportedProgress:
     """What a server tells of a print whose program is not known here, as the progress of a print."""
 
     def __init__(self) -> None:
         self.line, self.elapsed_s = 0, 0.0
-        self._told: JobStatus | None = None  # last
-        self._told_s = monotonic()
+        self._last_status: JobStatus | None = None
+        self._last_status_s = monotonic()
 
     @property
     def last_known(self) -> str:
         """The temperatures that were told last, behind the last words of a print."""
-        return "" if self._told is None else last_known(self._told.temperature, monotonic() - self._told_s)
+        return "" if self._last_status is None else last_known(self._last_status.temperature, monotonic() - self._last_status_s)
 
     def at(self, status: JobStatus, message: str) -> Progress:
         """The progress at a moment. message: goes before the server's own."""
-        if status is not self._told:  # a server that does not answer leaves what it told last
-            self._told, self._told_s = status, monotonic()
+        if status is not self._last_status:  # a server that does not answer leaves what it told last
+            self._last_status, self._last_status_s = status, monotonic()
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s or 0.0)
         return Progress(
             elapsed_s=self.elapsed_s,
             share=status.share,
             temperature=status.temperature,
-            heat_age_s=monotonic() - self._told_s,
+            heat_age_s=monotonic() - self._last_status_s,
             state=status.phase.value,
             feed_percent=status.feed_percent or 100.0,
             flow_percent=status.flow_percent or 100.0,
@@ -175,13 +175,13 @@ class ProgressToldByServer:
         )
 
 
-class ServerProgress(ProgressToldByServer):
+class ServerProgress(ReportedProgress):
     """The same of a known program; part and layer are those of the place up to which the server has read the file."""
 
     def __init__(self, upload: GcodeUpload, lines: tuple[str, ...], remaining_s: Callable[[int], float]) -> None:
         super().__init__()
         self._line_at, self._lines, self._remaining_s = upload.line_at, lines, remaining_s
-        self._place = ProgramPosition()
+        self._position = ProgramPosition()
 
     def at(self, status: JobStatus, message: str) -> Progress:
         """The progress at a moment. message: goes before the server's own."""
@@ -194,17 +194,17 @@ class ServerProgress(ProgressToldByServer):
             total=len(self._lines),
             file_line=self.line,
             left_s=self._remaining_s(self.line) * 100.0 / progress.feed_percent,
-            share=self._place.share(self.line, len(self._lines)),
-            part=self._place.part,
-            parts=self._place.parts,
-            layer=self._place.layer,
+            share=self._position.share(self.line, len(self._lines)),
+            part=self._position.part,
+            parts=self._position.parts,
+            layer=self._position.layer,
         )
 
     def _read_to(self, line: int) -> None:
         for text in self._lines[self.line : line]:
-            self._place.read_comment(text)
+            self._position.read_comment(text)
             if text[:1] in "Mm":
-                self._place.read_m73(text.partition(";")[0], self.elapsed_s)
+                self._position.read_m73(text.partition(";")[0], self.elapsed_s)
         self.line = max(self.line, line)
 
 

@@ -70,11 +70,12 @@ class Resumption:
         """What was printed."""
         return self.story.heading.name
 
-    def told(self) -> tuple[str, ...]:
+    def sentences(self) -> tuple[str, ...]:
         """Where it was cut off, as sentences for a person."""
-        place, at = self.point.position, self.point.modal.at
-        where = [f"part {place.part}" + (f" of {place.parts}" if place.parts else "")] if place.part is not None else []
-        where += [f"layer {place.layer}"] if place.layer is not None else []
+        position, at = self.point.position, self.point.modal.at
+        of_parts = f" of {position.parts}" if position.parts else ""
+        where = [f"part {position.part}{of_parts}"] if position.part is not None else []
+        where += [f"layer {position.layer}"] if position.layer is not None else []
         letters = self.point.modal.axes.letters
         known = [f"{letter} {value:.3f}" for letter, value in zip(letters[:5], at[:5], strict=True) if value is not None]
         torn = self.story.torn
@@ -211,17 +212,17 @@ def _question(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> str
         return reason
     (x, y, z), pose = position_at_interruption(point, profile)
     tilt, turn, machine = pose.tilt_deg, pose.turn_deg, profile.machine
-    place = f"tip at X {x:.1f} Y {y:.1f} Z {z:.2f}"
+    tip = f"tip at X {x:.1f} Y {y:.1f} Z {z:.2f}"
     heights = heights_mm(point)
     if point.checkpoint.state not in PARKED and len(heights) > 1:
-        place += f" (or up to {heights[-1] - heights[0]:.2f} mm higher)"
+        tip += f" (or up to {heights[-1] - heights[0]:.2f} mm higher)"
     if hypot(tilt, turn) > 0:
         turns = f", {int(turn // 360)} whole turns and {turn % 360:.3f}" if abs(turn) >= 360 else ""
-        place += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"
+        tip += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"
     if machine.gcode.resume:
-        return f"{reason}\nit was cut off with the {place}\nthen: machine.gcode.resume homes the axes, bed and nozzle heat"
+        return f"{reason}\nit was cut off with the {tip}\nthen: machine.gcode.resume homes the axes, bed and nozzle heat"
     return (
-        f"{reason}\nlook first: all must stand as it was cut off, {place}\n"
+        f"{reason}\nlook first: all must stand as it was cut off, {tip}\n"
         "if anything was moved since, answer no, for only X and Y will be homed, Z and the table will not\n"
         "then: bed and nozzle heat where the tip stands, the tip rises, X and Y are homed"
     )

@@ -58,7 +58,7 @@ class Watched:
         self.token = secrets.token_urlsafe(16)
         self._progress: Progress | None = None
         self._ended = ""
-        self._asked, self._told = Event(), Event()
+        self._asked, self._end_reported = Event(), Event()
 
     def follow(self, progress: Progress) -> None:
         """Take note of where the print stands."""
@@ -68,14 +68,14 @@ class Watched:
         """The state as JSON."""
         self._asked.set()
         if self._ended:
-            self._told.set()
+            self._end_reported.set()
         return json.dumps(state_of(self._progress, self._ended)).encode()
 
     def end(self, state: str) -> None:
         """Say once how the print ended, and wait a moment for those who have asked before to hear it."""
         self._ended = self._ended or state
         if self._asked.is_set():
-            self._told.wait(LAST_WORD_S)
+            self._end_reported.wait(LAST_WORD_S)
 
 
 @contextmanager

@@ -37,7 +37,7 @@ class ScreenState:
 def render(state: ScreenState, now: datetime) -> RenderableType:
     """The whole screen at a moment."""
     progress = state.progress
-    lines = [_head(state), _place(state), _heat(progress), _bar(progress), _times(progress, now), *_words(state.words)]
+    lines = [_head(state), _position(state), _heat(progress), _bar(progress), _times(progress, now), *_words(state.words)]
     if state.hint or state.keys:
         lines.append(Text(plain_line(state.hint or KEYS), style="bold yellow" if state.hint else "dim"))
     return Group(*lines)
@@ -52,7 +52,7 @@ def _head(state: ScreenState) -> RenderableType:
     return row
 
 
-def _place(state: ScreenState) -> Text:
+def _position(state: ScreenState) -> Text:
     progress, timeline = state.progress, state.timeline
     phrases = []
     if progress.part is not None:

@@ -14,7 +14,7 @@ from machine.dryrun.conformity.deposit import AROUND, inside
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.strokes import beads_of
 from machine.reader.parsed import pose_runs
-from mdp.kernels.arrays import floats, longs
+from mdp.kernels.arrays import flags, floats, longs
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Mesh
 from mdp.pose import rotation
@@ -70,9 +70,8 @@ def printing_directions(run: DryRun, profile: Profile) -> Floats:
 
 def in_beads(places: Floats, segments: Floats, ups: Floats, width: Floats, height: Floats) -> NDArray[np.bool_]:
     """(n,) whether (n, 3) places lie in one of the bars below (m, 2, 3) segments, their tops."""
-    hit = np.zeros(len(places), dtype=np.bool_)
     if not len(segments) or not len(places):
-        return hit
+        return np.zeros(len(places), dtype=np.bool_)
     origin = places.min(axis=0) - 1.0
     size = places.max(axis=0) + 1.0 - origin
     cell = max(CELL_MM, float(np.cbrt(size.prod() / MOST_CELLS)))
@@ -81,8 +80,8 @@ def in_beads(places: Floats, segments: Floats, ups: Floats, width: Floats, heigh
     key = (cells[:, 0] * shape[1] + cells[:, 1]) * shape[2] + cells[:, 2]
     order = np.argsort(key, kind="stable")
     first = np.searchsorted(key[order], np.arange(shape.prod() + 1))
-    _mark_places(Places(places, order, first, origin, cell, shape), segments, ups, width, height, hit)
-    return hit
+    marked: NDArray[np.bool_] = _places_in_bars(Places(places, order, first, origin, cell, shape), segments, ups, width, height)
+    return marked
 
 
 class Places(NamedTuple):
@@ -123,9 +122,9 @@ def _in_bar(p: Floats, bar: Bar) -> bool:
 
 
 @kernel
-def _mark_places(places: Places, segments: Floats, ups: Floats, width: Floats, height: Floats, hit: NDArray[np.bool_]) -> None:
-    """Mark the places in every bar: those of the cubes that its box touches, piece by piece."""
-    d, low, high = floats(3, 0.0), longs(3, 0), longs(3, 0)
+def _places_in_bars(places: Places, segments: Floats, ups: Floats, width: Floats, height: Floats) -> NDArray[np.bool_]:
+    """(n,) which places lie in a bar: those of the cubes that its box touches are tried, piece by piece."""
+    hit, d, low, high = flags(len(places.points)), floats(3, 0.0), longs(3, 0), longs(3, 0)
     origin, cell, shape = places.origin, places.cell, places.shape
     for i in range(len(segments)):
         a, b = segments[i, 0], segments[i, 1]
@@ -151,3 +150,4 @@ def _mark_places(places: Places, segments: Floats, ups: Floats, width: Floats, h
                         p = places.order[q]
                         if not hit[p] and _in_bar(places.points[p], bar):
                             hit[p] = True
+    return hit

@@ -50,7 +50,7 @@ def plan_park(modal: ModalState, profile: Profile | None, bounds: PrintedBounds 
 
 def lift_move(modal: ModalState, machine: Machine) -> tuple[str, float] | None:
     """Words and mm/min of a step that takes the tip away from the print; None where its place is not known or at the top."""
-    standing = axis_position(machine, modal.place(), modal.follows)
+    standing = axis_position(machine, modal.coordinates(), modal.follows)
     if standing is None:
         return None
     at, pose = standing
@@ -97,7 +97,7 @@ def _moves(modal: ModalState, profile: Profile | None, bounds: PrintedBounds | N
     if profile is None or bounds is None:
         return [], [], None
     machine, following = profile.machine, modal.follows
-    standing = axis_position(machine, modal.place(), following)
+    standing = axis_position(machine, modal.coordinates(), following)
     if standing is None:
         return [], [], None
     at, pose = standing
@@ -118,8 +118,8 @@ def _moves(modal: ModalState, profile: Profile | None, bounds: PrintedBounds | N
     return up, down, park
 
 
-def _words(place: tuple[float, float, float]) -> str:
-    return f"X{place[0]:.3f} Y{place[1]:.3f}"
+def _words(point: tuple[float, float, float]) -> str:
+    return f"X{point[0]:.3f} Y{point[1]:.3f}"
 
 
 def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> list[str]:
@@ -130,9 +130,9 @@ def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> lis
     return [f"Z{park.lift_mm[2]:.3f}", *map(_words, stops[1:])]
 
 
-def axis_position(machine: Machine, place: tuple[float | None, ...], following: bool) -> tuple[Floats, Pose] | None:
+def axis_position(machine: Machine, coordinates: tuple[float | None, ...], following: bool) -> tuple[Floats, Pose] | None:
     """(3,) axis positions and the pose of a place as the program calls it; None where a coordinate is not known."""
-    x, y, z, tilt, turn = place[:5]
+    x, y, z, tilt, turn = coordinates[:5]
     if x is None or y is None or z is None:
         return None
     pose = Pose(machine.tilt.zero_deg if tilt is None else tilt, machine.turn.zero_deg if turn is None else turn)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import inf
 
 from machine.firmware import dialect_of
-from machine.gcode.modal_state import MOVES, ModalState, Place
+from machine.gcode.modal_state import MOVES, Coordinates, ModalState
 from machine.gcode.pen import number
 from machine.link.exchange import Exchange
 from machine.link.pause.park_moves import fill_commands, heat_commands, plan_park
@@ -37,7 +37,7 @@ class Pause:
     reports: PrinterReports
     modal: ModalState
     profile: Profile | None
-    stands: Place | None = None
+    stands: Coordinates | None = None
     aside: bool = False
     off: bool = False
     printing_c: float = 0.0  # the nozzle's target where the print stopped
@@ -49,7 +49,7 @@ class Pause:
         self._send(moves.away)
         self.exchange.drain()
         self.aside = moves.park is not None
-        self.stands = (*moves.park.stand_mm, *modal.at[3:]) if moves.park is not None else modal.place()
+        self.stands = (*moves.park.stand_mm, *modal.at[3:]) if moves.park is not None else modal.coordinates()
         yield "paused", why
         for words in self._wait(why):
             yield "paused", words

@@ -5,8 +5,8 @@ from itertools import product
 
 import numpy as np
 
-from machine.gcode.arcs import arc_box, told_centre
-from machine.gcode.modal_state import ModalState, Place
+from machine.gcode.arcs import arc_box, arc_centre
+from machine.gcode.modal_state import Coordinates, ModalState
 from machine.gcode.words import read_words, split_command
 from machine.kinematics.collision import Printed
 from machine.kinematics.coordinates import origin_mm
@@ -26,19 +26,19 @@ class PrintedBounds:
 
     def track(self, modal: ModalState, command: str) -> tuple[bool, bool]:
         """Hand a command to `modal` and keep the boxes in step; whether it moves something, and whether it extrudes."""
-        before, pulled = modal.place(), modal.pulled_mm
+        before, pulled = modal.coordinates(), modal.pulled_mm
         if not modal.take(command):
             return False, False
         extrudes = modal.pushed_mm > 0.0 and not pulled
         if extrudes:
-            after = modal.place()
-            for place in (before, *_far_corners(modal, command, before, after), after):
-                self.extrude_to(place)
+            after = modal.coordinates()
+            for coordinates in (before, *_far_corners(modal, command, before, after), after):
+                self.extrude_to(coordinates)
         return True, extrudes
 
-    def extrude_to(self, place: Place) -> None:
+    def extrude_to(self, coordinates: Coordinates) -> None:
         """Filament was pushed on the way to a place, X Y Z tilt turn."""
-        x, y, z, tilt, turn = place[:5]
+        x, y, z, tilt, turn = coordinates[:5]
         if x is None or y is None or z is None:
             return
         tilt = self.machine.tilt.zero_deg if tilt is None else tilt
@@ -65,7 +65,7 @@ class PrintedBounds:
         return Printed(np.vstack(corners), BEAD_MM)
 
 
-def _far_corners(modal: ModalState, command: str, before: Place, after: Place) -> list[Place]:
+def _far_corners(modal: ModalState, command: str, before: Coordinates, after: Coordinates) -> list[Coordinates]:
     """Corners of the box around an arc that was just taken, at the pose and height of its end; none of another move."""
     name, rest = split_command(command.upper())
     words = modal.axes.words
@@ -73,7 +73,7 @@ def _far_corners(modal: ModalState, command: str, before: Place, after: Place) -
         return []
     shape = {letter: value * modal.modes.unit_mm for letter, value in read_words(rest) if letter in "IJR" and letter not in words}
     start, end = (before[0], before[1]), (after[0], after[1])
-    centre = told_centre(start, end, shape, name == "G2")
+    centre = arc_centre(start, end, shape, name == "G2")
     if centre is None:
         return []
     return [(*corner, *after[2:]) for corner in arc_box(start, end, centre, name == "G2")]

@@ -47,11 +47,11 @@ def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
     )
 
 
-def command_of(line: str, place: int | str, limit: int = LINE_LIMIT) -> str:
+def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
     """The command in a line of a program, without comment and blanks; "" when there is none.
 
     A command with a PAUSE_REMARK is the sender's own affair and counts as none.
-    place: the line's number in the program, or what it is called, for messages. Raises LocalProtocolError for a character
+    source: the line's number in the program, or what it is called, for messages. Raises LocalProtocolError for a character
     outside printable ASCII, for a `*`, and for commands that only the sender itself may give.
     """
     command, _, remark = line.partition(";")
@@ -62,21 +62,21 @@ def command_of(line: str, place: int | str, limit: int = LINE_LIMIT) -> str:
         command = command.replace("\t", " ")
         bad = next((c for c in command if not (c.isascii() and c.isprintable())), None)
         if bad is not None:
-            raise LocalProtocolError(f"{_called(place)} holds the character {bad!r}: only printable ASCII can be sent")
+            raise LocalProtocolError(f"{_called(source)} holds the character {bad!r}: only printable ASCII can be sent")
     if "*" in command:
-        raise LocalProtocolError(f"{_called(place)} ({command[:40]!r}) holds a '*': checksums are added by the sender")
+        raise LocalProtocolError(f"{_called(source)} ({command[:40]!r}) holds a '*': checksums are added by the sender")
     if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
-        raise LocalProtocolError(f"{_called(place)} holds {name_of(command)}, which {reason}: remove it from the program")
+        raise LocalProtocolError(f"{_called(source)} holds {name_of(command)}, which {reason}: remove it from the program")
     if len(command) > limit - FRAME_CHARACTERS:
         raise LocalProtocolError(
-            f"{_called(place)} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
+            f"{_called(source)} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
             f"{limit} are allowed, {limit - FRAME_CHARACTERS} without"
         )
     return command
 
 
-def _called(place: int | str) -> str:
-    return f"line {place}" if isinstance(place, int) else place
+def _called(source: int | str) -> str:
+    return f"line {source}" if isinstance(source, int) else source
 
 
 def name_of(command: str) -> str:

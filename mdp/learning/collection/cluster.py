@@ -16,9 +16,9 @@ from distributed.system import MEMORY_LIMIT
 
 from profiles.errors import LearningError
 
-REACHED_WITHIN_S = 10.0
-POLL_S = 0.1
-CLOSED_WITHIN_S = 1.0
+REACHED_WITHIN_S = 10.0  # a scheduler that is there, also by a slow network
+POLL_S = 0.1  # Ctrl-C is answered within that
+CLOSED_WITHIN_S = 1.0  # a scheduler that is gone does not answer the goodbye either
 
 Key = TypeVar("Key")
 

@@ -19,7 +19,7 @@ from profiles.errors import LearningError, MeshError
 
 ARRAYS = ".npz"
 MOST_MOVED = 0.002  # share of the diagonal by which a coarser surface may lie off
-FINEST_MOVED = MOST_MOVED / 2**8
+FINEST_MOVED = MOST_MOVED / 2**8  # tried first, then twice as much each time: at most nine simplifications
 SIDES_APART_DEG = 20.0  # directions of two sides that count as different
 TURN_DEG = 137.5  # the golden angle: no two turns come close to each other
 

@@ -11,10 +11,10 @@ from mdp.learning.labels import RatedList
 from mdp.learning.ndcg import Measure, Scores, at, best_within, full_lists, interval, regret
 from mdp.mesh import Floats
 
-CUTS = (1, 2, 3, 4, 5)
-FIRST = (1, 2, 5)
+CUTS = (1, 2, 3, 4, 5)  # of the NDCG, as the paper's table has them
+FIRST = (1, 2, 5)  # so many candidates are followed
 SEVERAL = 20  # candidates from which a list is no short one
-SIZES = ((2, 5), (6, 10), (11, 20), (21, 35), (36, 49), (50, 10_000))
+SIZES = ((2, 5), (6, 10), (11, 20), (21, 35), (36, 49), (50, 10_000))  # of lists, the last ones full (mdp.learning.ndcg.FULL)
 
 Given = Sequence[Floats]  # the scores of every list
 
@@ -73,13 +73,15 @@ def regret_table(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
 
 def by_size(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
     """A row a ranker, a column a range of sizes."""
-    rows = [[row for row, rated in enumerate(lists) if low <= len(rated.ratings) <= high] for low, high in SIZES]
+    columns = [[row for row, rated in enumerate(lists) if low <= len(rated.ratings) <= high] for low, high in SIZES]
     named = [f"{low}-{high}" if high < SIZES[-1][1] else f"{low} and more" for low, high in SIZES]
     lines = [_row("ranker", named), "|---|" + "---:|" * len(SIZES)]
-    lines.append(_row("lists", [str(len(each)) for each in rows]))
+    lines.append(_row("lists", [str(len(rows)) for rows in columns]))
     for name, scores in given.items():
         ends = [measured(at(cut), scores, lists) for cut in (CUTS[0], CUTS[-1])]
-        lines.append(_row(name, [" / ".join(f"{values[each].mean():.3f}" for values in ends) if each else "-" for each in rows]))
+        lines.append(
+            _row(name, [" / ".join(f"{values[rows].mean():.3f}" for values in ends) if rows else "-" for rows in columns])
+        )
     return "\n".join(lines)
 
 

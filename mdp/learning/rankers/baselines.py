@@ -19,7 +19,7 @@ GRADES = (0.2, 0.06, 0.02, 0.005, 1e-6)  # a candidate's grade is how many of th
 # The settings of XGBoost's own ranking demo, which the paper names, with the paper's depth and rounds.
 XGBOOST = {"max_depth": 8, "eta": 0.1, "gamma": 1.0, "min_child_weight": 0.1, "tree_method": "hist", "nthread": 1, "seed": 0}
 XGBOOST_PAIRS = {"lambdarank_pair_method": "mean", "lambdarank_num_pair_per_sample": 1}  # as that demo drew them in 2020
-XGBOOST_ROUNDS = 500
+XGBOOST_ROUNDS = 500  # the paper's
 LIGHTGBM = {
     "objective": "lambdarank",
     "metric": "ndcg",
@@ -33,7 +33,7 @@ LIGHTGBM = {
     "seed": 0,
     "verbosity": -1,
 }
-LIGHTGBM_ROUNDS, LIGHTGBM_PATIENCE = 1000, 50
+LIGHTGBM_ROUNDS, LIGHTGBM_PATIENCE = 1000, 50  # validation ends it: after 50 rounds, a twentieth, that better nothing
 
 Lists = Sequence[RatedList]
 Columns = Sequence[str]

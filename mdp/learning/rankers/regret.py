@@ -19,13 +19,13 @@ from mdp.learning.rankers.objective import FAR_BELOW, Figures, Objective, Padded
 from mdp.mesh import Floats
 from mdp.ranking.network import INPUT
 
-HIDDEN = (32, 32)
+HIDDEN = (32, 32)  # an ensemble of them stays below 200 kB (mdp.learning.train)
 TRADE_OFFS = (1.0, 4.0, 16.0)  # of M6 against M2
 SMALLEST_RANGE = 1e-4  # features that differ less over a list are hardly told apart: a share of 1e-4 is no reason
 SMALLEST_SPREAD = 1e-6  # an input that spreads less over all lists is the same everywhere
 LEAST_PART = 0.3  # of a list that a step sees
 PERCENT, MOST_REGRET, ENTROPY_WEIGHT = 100.0, 1.0, 0.005  # a list costs 1 at most; entropy keeps scores from running away
-FIRST = (1, 2)
+FIRST = (1, 2)  # candidates: by the regret of the best of them a training is validated
 
 
 def regret_loss(scores: torch.Tensor, regrets: torch.Tensor, present: torch.Tensor) -> torch.Tensor:

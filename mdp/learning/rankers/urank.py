@@ -15,8 +15,8 @@ from mdp.learning.ndcg import Scores, ndcg
 from mdp.learning.rankers.objective import FAR_BELOW, Figures, Loss, Objective, Targets
 from mdp.mesh import Floats
 
-HIDDEN = (100, 100)
-CUTS = (1, 3, 5)
+HIDDEN = (100, 100)  # as the paper's network
+CUTS = (1, 3, 5)  # of the NDCG that a training is validated by
 
 
 class Network(torch.nn.Module):

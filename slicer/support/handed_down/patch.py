@@ -27,7 +27,7 @@ class Patch:
         deep_mm = self.gap_mm + DEEP_MM
         layers = plane.layers_near(self.places, deep_mm)
         begins = {layer: self.under(plane, layer, deep_mm) for layer in layers if layer < count}
-        return {layer: place for layer, place in begins.items() if not place.is_empty()}
+        return {layer: area for layer, area in begins.items() if not area.is_empty()}
 
 
 def keep_off(bodies: Sequence[Polygons], patches: Sequence[Patch], plane: BasePlane, gap_mm: float) -> list[Polygons]:

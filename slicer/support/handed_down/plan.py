@@ -81,9 +81,9 @@ def _extents(own: Sequence[Supports]) -> list[tuple[Floats, float]]:
         tops[k] = max(tops[k], top_mm)
 
     for k in range(len(own) - 1, 0, -1):
-        for layer, place in enumerate(own[k].missed):
-            if not place.is_empty():
-                bounds = np.array(place.bounds())
+        for layer, area in enumerate(own[k].missed):
+            if not area.is_empty():
+                bounds = np.array(area.bounds())
                 take(k, bounds[:2], bounds[2:], float(own[k].sections.heights.tip_mm[layer]))
         x0, y0, x1, y1 = boxes[k]
         for m in range(k if x0 < x1 else 0):
@@ -153,24 +153,24 @@ def _reached(room: Room, later: Sections, window: Polygons) -> Polygons:
 def _hand_down(room: Room, own: Supports, later: Sequence[HandedDown]) -> HandedDown:
     """The support that a part's own misses, and that later parts ask for."""
     sections, areas = room.sections, room.areas
-    planes = [BasePlane.seen_from(sections, other.room.sections, room.far_mm) for other in later]
+    planes = [BasePlane.seen_from(sections, upper.room.sections, room.far_mm) for upper in later]
     begins: dict[int, list[Polygons]] = {}
-    for plane, other in zip(planes, later, strict=True):
-        for patch in other.patches:
-            for layer, place in patch.begins(plane, len(areas.reachable)).items():
-                begins.setdefault(layer, []).append(place)
+    for plane, upper in zip(planes, later, strict=True):
+        for patch in upper.patches:
+            for layer, area in patch.begins(plane, len(areas.reachable)).items():
+                begins.setdefault(layer, []).append(area)
     wanted = [Polygons()] * len(own.missed) if sections.on_platform else own.missed
     grown = grow(wanted, {layer: union(places) for layer, places in begins.items()}, areas)
     bodies = grown.bodies
-    for plane, other in zip(planes, later, strict=True):
-        bodies = keep_off(bodies, other.patches, plane, sections.process.support_distance_mm)
+    for plane, upper in zip(planes, later, strict=True):
+        bodies = keep_off(bodies, upper.patches, plane, sections.process.support_distance_mm)
     grown = replace(grown, bodies=bodies)
     return HandedDown(room, grown, () if sections.on_platform else _patches(room, bodies, wanted))
 
 
 def _patches(room: Room, bodies: Sequence[Polygons], wanted: Sequence[Polygons]) -> list[Patch]:
     """What of a part and of its support hangs over its base plane."""
-    patches = [Patch(place, _gap_mm(room.areas, layer)) for layer, place in _hanging_low(room.areas, wanted)]
+    patches = [Patch(area, _gap_mm(room.areas, layer)) for layer, area in _hanging_low(room.areas, wanted)]
     if bodies and not bodies[0].is_empty():
         patches.append(Patch(bodies[0] - _own_placeable(room), 0.0))
     return [patch for patch in patches if patch.places.area() >= LEAST_MM2]
@@ -179,7 +179,7 @@ def _patches(room: Room, bodies: Sequence[Polygons], wanted: Sequence[Polygons])
 def _hanging_low(areas: ReachableAreas, wanted: Sequence[Polygons]) -> list[tuple[int, Polygons]]:
     """The hanging places that support above the base plane has no room under, with their layers."""
     low = enumerate(wanted[: int(np.searchsorted(areas.bottom_mm, areas.process.support_gap_mm + 1.0))])
-    return [(k, place) for k, place in low if not place.is_empty() and not len(areas.carrying_layers(k))]
+    return [(k, area) for k, area in low if not area.is_empty() and not len(areas.carrying_layers(k))]
 
 
 def _gap_mm(areas: ReachableAreas, layer: int) -> float:

@@ -17,8 +17,8 @@ POINT = 0.3  # of its half thickness: a piece of the axis shorter than that is a
 FLICKER = 2.0  # nominal spacings: a shorter stretch keeps the count of its neighbours where beads can be as wide
 ROUNDS = 4  # of taking out such stretches
 ALIKE = 1.1  # the thickest point of a place belongs to an axis beside it where it is not thicker by this factor
-SAME_MM = 1e-6
-MOST_HOPS = 8
+SAME_MM = 1e-6  # radii that differ by less are equal
+MOST_HOPS = 8  # from node to node; two that lead to each other would go on for ever
 
 
 class Counts(NamedTuple):
@@ -46,8 +46,8 @@ class _Pieces(NamedTuple):
 def count_beads(across: Ints, skeleton: Skeleton, rule: Rule) -> Counts:
     """The counts of a skeleton; clears `central` where a limb of the axis is too short to have a count of its own."""
     size = len(skeleton.radii)
-    beads, one = ints(size, 0), ints(size, 1)
-    _drop_stubs(across, skeleton, _pieces(across, skeleton, one), STUB * rule.inner)
+    beads, uniform = ints(size, 0), ints(size, 1)
+    _drop_stubs(across, skeleton, _pieces(across, skeleton, uniform), STUB * rule.inner)
     for t in range(size):
         beads[t] = bead_count(rule, skeleton.radii[t])
     for _ in range(ROUNDS):
@@ -72,14 +72,15 @@ def _pieces(across: Ints, skeleton: Skeleton, value: Ints) -> _Pieces:
             t = stack[waiting]
             low[many], high[many] = min(low[many], skeleton.radii[t]), max(high[many], skeleton.radii[t])
             for h in range(3 * t, 3 * t + 3):
-                other = across[h] // 3
+                beyond = across[h] // 3
                 if skeleton.central[h]:
                     step = 0.5 * np.hypot(
-                        skeleton.centres[t, 0] - skeleton.centres[other, 0], skeleton.centres[t, 1] - skeleton.centres[other, 1]
+                        skeleton.centres[t, 0] - skeleton.centres[beyond, 0],
+                        skeleton.centres[t, 1] - skeleton.centres[beyond, 1],
                     )
                     length[many] += step
-                    if value[other] == value[t] and of[other] < 0:
-                        of[other], stack[waiting] = many, other
+                    if value[beyond] == value[t] and of[beyond] < 0:
+                        of[beyond], stack[waiting] = many, beyond
                         waiting += 1
         many += 1
     return _Pieces(of, many, length, low, high)
@@ -108,12 +109,12 @@ def _smooth(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> bool:
         piece = pieces.of[h // 3]
         if not skeleton.central[h] or pieces.length[piece] > FLICKER * rule.inner:
             continue
-        other = pieces.of[across[h] // 3]
+        next_piece = pieces.of[across[h] // 3]
         count = beads[across[h] // 3]
-        if count == beads[h // 3] or pieces.length[other] <= max(longest[piece], pieces.length[piece]):
+        if count == beads[h // 3] or pieces.length[next_piece] <= max(longest[piece], pieces.length[piece]):
             continue
         if _suits(rule, count, pieces.low[piece], pieces.high[piece]):
-            best[piece], longest[piece] = count, pieces.length[other]
+            best[piece], longest[piece] = count, pieces.length[next_piece]
     changed = False
     for t in range(len(beads)):
         piece = pieces.of[t]
@@ -172,17 +173,17 @@ def _roots(across: Ints, skeleton: Skeleton) -> NDArray[np.int64]:
         if _on_axis(skeleton, t):
             continue
         for h in range(3 * t, 3 * t + 3):
-            other = across[h] // 3
-            if across[h] >= 0 and root[other] >= 0 and (root[t] == t or radii[other] > falling[t]):
-                root[t], falling[t] = root[other], radii[other]
+            beyond = across[h] // 3
+            if across[h] >= 0 and root[beyond] >= 0 and (root[t] == t or radii[beyond] > falling[t]):
+                root[t], falling[t] = root[beyond], radii[beyond]
     for t in range(len(radii)):
         if root[t] != t or _on_axis(skeleton, t):
             continue
         for h in range(3 * t, 3 * t + 3):  # of nodes as good as equal one comes first, and need not be the one that leads up
-            other = across[h] // 3
-            alike = radii[other] > radii[t] - SAME_MM or (_on_axis(skeleton, other) and radii[t] < ALIKE * radii[other])
-            if across[h] >= 0 and root[other] != t and alike:
-                hop[t] = root[other]
+            beyond = across[h] // 3
+            alike = radii[beyond] > radii[t] - SAME_MM or (_on_axis(skeleton, beyond) and radii[t] < ALIKE * radii[beyond])
+            if across[h] >= 0 and root[beyond] != t and alike:
+                hop[t] = root[beyond]
     for t in range(len(radii)):
         for _ in range(MOST_HOPS):
             if hop[root[t]] >= 0:

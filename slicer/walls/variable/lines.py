@@ -72,14 +72,14 @@ def _join(lines: dict[int, Line], at: dict[int, list[int]], node: int, members: 
         return
     leaving = {k: lines[k] if lines[k].ends[0] == node else lines[k].reversed for k in members}
     a, b = min(combinations(members, 2), key=lambda pair: float(_heading(leaving[pair[0]]) @ _heading(leaving[pair[1]])))
-    one, other = leaving[a].reversed, leaving[b]
-    points, widths = np.concatenate([one.points, other.points[1:]]), np.concatenate([one.widths, other.widths[1:]])
+    into, onward = leaving[a].reversed, leaving[b]
+    points, widths = np.concatenate([into.points, onward.points[1:]]), np.concatenate([into.widths, onward.widths[1:]])
     for k in members:
         if k not in (a, b):
-            lines[k] = replace(leaving[k], taken=(ABUT * float(other.widths[0]), leaving[k].taken[1]))
-    lines[a] = Line(points, widths, one.level, (one.ends[0], other.ends[1]), (one.taken[0], other.taken[1]))
+            lines[k] = replace(leaving[k], taken=(ABUT * float(onward.widths[0]), leaving[k].taken[1]))
+    lines[a] = Line(points, widths, into.level, (into.ends[0], onward.ends[1]), (into.taken[0], onward.taken[1]))
     del lines[b]
-    at[other.ends[1]] = [a if k == b else k for k in at[other.ends[1]]]
+    at[onward.ends[1]] = [a if k == b else k for k in at[onward.ends[1]]]
 
 
 def _heading(line: Line) -> Floats:
@@ -165,10 +165,10 @@ def _taken(across: Ints, skeleton: Skeleton, counts: Counts, rule: Rule, t: int)
     """How much of a line the loop takes that runs across its end, where more beads lie side by side beyond it."""
     taken, level = 0.0, loops_of(rule, counts.beads[t])
     for h in range(3 * t, 3 * t + 3):
-        other = across[h] // 3
-        if across[h] >= 0 and loops_of(rule, counts.beads[other]) > level:
-            width = spacing_of(rule, counts.beads[other], counts.radii[other], level) + rule.round
-            depth = depth_of(rule, counts.beads[other], counts.radii[other], level)
+        next_node = across[h] // 3
+        if across[h] >= 0 and loops_of(rule, counts.beads[next_node]) > level:
+            width = spacing_of(rule, counts.beads[next_node], counts.radii[next_node], level) + rule.round
+            depth = depth_of(rule, counts.beads[next_node], counts.radii[next_node], level)
             beyond = np.sqrt(max(depth * depth - skeleton.radii[t] * skeleton.radii[t], 0.0))
             taken = max(taken, ABUT * width - beyond)
     return taken

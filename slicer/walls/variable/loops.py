@@ -61,14 +61,14 @@ def trace_loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts
             spacing = spacing_of(rule, counts.beads[t], counts.radii[t], level)
             begun = n
             n = _rib(triangulation, skeleton, h, out, n)
-            other = across[h]
-            if other >= 0 and active[other // 3]:
-                n = _turn(triangulation, skeleton, (h, after(other)), out, n)
-                h = after(other)
+            twin = across[h]
+            if twin >= 0 and active[twin // 3]:
+                n = _turn(triangulation, skeleton, (h, after(twin)), out, n)
+                h = after(twin)
             else:
-                if other >= 0:
-                    room_there = loops_of(rule, counts.beads[other // 3]) > level
-                    n = _cross(skeleton, (t, other // 3), depth[t], room_there, out, n)
+                if twin >= 0:
+                    room_there = loops_of(rule, counts.beads[twin // 3]) > level
+                    n = _cross(skeleton, (t, twin // 3), depth[t], room_there, out, n)
                 h = after(h)
             for k in range(begun, n):
                 out.depth[k], out.spacing[k] = depth[t], spacing
@@ -122,12 +122,14 @@ def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, 
 @part
 def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, out: Ribs, n: int) -> int:
     """Adds the place where the loop crosses the axis on the way to a node beyond it."""
-    t, other = nodes
-    here, there = skeleton.radii[t], skeleton.radii[other]
+    t, beyond = nodes
+    here, there = skeleton.radii[t], skeleton.radii[beyond]
     share = 0.0 if there >= depth else (depth - there) / (here - there)
     if not room_there:  # halfway, but no farther than the loop is deep: a node may lie on the other side of a hall
-        away = np.hypot(skeleton.centres[t, 0] - skeleton.centres[other, 0], skeleton.centres[t, 1] - skeleton.centres[other, 1])
+        away = np.hypot(
+            skeleton.centres[t, 0] - skeleton.centres[beyond, 0], skeleton.centres[t, 1] - skeleton.centres[beyond, 1]
+        )
         share = max(share, 0.5 if away <= 2.0 * depth else depth / away)
-    x = skeleton.centres[other, 0] + share * (skeleton.centres[t, 0] - skeleton.centres[other, 0])
-    y = skeleton.centres[other, 1] + share * (skeleton.centres[t, 1] - skeleton.centres[other, 1])
+    x = skeleton.centres[beyond, 0] + share * (skeleton.centres[t, 0] - skeleton.centres[beyond, 0])
+    y = skeleton.centres[beyond, 1] + share * (skeleton.centres[t, 1] - skeleton.centres[beyond, 1])
     return _add(out, n, (x, y), (0.0, 0.0), there + share * (here - there))

@@ -22,7 +22,7 @@ MOST_SPREAD_MM, LEAST_MM = 0.03, 0.045  # but for one where they change by that 
 
 def in_pieces(placed: Sequence[Placed], height_mm: float) -> list[Placed]:
     """The beads in the same order, those of varying width in pieces whose widths are the means of their stretches."""
-    return [piece for each in placed for piece in _pieces(each, each.bead.course, height_mm)]
+    return [piece for bead in placed for piece in _pieces(bead, bead.bead.course, height_mm)]
 
 
 def split_course(points: Floats, widths: Floats) -> Iterator[tuple[Floats, float]]:
@@ -80,7 +80,7 @@ def _cuts(steps: list[float], widths: list[float]) -> list[int]:
 
 @kernel
 def _widths_at(places: Floats, points: Floats, widths: Floats) -> Floats:
-    """(n,) widths at places (n, 2) on a course (k, 2), whose steps are looked through from the last one found on."""
+    """(n,) widths at places (n, 2) on a course (k, 2), looked through from the step nearest to the place before on."""
     out: Floats = floats(len(places), 0.0)
     steps, at = len(points) - 1, 0
     for i in range(len(places)):
@@ -92,9 +92,9 @@ def _widths_at(places: Floats, points: Floats, widths: Floats) -> Floats:
             x, y = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
             away = (x - places[i, 0]) ** 2 + (y - places[i, 1]) ** 2
             if away < least:
-                least, found = away, k
+                least, nearest = away, k
                 out[i] = widths[k] + share * (widths[k + 1] - widths[k])
                 if away < 1e-16:
                     break
-        at = found
+        at = nearest
     return out

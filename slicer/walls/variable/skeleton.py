@@ -58,7 +58,7 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
     count = len(tails) // 3
     out = Skeleton(table(count, 2), floats(count, 0.0), table(len(tails), 2), flags(len(tails)))
     for t in range(count):
-        _place(triangulation, t, out)
+        _put_at_circumcentre(triangulation, t, out)
         for turn in range(3):
             near = far = 3 * t
             for h in range(3 * t, 3 * t + 3):
@@ -71,12 +71,12 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
             elif not _leaves(triangulation, t, out.centres[t, 0], out.centres[t, 1]):
                 break
             else:
-                _place_in_the_middle(triangulation, t, out)
+                _put_in_middle(triangulation, t, out)
     for h in range(len(tails)):
-        other = across[h]
-        if other > h:
-            out.central[h] = 0.5 * (_slope2(out, h) + _slope2(out, other)) < SLOPE * SLOPE
-            out.central[other] = out.central[h]
+        twin = across[h]
+        if twin > h:
+            out.central[h] = 0.5 * (_slope2(out, h) + _slope2(out, twin)) < SLOPE * SLOPE
+            out.central[twin] = out.central[h]
     return out
 
 
@@ -100,7 +100,7 @@ def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
 
 
 @part
-def _place(triangulation: Triangulation, t: int, out: Skeleton) -> None:
+def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Fills in the circumcentre of a triangle."""
     points, tails, _ = triangulation
     a, b, c = tails[3 * t], tails[3 * t + 1], tails[3 * t + 2]
@@ -108,7 +108,7 @@ def _place(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     cx, cy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     doubled = 2.0 * (bx * cy - by * cx)
     if abs(doubled) < 1e-12:
-        _place_in_the_middle(triangulation, t, out)
+        _put_in_middle(triangulation, t, out)
         return
     b2, c2 = bx * bx + by * by, cx * cx + cy * cy
     out.centres[t, 0] = points[a, 0] + (cy * b2 - by * c2) / doubled
@@ -116,7 +116,7 @@ def _place(triangulation: Triangulation, t: int, out: Skeleton) -> None:
 
 
 @part
-def _place_in_the_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
+def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Puts a node into its triangle, where that has no circumcentre of use."""
     points, tails, _ = triangulation
     for axis in range(2):
@@ -159,8 +159,8 @@ def _centre(out: Skeleton, near: int, far: int) -> None:
 @part
 def _slope2(out: Skeleton, h: int) -> float:
     """Square of how fast the radius changes along the axis across side h: cosine of half the angle between its two ribs."""
-    t, other = h // 3, after(h)
+    t, next_side = h // 3, after(h)
     ax, ay = out.feet[h, 0] - out.centres[t, 0], out.feet[h, 1] - out.centres[t, 1]
-    bx, by = out.feet[other, 0] - out.centres[t, 0], out.feet[other, 1] - out.centres[t, 1]
+    bx, by = out.feet[next_side, 0] - out.centres[t, 0], out.feet[next_side, 1] - out.centres[t, 1]
     long = np.hypot(ax, ay) * np.hypot(bx, by)
     return 0.5 * (1.0 + (ax * bx + ay * by) / long) if long > 1e-12 else 1.0

@@ -42,7 +42,7 @@ TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothe
 SEEN_RESOLUTION_MM = 0.004  # of outer walls, whose points are close where ribs are
 WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
 DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
-DASH = 0.25
+DASH = 0.25  # of its width, and as much longer
 SLACK_MM = 0.01  # by which a place may be narrower than the least bead
 SHORT = 0.05  # of its width: a dash is no shorter
 THIN = 4.0  # least widths: what is narrower than one and longer than this is a wall, what is shorter the tip of a corner
@@ -76,17 +76,17 @@ def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
         return []
     skeleton = skeleton_of(triangulation)
     counts = count_beads(triangulation.across, skeleton, rule)
-    found: list[Wall] = []
+    walls: list[Wall] = []
     for level in range(rule.walls):
         loops = _loops(triangulation, skeleton, counts, rule, level)
         if not loops:
             break
-        found += loops
+        walls += loops
     lines = [_along(line, rule) for line in lines_of(trace_chains(triangulation.across, skeleton, counts, rule))]
     lines += [_dash(*dot, rule) for dot in _dots(skeleton, counts)]
     borders = edges(polygons) if any(line.level == 0 for line in lines) else np.zeros((0, 4))
-    kept = (_kept_inside(line, borders, rule) for line in lines)
-    return found + [_simplified(line) for line in kept if len(line.points) > 1]
+    clipped = (_clipped(line, borders, rule) for line in lines)
+    return walls + [_simplified(line) for line in clipped if len(line.points) > 1]
 
 
 def _loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> list[Wall]:
@@ -97,7 +97,7 @@ def _loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rul
         rough = ribs.feet[a:b] + ribs.ways[a:b] * ribs.depth[a:b, None]
         if length_mm(close_loop(rough)) < SHORTEST * rule.inner:
             continue
-        depth, spacing = (smoothed(rough, each[a:b], TRANSITION * rule.inner, True) for each in (ribs.depth, ribs.spacing))
+        depth, spacing = (smoothed(rough, values[a:b], TRANSITION * rule.inner, True) for values in (ribs.depth, ribs.spacing))
         depth = np.minimum(depth, ribs.reach[a:b])
         points = ribs.feet[a:b] + ribs.ways[a:b] * depth[:, None]
         widths = spacing + rule.round if level else 2.0 * depth
@@ -109,7 +109,7 @@ def _along(line: Line, rule: Rule) -> Wall:
     """The bead along a line."""
     closed = line.ends[0] == line.ends[1]
     widths = smoothed(line.points, line.widths, TRANSITION * rule.inner, closed)
-    x, y = (smoothed(line.points, np.ascontiguousarray(each), 0.5 * TRANSITION * rule.inner, closed) for each in line.points.T)
+    x, y = (smoothed(line.points, np.ascontiguousarray(row), 0.5 * TRANSITION * rule.inner, closed) for row in line.points.T)
     points, free = np.column_stack([x, y]), 2 * int(line.level == 0)
     if closed:
         return Wall(points[:-1], widths[:-1], line.level, True, free)
@@ -139,7 +139,7 @@ def _dash(begin: Floats, end: Floats, width: float, rule: Rule) -> Wall:
     return Wall(np.array([middle - half * way, middle + half * way]), np.full(2, thinner), 0, False, 2)
 
 
-def _kept_inside(line: Wall, borders: Floats, rule: Rule) -> Wall:
+def _clipped(line: Wall, borders: Floats, rule: Rule) -> Wall:
     """A line that lies alone no wider than its place, but for the least bead, without ends where not even that fits.
 
     Thin walls keep ends of theirs where it nearly fits: a wall that is now thicker and now thinner than the least bead would be

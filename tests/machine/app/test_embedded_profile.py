@@ -12,16 +12,16 @@ OTHER = load("generic_ac", "petg" if "petg" in shipped("material") else "pla", s
 
 @pytest.mark.parametrize("machine", shipped("machine"))
 def test_every_shipped_profile_comes_back_from_a_file_s_foot(machine: str) -> None:
-    made = load(machine, settings=["process.walls=5", "material.nozzle_c=222"])
-    told, taken = read_embedded_profile(tuple(foot(made, 1.0, 1.0)), OTHER, frozenset())
-    plain = {section: getattr(made, section).model_dump(exclude={"sources"}) for section in taken}
-    assert {section: getattr(told, section).model_dump(exclude={"sources"}) for section in taken} == plain
+    written = load(machine, settings=["process.walls=5", "material.nozzle_c=222"])
+    read, taken = read_embedded_profile(tuple(foot(written, 1.0, 1.0)), OTHER, frozenset())
+    plain = {section: getattr(written, section).model_dump(exclude={"sources"}) for section in taken}
+    assert {section: getattr(read, section).model_dump(exclude={"sources"}) for section in taken} == plain
     assert set(taken) == {"machine", "material", "process", "search"}
 
 
 def test_what_the_user_has_named_is_not_taken_from_the_file() -> None:
-    told, taken = read_embedded_profile(tuple(foot(load(), 1.0, 1.0)), OTHER, frozenset({"machine"}))
-    assert (told.machine.lift_mm, told.process.walls, "machine" in taken) == (33.0, load().process.walls, False)
+    read, taken = read_embedded_profile(tuple(foot(load(), 1.0, 1.0)), OTHER, frozenset({"machine"}))
+    assert (read.machine.lift_mm, read.process.walls, "machine" in taken) == (33.0, load().process.walls, False)
 
 
 @pytest.mark.parametrize("edit", ["; machine.x.speed_mm_s = fast", "; machine.head.boxes[9].name = x", "; machine[0] = 1", "; ="])
@@ -35,7 +35,7 @@ def test_a_file_without_a_foot_changes_nothing() -> None:
 
 
 def test_settings_of_single_parts_come_back_with_the_process() -> None:
-    made = with_part_settings(load(), [parse_part_settings("2:walls=4,infill_pattern=gyroid,infill_density=0.4")])
-    lines = tuple(foot(made, 1.0, 1.0))
-    assert read_embedded_profile(lines, OTHER, frozenset())[0].parts == made.parts
+    written = with_part_settings(load(), [parse_part_settings("2:walls=4,infill_pattern=gyroid,infill_density=0.4")])
+    lines = tuple(foot(written, 1.0, 1.0))
+    assert read_embedded_profile(lines, OTHER, frozenset())[0].parts == written.parts
     assert read_embedded_profile(lines, OTHER, frozenset({"process"}))[0].parts == []

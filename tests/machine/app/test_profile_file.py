@@ -26,7 +26,7 @@ BLOCK = 'machine.gcode.start="G28\\nM117 \'ready\' \\"{nozzle_c}\\" \\\\\\n"'  #
 )
 def test_a_profile_with_changes_is_saved_and_read_back_the_same(name: str, settings: list[str], tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
-    assert main(["profiles", "save", name, "-o", str(file), *(word for each in settings for word in ("--set", each))]) == 0
+    assert main(["profiles", "save", name, "-o", str(file), *(word for setting in settings for word in ("--set", setting))]) == 0
     assert load_one(str(file)) == load_one(name, settings)
     assert check_file(file) == []
 

@@ -91,7 +91,7 @@ def at_the_mark(real: Machine) -> list[str]:
     """The twelve lines of X Y Z that a real machine shows when its tip is on the mark where it stands."""
     touches = plan_touches(machine_of("open5x_voron0"), 20.0)
     places = [machine_points(real, pose, np.array([touches.mark_mm]))[0] for pose in touches.poses]
-    return [" ".join(f"{letter}{value:.4f}" for letter, value in zip("XYZ", place, strict=True)) for place in places]
+    return [" ".join(f"{letter}{value:.4f}" for letter, value in zip("XYZ", point, strict=True)) for point in places]
 
 
 def test_a_person_who_is_led_through_the_touches_ends_with_an_own_profile(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,9 +100,9 @@ def test_a_person_who_is_led_through_the_touches_ends_with_an_own_profile(monkey
     first = lines[0].replace("X", "").replace("Y", "").replace("Z", "").split()
     person = talked(monkeypatch, "", "", *first[:2], "b", "", first[2], "s", *lines[2:])
     assert person.lines == []
-    found = machine_of("open5x_voron0")
-    assert found.turn.point_mm == pytest.approx(real.turn.point_mm, abs=0.01)
-    assert (found.tilt.zero_deg, found.turn.sign) == (pytest.approx(1.2, abs=0.01), 1)
+    calibrated = machine_of("open5x_voron0")
+    assert calibrated.turn.point_mm == pytest.approx(real.turn.point_mm, abs=0.01)
+    assert (calibrated.tilt.zero_deg, calibrated.turn.sign) == (pytest.approx(1.2, abs=0.01), 1)
 
 
 def test_a_touch_that_does_not_fit_the_others_is_asked_again(

@@ -26,16 +26,16 @@ def really(machine: Machine, tilt: Wrong, turn: Wrong) -> Machine:
 def touched(machine: Machine, tilts: tuple[float, ...] = (0.0, 40.0, -40.0), noise_mm: float = 0.0, seed: int = 0) -> list[Touch]:
     """X Y Z of a real machine with the tip on the mark, at four turns and each tilt."""
     random = np.random.default_rng(seed)
-    found = []
+    touches = []
     for pose in [Pose(tilt, turn) for tilt in tilts for turn in (0.0, 90.0, 180.0, 270.0)]:
         x, y, z = machine_points(machine, pose, np.array([MARK]))[0] + random.normal(0.0, noise_mm, 3)
-        found.append(Touch(pose, (float(x), float(y), float(z))))
-    return found
+        touches.append(Touch(pose, (float(x), float(y), float(z))))
+    return touches
 
 
-def off_mm(found: Calibration, real: Machine) -> float:
+def off_mm(fitted: Calibration, real: Machine) -> float:
     """How far the found centres are from the real ones, at most; the tilt's across its own axis."""
     along = np.array(real.tilt.axis) / np.linalg.norm(real.tilt.axis)
-    tilt = np.subtract(found.machine.tilt.point_mm, real.tilt.point_mm)
+    tilt = np.subtract(fitted.machine.tilt.point_mm, real.tilt.point_mm)
     tilt = tilt - along * (along @ tilt)
-    return float(max(np.abs(tilt).max(), np.abs(np.subtract(found.machine.turn.point_mm, real.turn.point_mm)).max()))
+    return float(max(np.abs(tilt).max(), np.abs(np.subtract(fitted.machine.turn.point_mm, real.turn.point_mm)).max()))

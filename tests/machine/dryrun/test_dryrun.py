@@ -133,6 +133,24 @@ def test_a_purge_beside_the_plate_is_no_fault() -> None:
     assert _codes(BEGIN + ";TYPE:Custom\nG0 X101 F3000\nG0 Z0.2 F600\nG1 X110 E0.1" + END) == []
 
 
+@pytest.mark.parametrize(
+    ("bead", "found"),
+    [
+        ("G0 X-20 Y0.55\nG1 X-3 E1", []),  # widths of 0.8 and 0.4 mm touch at 0.6 mm, less 0.02 mm of rounding
+        ("G0 X-20 Y0.57\nG1 X0 E1", ["X0.0 Y0.0"]),
+        ("G0 X-20 Y0.59\nG1 X20 E1", []),
+        ("G0 X10.57 Y-20\nG1 X10.57 Y20 E2", ["X10.0 Y0.0"]),
+        ("G0 X10.59 Y-20\nG1 X10.59 Y20 E2", []),
+        ("G0 X4 Y-9\nG1 X4 Y9 E1", ["X4.0 Y0.0"]),
+        ("G0 X4 Y-9 Z0.4\nG1 X4 Y9 E1", []),
+    ],
+)
+def test_a_purge_may_touch_a_bead_of_the_first_layer_and_not_overlap_it(bead: str, found: list[str]) -> None:
+    purge = ";HEIGHT:0.2\n;TYPE:Custom\n;WIDTH:0.8\nG0 Z0.2 F600\nG0 X0 Y0\nG1 X10 E1\n;TYPE:Perimeter\n;WIDTH:0.4\n"
+    told = [finding.message for finding in dry_run((BEGIN + purge + bead + END).splitlines(), CLEAN).findings]
+    assert [message[13 : message.index(" lies")] for message in told if "the purge" in message] == found
+
+
 def test_homing_across_after_a_print_is_no_fault() -> None:
     assert _codes(BEGIN + "G1 X5 E0.1 F600\nG28 X Y" + END) == []
 

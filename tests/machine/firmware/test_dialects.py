@@ -41,15 +41,15 @@ ENDS = {"linuxcnc": "M104 P0\nM107"}
 
 def profile(dialect: str, coordinates: str = "table", machine: str = "generic_ac", settings: tuple[str, ...] = ()) -> Profile:
     """A profile whose machine has that firmware, its tilt axis beside the plate and its turn axis off the zero."""
-    made = load(machine=machine, settings=[f"machine.dialect={dialect}", f"machine.coordinates={coordinates}", *settings])
+    loaded = load(machine=machine, settings=[f"machine.dialect={dialect}", f"machine.coordinates={coordinates}", *settings])
     axes = {
-        "tilt": made.machine.tilt.model_copy(update={"point_mm": (0.0, 3.5, -12.0)}),
-        "turn": made.machine.turn.model_copy(update={"point_mm": (2.25, -1.5, 0.75)}),
+        "tilt": loaded.machine.tilt.model_copy(update={"point_mm": (0.0, 3.5, -12.0)}),
+        "turn": loaded.machine.turn.model_copy(update={"point_mm": (2.25, -1.5, 0.75)}),
     }
-    usual = made.machine.gcode
+    usual = loaded.machine.gcode
     blocks = {"start": STARTS.get(dialect, usual.start), "end": ENDS.get(dialect, usual.end)}
     axes |= {"gcode": usual.model_copy(update=blocks)}  # type: ignore[dict-item]
-    return made.model_copy(update={"machine": made.machine.model_copy(update=axes)})
+    return loaded.model_copy(update={"machine": loaded.machine.model_copy(update=axes)})
 
 
 @cache
@@ -206,12 +206,12 @@ PLACE = st.tuples(*[st.floats(-60, 60).map(lambda v: round(v, 3))] * 2, st.float
 @given(st.lists(st.tuples(ANGLE, ANGLE, st.lists(PLACE, min_size=2, max_size=5, unique=True)), min_size=1, max_size=3))
 def test_any_program_comes_back_in_any_dialect(dialect: str, coordinates: str, parts: list) -> None:
     chosen = profile(dialect, coordinates)
-    program = made(parts)
+    program = program_of(parts)
     parsed = parse_gcode(write_gcode(program, chosen), chosen.machine)
     assert laid(chosen.machine, parsed) == pytest.approx(wanted(chosen.machine, program), abs=1e-3)
 
 
-def made(parts: list) -> MachineProgram:
+def program_of(parts: list) -> MachineProgram:
     """Parts of (tilt, turn, points): each one stroke at its pose, with a retraction between."""
     moves: list = []
     at = np.array([0.0, 0.0, 90.0])
@@ -226,13 +226,13 @@ def made(parts: list) -> MachineProgram:
 
 
 @given(ANGLE, ANGLE, PLACE)
-def test_followed_places_and_axis_positions_are_each_other_s_inverse(tilt: float, turn: float, place: tuple) -> None:
+def test_followed_places_and_axis_positions_are_each_other_s_inverse(tilt: float, turn: float, point: tuple) -> None:
     machine = profile("linuxcnc", "workpiece").machine
-    there = followed_places(machine, Pose(tilt, turn), np.array([place]))
-    assert axis_positions(machine, np.array([[*there[0], tilt, turn]])) == pytest.approx(np.array([place]), abs=1e-9)
+    there = followed_places(machine, Pose(tilt, turn), np.array([point]))
+    assert axis_positions(machine, np.array([[*there[0], tilt, turn]])) == pytest.approx(np.array([point]), abs=1e-9)
 
 
 @given(PLACE)
-def test_with_the_table_level_followed_places_are_axis_positions(place: tuple) -> None:
+def test_with_the_table_level_followed_places_are_axis_positions(point: tuple) -> None:
     machine = profile("linuxcnc", "workpiece").machine
-    assert followed_places(machine, Pose(0.0, 0.0), np.array([place])) == pytest.approx(np.array([place]), abs=1e-9)
+    assert followed_places(machine, Pose(0.0, 0.0), np.array([point])) == pytest.approx(np.array([point]), abs=1e-9)

@@ -85,6 +85,6 @@ def test_every_name_that_a_profile_may_give_is_written_and_follows_the_table_as_
 
 
 def test_every_firmware_that_takes_lines_has_a_name_on_the_line_and_a_simulation() -> None:
-    serial = [each for each in firmware.FIRMWARES if any(dialect.serial for dialect in each.dialects.values())]
+    serial = [family for family in firmware.FIRMWARES if any(dialect.serial for dialect in family.dialects.values())]
     assert len(serial) >= 3
-    assert [each.name for each in serial if not (each.signs and each.simulated)] == []
+    assert [family.name for family in serial if not (family.signs and family.simulated)] == []

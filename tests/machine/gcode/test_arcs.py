@@ -145,10 +145,10 @@ def test_a_program_with_arcs_lays_the_same_plastic_as_one_without() -> None:
     assert runs[1].time_s == pytest.approx(runs[0].time_s, rel=0.25)
 
 
-_place = st.floats(-50.0, 50.0)
+_coordinate = st.floats(-50.0, 50.0)
 
 
-@given(_place, _place, st.floats(0.5, 40.0), st.floats(-pi, pi), st.floats(0.01, 2.0 * pi), st.booleans())
+@given(_coordinate, _coordinate, st.floats(0.5, 40.0), st.floats(-pi, pi), st.floats(0.01, 2.0 * pi), st.booleans())
 def test_the_box_of_an_arc_holds_all_its_points_and_touches_them_on_every_side(
     x: float, y: float, radius: float, first: float, swept: float, clockwise: bool
 ) -> None:

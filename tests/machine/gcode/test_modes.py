@@ -37,8 +37,8 @@ def read_by_host(lines: list[str], machine: Machine) -> list[Place]:
     for line in lines:
         before = modal.at[E_AXIS] or 0.0
         if modal.take(line):
-            *place, filament_mm = (coordinate or 0.0 for coordinate in modal.at)
-            places.append([*place, filament_mm - before])
+            *coordinates, filament_mm = (coordinate or 0.0 for coordinate in modal.at)
+            places.append([*coordinates, filament_mm - before])
     return places
 
 
@@ -47,11 +47,11 @@ def read_by_simulator(lines: list[str], machine: Machine) -> list[Place]:
     motion = firmware.board.motion
     firmware.board.cold_allowed, motion.limits = True, [(-inf, inf)] * 5
     for line in lines:
-        before, moves = motion.place[E_AXIS], line[:2] in ("G0", "G1") and "F" not in line
+        before, moves = motion.position[E_AXIS], line[:2] in ("G0", "G1") and "F" not in line
         firmware.receive(f"{line}\n".encode())
         firmware.advance(inf)
         if moves:
-            places.append([*motion.coordinates()[:E_AXIS], motion.place[E_AXIS] - before])
+            places.append([*motion.coordinates()[:E_AXIS], motion.position[E_AXIS] - before])
     return places
 
 
@@ -80,7 +80,7 @@ READERS = (read_by_dry_run, read_by_host, read_by_simulator)
 def test_what_a_word_of_filament_pushes(read, dialect: str, text: str, pushed_mm: list[float]) -> None:
     machine = MACHINES[dialect]
     places = read([*from_zero(machine), *text.split("|")], machine)
-    assert [place[E_AXIS] for place in places] == pytest.approx(pushed_mm)
+    assert [coordinates[E_AXIS] for coordinates in places] == pytest.approx(pushed_mm)
 
 
 @dataclass
@@ -111,9 +111,9 @@ class Model:
             self.at[letter] = length + (before[letter] if steps and name != "G92" else 0.0)
         if name not in ("G0", "G1"):
             return None
-        place = dict.fromkeys(range(6), 0.0) | {axis: self.at.get(letter, 0.0) for letter, axis in axes.items()}
+        coordinates = dict.fromkeys(range(6), 0.0) | {axis: self.at.get(letter, 0.0) for letter, axis in axes.items()}
         filament = next(letter for letter, axis in axes.items() if axis == E_AXIS)
-        return [*(place[axis] for axis in range(E_AXIS)), self.at.get(filament, 0.0) - before[filament]]
+        return [*(coordinates[axis] for axis in range(E_AXIS)), self.at.get(filament, 0.0) - before[filament]]
 
 
 @st.composite
@@ -136,7 +136,7 @@ def test_any_sequence_of_modes_and_moves_is_read_alike(dialect: str, data: st.Da
     lines = from_zero(machine) + [
         blank.join([name, *(f"{letter}{value:.3f}" for letter, value in words)]) for name, words in sequence
     ]
-    expected = [place for name, words in sequence if (place := model.take(name, words)) is not None]
+    expected = [coordinates for name, words in sequence if (coordinates := model.take(name, words)) is not None]
     for read in READERS:
         assert np.array(read(lines, machine)) == pytest.approx(np.array(expected), abs=1e-6), read.__name__
 

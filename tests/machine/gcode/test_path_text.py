@@ -13,12 +13,12 @@ POINTS = st.lists(st.tuples(st.sampled_from([0, 5, -1500]), WHOLE, st.sampled_fr
 
 def by_python(points: list[tuple[int, int, int, int]], relative: bool, known: list[int]) -> list[str]:
     lines, ending = [], " F1200"
-    for *place, pushed in points:
-        changed = [k for k in range(3) if place[k] != known[k]]
+    for *point, pushed in points:
+        changed = [k for k in range(3) if point[k] != known[k]]
         if changed:
-            words = "".join(f" {'XYZ'[k]}{place[k] / 1000:.3f}" for k in changed)
+            words = "".join(f" {'XYZ'[k]}{point[k] / 1000:.3f}" for k in changed)
             lines.append(f"G1{words} E{(pushed - known[3] if relative else pushed) / 1e5:.5f}{ending}")
-            known[:], ending = [*place, pushed], ""
+            known[:], ending = [*point, pushed], ""
     return lines
 
 

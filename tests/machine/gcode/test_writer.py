@@ -151,8 +151,8 @@ def test_the_foot_tells_filament_and_time_as_the_dry_run_does(machine: str) -> N
     assert float(cm3) == pytest.approx(float(mm) * pi * 1.75**2 / 4 / 1000, abs=0.01)
     assert float(grams) == pytest.approx(float(cm3) * 1.24, abs=0.02)
     printing = float(run.times_s[run.program.part > 0].sum())
-    told = _foot(text(machine), "estimated printing time (normal mode)")
-    assert told in (duration(printing - 0.05), duration(printing + 0.05))  # the text has thousandths
+    time = _foot(text(machine), "estimated printing time (normal mode)")
+    assert time in (duration(printing - 0.05), duration(printing + 0.05))  # the text has thousandths
 
 
 def _foot(lines, key: str) -> str:

@@ -94,12 +94,12 @@ def test_a_direction_just_beyond_what_the_axes_reach_has_no_pose() -> None:
 
 @given(CHAINS, st.floats(-170, 170), st.floats(-170, 170))
 def test_the_pose_that_a_direction_was_made_with_is_among_its_poses(machine: Machine, tilt: float, turn: float) -> None:
-    made = Pose(machine.tilt.zero_deg + tilt, machine.turn.zero_deg + turn)
-    direction = rotation(machine, made).T @ UP
-    turned = axis_rotation(machine.turn, made.turn_deg) @ direction
+    pose = Pose(machine.tilt.zero_deg + tilt, machine.turn.zero_deg + turn)
+    direction = rotation(machine, pose).T @ UP
+    turned = axis_rotation(machine.turn, pose.turn_deg) @ direction
     corner = abs(np.linalg.det([unit(machine.turn.axis), unit(machine.tilt.axis), turned]))
     assume(corner > 0.02)  # nearer to where both branches meet a digit of the direction is many of the angles
-    apart = [max(abs(p.tilt_deg - made.tilt_deg), abs(p.turn_deg - made.turn_deg)) for p in poses(machine, direction)]
+    apart = [max(abs(p.tilt_deg - pose.tilt_deg), abs(p.turn_deg - pose.turn_deg)) for p in poses(machine, direction)]
     assert min(apart) < 1e-9
 
 
@@ -118,9 +118,9 @@ def test_small_tilts_keep_their_digits(name: str, lean_deg: float, around_deg: f
 def test_every_machine_reaches_every_direction_that_leans_a_little(name: str, x: float, y: float, z: float) -> None:
     machine = load(machine=name).machine
     direction = unit([x, y, z])
-    found = poses(machine, direction)
-    assert found
-    for pose in found:
+    reached = poses(machine, direction)
+    assert reached
+    for pose in reached:
         assert rotation(machine, pose) @ direction == pytest.approx(UP, abs=2e-7)
 
 
@@ -139,9 +139,9 @@ def test_a_level_table_keeps_the_turn_it_has(turn_deg: float) -> None:
 
 
 def test_both_branches_are_found() -> None:
-    found = poses(load().machine, unit([0.0, 1.0, 1.0]))
-    assert [round(pose.tilt_deg, 9) for pose in found] == [45.0, -45.0]
-    assert [round(pose.turn_deg, 9) % 360.0 for pose in found] == [0.0, 180.0]
+    reached = poses(load().machine, unit([0.0, 1.0, 1.0]))
+    assert [round(pose.tilt_deg, 9) for pose in reached] == [45.0, -45.0]
+    assert [round(pose.turn_deg, 9) % 360.0 for pose in reached] == [0.0, 180.0]
 
 
 def test_a_known_pose_tilts_the_rear_edge_up() -> None:

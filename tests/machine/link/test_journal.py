@@ -62,11 +62,11 @@ def test_a_disk_that_left_zeros_at_the_end_costs_only_the_end(tmp_path: Path) ->
     assert (story.last, story.torn) == (at(32), 1)
 
 
-@pytest.mark.parametrize("place", [0, 1, 2])
-def test_a_record_damaged_before_the_end_is_refused_by_its_number(tmp_path: Path, place: int) -> None:
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_record_damaged_before_the_end_is_refused_by_its_number(tmp_path: Path, index: int) -> None:
     path = written(tmp_path / "j", [at(16), at(32), at(48)])
     lines = path.read_bytes().splitlines(keepends=True)
-    lines[place] = lines[place].replace(b"1", b"2").replace(b"0", b"1")
+    lines[index] = lines[index].replace(b"1", b"2").replace(b"0", b"1")
     path.write_bytes(b"".join(lines))
     with pytest.raises(JournalError, match=r"is no journal|damaged: record 2|damaged: record 3"):
         read_journal(path)

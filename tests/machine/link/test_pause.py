@@ -86,8 +86,8 @@ def strokes(printer: VirtualPrinter) -> np.ndarray:
 
 
 def planned(program: list[str]) -> np.ndarray:
-    found = [re.fullmatch(r"G1 X(\S+) Y(\S+) E(\S+)", line) for line in program]
-    return np.array([[float(m[1]), float(m[2]), float(m[3])] for m in found if m])
+    matches = [re.fullmatch(r"G1 X(\S+) Y(\S+) E(\S+)", line) for line in program]
+    return np.array([[float(m[1]), float(m[2]), float(m[3])] for m in matches if m])
 
 
 def is_exact(watcher: Watcher) -> bool:
@@ -120,12 +120,12 @@ def filament_before_pause(lines: list[str]) -> float:
 
 
 def test_the_states_of_a_pause_are_told_in_order(paused: Watcher) -> None:
-    told = list(dict.fromkeys(progress.state for progress in paused.shown))
-    assert told == ["printing", "pausing", "paused", "resuming", "finishing"]
+    states = list(dict.fromkeys(progress.state for progress in paused.shown))
+    assert states == ["printing", "pausing", "paused", "resuming", "finishing"]
 
 
 def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way(paused: Watcher) -> None:
-    asked = next(place for place, progress in enumerate(paused.shown) if progress.acknowledged >= 150)
+    asked = next(index for index, progress in enumerate(paused.shown) if progress.acknowledged >= 150)
     assert [progress.state for progress in paused.shown[asked : asked + 2]] == ["printing", "pausing"]
 
 

@@ -180,10 +180,10 @@ def test_a_closed_port_stays_closed() -> None:
 @pytest.mark.skipif(os.name != "posix", reason="a port has the descriptor there")
 def test_a_closed_port_touches_no_file_that_has_its_descriptor_since(tmp_path: Path) -> None:
     with accepted() as (port, _):
-        number, other = port._device.fileno(), tmp_path / "other"
+        number, file = port._device.fileno(), tmp_path / "other"
         port.close()
-        other.write_bytes(b"text")
-        descriptor = os.open(other, os.O_RDWR)
+        file.write_bytes(b"text")
+        descriptor = os.open(file, os.O_RDWR)
         os.dup2(descriptor, number)
         try:
             with pytest.raises(PortError, match="was lost"):
@@ -193,7 +193,7 @@ def test_a_closed_port_touches_no_file_that_has_its_descriptor_since(tmp_path: P
         finally:
             for held in {descriptor, number}:
                 os.close(held)
-        assert other.read_bytes() == b"text"
+        assert file.read_bytes() == b"text"
 
 
 def test_serial_devices_are_told_once_and_stable_names_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -206,8 +206,8 @@ def test_serial_devices_are_told_once_and_stable_names_first(monkeypatch: pytest
     ports = [Found("/dev/ttyS0", None, None), Found("/dev/ttyACM0", "Mega 2560", "7533")]
     monkeypatch.setattr(port_module.list_ports, "comports", lambda: ports)
     monkeypatch.setattr(port_module, "_stable_names", lambda: {"/dev/ttyACM0": "/dev/serial/by-id/usb-Mega"})
-    told = [(device.name, device.path, device.description, device.serial_number) for device in serial_devices()]
-    assert told == [
+    devices = [(device.name, device.path, device.description, device.serial_number) for device in serial_devices()]
+    assert devices == [
         ("/dev/serial/by-id/usb-Mega", "/dev/ttyACM0", "Mega 2560 (2341:0042)", "7533"),
         ("/dev/ttyS0", "/dev/ttyS0", "", ""),
     ]

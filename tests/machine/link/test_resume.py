@@ -98,12 +98,12 @@ def cut_off(program: Iterable[str], last: Checkpoint) -> InterruptedPrint:
 
 def resumed(text: GcodeFile, printer: VirtualPrinter, story: JournalContents) -> tuple[ResumePlan, list[str]]:
     """Resume; the decision, and the commands sent."""
-    found: list[ResumePlan] = []
+    plans: list[ResumePlan] = []
     sent: list[bytes] = []
 
     def begin(seen: PrinterStatus) -> ResumePoint:
-        found.append(plan_resume(cut_off(text, story.last), seen, PROFILE))
-        return found[0].start
+        plans.append(plan_resume(cut_off(text, story.last), seen, PROFILE))
+        return plans[0].start
 
     with journal_of(text, "rest") as journal:
         print_lines(
@@ -115,7 +115,7 @@ def resumed(text: GcodeFile, printer: VirtualPrinter, story: JournalContents) ->
             begin=begin,
         )
     assert read_journal(journal.path).finished
-    return found[0], [re.sub(r"^N\d+ |\*\d+$", "", line) for line in b"".join(sent).decode().splitlines()]
+    return plans[0], [re.sub(r"^N\d+ |\*\d+$", "", line) for line in b"".join(sent).decode().splitlines()]
 
 
 def moved(printer: VirtualPrinter) -> np.ndarray:
@@ -225,7 +225,7 @@ def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: Gc
         with journal_of(text, f"at {line}") as journal, pytest.raises(FirmwareError):
             print_lines(text, PATH, medium=printer.medium, profile=PROFILE, journal=journal)
         last = read_journal(journal.path).last
-        surely = sum(is_move(each) for each in PROGRAM[: last.executed])
+        surely = sum(is_move(entry) for entry in PROGRAM[: last.executed])
         assert surely <= len(printer.record.start), line
         assert last.executed <= last.acknowledged <= last.sent
 
@@ -259,9 +259,9 @@ def test_a_height_in_doubt_is_not_guessed(text: GcodeFile, tmp_path: Path, capsy
     with SimulatedPrinter(PROFILE.machine, faults=IN_DOUBT) as printer:
         doubtful(text, journal, printer)
         assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
-    told = capsys.readouterr().err
-    assert "it stands at Z 62.00 or Z 62.20; look at the print below it, for Z is not homed" in told
-    assert "a person must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in told
+    errors = capsys.readouterr().err
+    assert "it stands at Z 62.00 or Z 62.20; look at the print below it, for Z is not homed" in errors
+    assert "a person must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in errors
 
 
 @pytest.mark.parametrize(("said", "called"), [("1", "Z62 "), ("2", "Z62.2 "), ("n", "")])
@@ -291,7 +291,7 @@ def point(executed: int, acknowledged: int | None = None, number: int = 100) -> 
     return cut_off(PROGRAM, moment)
 
 
-def found(position: dict[str, float] | None = None, last: int | None = 0) -> PrinterStatus:
+def asked(position: dict[str, float] | None = None, last: int | None = 0) -> PrinterStatus:
     return PrinterStatus(last, Position(tuple(position.items())) if position is not None else None, Temperature())
 
 
@@ -314,14 +314,14 @@ def test_the_point_knows_part_layer_pose_and_modes() -> None:
 def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> None:
     still = [*START, "G0 X10 Y20 Z30", "G1 X11 E1 F600", "M106 S10", "M106 S20", "M106 S30", "G1 X12 E1"]
     at = cut_off(still, Checkpoint(13, 13, 13, 5))
-    way = plan_resume(at, found({"X": 11.0, "Y": 20.0, "Z": 30.0, "E": 1.0}), PROFILE)
+    way = plan_resume(at, asked({"X": 11.0, "Y": 20.0, "Z": 30.0, "E": 1.0}), PROFILE)
     assert way.start.line == still.index("M106 S10") + 1
 
 
 @pytest.mark.parametrize("state", ["paused", "left"])
 def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> None:
     moment = Checkpoint(LINE + 3, LINE, LINE, 100, (159.0, -159.0, 120.0, 30.0, 725.0, 5.0), state)
-    before = plan_resume(cut_off(PROGRAM, moment), found(), PROFILE).start.before
+    before = plan_resume(cut_off(PROGRAM, moment), asked(), PROFILE).start.before
     assert "G92 X159 Y-159 Z120 A30 C725" in before
 
 
@@ -342,7 +342,7 @@ def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text
 def test_a_profiles_own_block_homes_instead() -> None:
     block = "G28 Z\nG28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
     profile = load(settings=[f"machine.gcode.resume={block!r}"])
-    before = plan_resume(point(LINE), found(), with_block(profile, block)).start.before
+    before = plan_resume(point(LINE), asked(), with_block(profile, block)).start.before
     assert before[before.index("G28 Z") : before.index("G28 Z") + 3] == ("G28 Z", "G28 X Y", "HOME_AC")
     assert "G0 A30 C725" in before
     assert not [line for line in before if line.startswith("G92 X")]
@@ -357,7 +357,7 @@ AT_HOME = {"X": -160.0, "Y": -160.0, "Z": 260.0, "A": -95.0, "C": -3600.0, "E": 
 
 
 def test_a_marlin_that_has_restarted_believes_itself_at_its_home_positions_and_is_resumed() -> None:
-    way = plan_resume(point(LINE), found(AT_HOME), PROFILE)
+    way = plan_resume(point(LINE), asked(AT_HOME), PROFILE)
     assert way.reason.startswith("the printer has restarted")
     assert way.homes
     assert "G92 X" in " ".join(way.start.before)
@@ -371,13 +371,13 @@ MOVED = {"X": 50.0, "Y": 50.0, "Z": 50.0}
 
 
 @pytest.mark.parametrize(("at", "said", "profile", "sentence"), [
-    (point(TURN, TURN + 5), found(), PROFILE, r"the table was turning about A.*machine\.gcode\.resume"),
-    (cut_off(PROGRAM, ON_THE_WAY), found(), PROFILE, "was on its way between print and parking place"),
-    (cut_off(PROGRAM, replace(ON_THE_WAY, state="resuming")), found(), PROFILE, "was on its way between print and parking place"),
-    (point(LINE), found(MOVED), PROFILE, "stands at X50 Y50 Z50: it was homed or moved since; switch it off and on"),
-    (point(LINE), found(AT_HOME, last=7), PROFILE, "another program has sent it 7 lines since: it may have been homed"),
-    (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), found(), PROFILE, "does not tell where X Y Z stand"),
-    (point(LINE), found(), FOLLOWING, "follows the table by itself"),
+    (point(TURN, TURN + 5), asked(), PROFILE, r"the table was turning about A.*machine\.gcode\.resume"),
+    (cut_off(PROGRAM, ON_THE_WAY), asked(), PROFILE, "was on its way between print and parking place"),
+    (cut_off(PROGRAM, replace(ON_THE_WAY, state="resuming")), asked(), PROFILE, "was on its way between print and parking place"),
+    (point(LINE), asked(MOVED), PROFILE, "stands at X50 Y50 Z50: it was homed or moved since; switch it off and on"),
+    (point(LINE), asked(AT_HOME, last=7), PROFILE, "another program has sent it 7 lines since: it may have been homed"),
+    (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), asked(), PROFILE, "does not tell where X Y Z stand"),
+    (point(LINE), asked(), FOLLOWING, "follows the table by itself"),
 ])  # fmt: skip
 def test_where_going_on_would_be_a_guess_it_is_refused(
     at: InterruptedPrint, said: PrinterStatus, profile: Profile, sentence: str
@@ -387,30 +387,30 @@ def test_where_going_on_would_be_a_guess_it_is_refused(
 
 
 def test_a_printer_whose_greeting_was_heard_has_restarted_wherever_it_believes_to_stand() -> None:
-    greeted = replace(found(MOVED), greeted=True)
+    greeted = replace(asked(MOVED), greeted=True)
     assert plan_resume(point(LINE), greeted, PROFILE).homes
 
 
 def test_home_positions_of_the_profile_tell_where_a_restarted_firmware_believes_to_stand() -> None:
-    elsewhere = found({"X": -5.0, "Y": 330.0, "Z": 300.0, "A": 0.0, "C": 0.0})
+    elsewhere = asked({"X": -5.0, "Y": 330.0, "Z": 300.0, "A": 0.0, "C": 0.0})
     with pytest.raises(JournalError, match=r"write it as machine\.x\.home_mm"):
         plan_resume(point(LINE), elsewhere, PROFILE)
-    told = load(settings=["machine.x.home_mm=-5", "machine.y.home_mm=330", "machine.z.home_mm=300"])
-    assert plan_resume(point(LINE), elsewhere, told).homes
+    with_homes = load(settings=["machine.x.home_mm=-5", "machine.y.home_mm=330", "machine.z.home_mm=300"])
+    assert plan_resume(point(LINE), elsewhere, with_homes).homes
 
 
 def test_home_positions_say_nothing_about_a_firmware_that_does_not_count_lines() -> None:
-    assert not plan_resume(point(LINE), found(AT_HOME, last=None), PROFILE).homes
+    assert not plan_resume(point(LINE), asked(AT_HOME, last=None), PROFILE).homes
 
 
 def test_a_board_that_restarts_while_it_is_asked_has_begun_its_numbers_anew() -> None:
     printer = VirtualPrinter(PROFILE.machine, faults=FaultScript((Fault("reset", at=2, unit="line"),)))
     line = printer.medium.open(PATH, 0)
     line.write(frame(1, "M110 N500") + b"\n")
-    told = status.query_status(line, printer.medium, lambda: None)
-    assert (told.greeted, told.last_number) == (True, 0)
-    assert told.position is not None
-    assert dict(told.position.axes) == AT_HOME
+    seen = status.query_status(line, printer.medium, lambda: None)
+    assert (seen.greeted, seen.last_number) == (True, 0)
+    assert seen.position is not None
+    assert dict(seen.position.axes) == AT_HOME
 
 
 def test_the_command_resumes_after_a_power_cut(
@@ -421,8 +421,8 @@ def test_the_command_resumes_after_a_power_cut(
         assert main(["print", str(text.path), "--port", printer.path, "--journal", str(journal), "--force"]) == 1
         assert "the printer restarted in the middle of the print" in capsys.readouterr().err
         assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 0
-        told, record = capsys.readouterr().err, printer.record
-    assert "the printer has restarted; lines" in told
+        errors, record = capsys.readouterr().err, printer.record
+    assert "the printer has restarted; lines" in errors
     assert record.clamped == 0
     assert [event for _, event in record.events if event.startswith("homed")] == ["homed XYZ", "homed XY"]
     assert record.end[-1, :5].tolist() == pytest.approx(whole[-1, :5])
@@ -430,7 +430,7 @@ def test_the_command_resumes_after_a_power_cut(
 
 def test_when_the_table_must_turn_back_it_turns_above_everything() -> None:
     turned = {"X": 20.0, "Y": 14.0, "Z": 150.0, "A": -20.0, "C": 360.0, "E": 3.0}
-    way = plan_resume(point(LINE, number=10), found(turned, last=20), PROFILE)
+    way = plan_resume(point(LINE, number=10), asked(turned, last=20), PROFILE)
     lines = list(way.start.before)
     turn = next(i for i, line in enumerate(lines) if re.match(r"G0 A30\S* C725", line))
     heights = [float(m[1]) for line in lines[:turn] if (m := re.match(r"G0 Z(\S+)", line))]
@@ -474,7 +474,7 @@ def test_every_firmware_is_told_where_its_axes_stand(dialect: str) -> None:
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
     x, y = (0.5 * sum(axis.limits_mm) for axis in (profile.machine.x, profile.machine.y))
     lines = [f"G92 {letters[0]}0 {letters[1]}0", f"G0 X{x} Y{y} Z60 F600", "M109 S200", *(f"G1 X{x + k} E1" for k in range(9))]
-    way = plan_resume(read_interrupted_print(lines, Checkpoint(6, 6, 6, 5), profile, 120), found(), profile)
+    way = plan_resume(read_interrupted_print(lines, Checkpoint(6, 6, 6, 5), profile, 120), asked(), profile)
     assert re.search(r"(G92 X\S+ Y\S+ Z60|SET_KINEMATIC_POSITION X=\S+ Y=\S+ Z=60)", "\n".join(way.start.before))
     assert "G28 X Y" in way.start.before
 
@@ -487,7 +487,7 @@ def cancelled(text: GcodeFile, port: str) -> Path:
             text,
             port,
             250000,
-            on_progress=lambda told: stop.set() if told.file_line > 190 else None,
+            on_progress=lambda progress: stop.set() if progress.file_line > 190 else None,
             stop=stop,
             profile=PROFILE,
             journal=journal,
@@ -506,11 +506,11 @@ def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
         assert main(["resume", str(journal), "--port", printer.path, "--yes", "--journal", further, "--watch"]) == 0
         record = printer.record
         assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
-    told = capsys.readouterr().err
-    assert re.search(r"p, part [23] of 3, (layer 1, )?line \d+ of 310", told)
-    assert "has not restarted and knows its place" in told
-    assert "watch the print at http://" in told
-    assert "was resumed already, what became of it is in" in told
+    errors = capsys.readouterr().err
+    assert re.search(r"p, part [23] of 3, (layer 1, )?line \d+ of 310", errors)
+    assert "has not restarted and knows its place" in errors
+    assert "watch the print at http://" in errors
+    assert "was resumed already, what became of it is in" in errors
     assert record.end[-1, 3:5].tolist() == [-20.0, 360.0]
 
 
@@ -524,9 +524,9 @@ def test_the_command_lists_the_prints_that_can_be_resumed_and_no_others(
             journal.write(state)
     (journal.path.parent / "torn.journal").write_bytes(b"nothing")
     assert main(["resume"]) == 0
-    path, told = capsys.readouterr().out.splitlines()
+    path, summary = capsys.readouterr().out.splitlines()
     assert path.endswith("-cut-off.journal")
-    assert told.startswith("    cut-off on generic A/C table, up to line 10, ")
+    assert summary.startswith("    cut-off on generic A/C table, up to line 10, ")
     assert main(["resume", path]) == 1
     assert capsys.readouterr().err.endswith("at which port is the printer? --port PORT is expected\n")
 
@@ -556,10 +556,10 @@ def test_a_cut_while_the_table_turned_is_resumed_by_a_profile_that_tells_how_it_
     for machine in ((), ("--machine", str(mine))):
         with SimulatedPrinter(PROFILE.machine) as printer:
             assert main(["resume", str(journal.path), "--port", printer.path, *machine]) == 1
-    told = capsys.readouterr().err.splitlines()
-    assert "the table was turning about A" in told[2]
-    assert "name that profile with --machine" in told[2]
-    assert told[-2] == "then: machine.gcode.resume homes the axes, bed and nozzle heat"
+    errors = capsys.readouterr().err.splitlines()
+    assert "the table was turning about A" in errors[2]
+    assert "name that profile with --machine" in errors[2]
+    assert errors[-2] == "then: machine.gcode.resume homes the axes, bed and nozzle heat"
 
 
 def test_a_journal_stays_whole_when_the_printer_does_not_answer(
@@ -587,18 +587,18 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
         journal.write(Checkpoint(120, 120, 100, 20, state="finished"))
     assert main(["resume", str(journal.path), "--port", "x"]) == 1
     assert main(["resume", str(journal.path), "--port", "sim"]) == 1
-    told = capsys.readouterr().err
-    assert "--machine gives another machine" in told
-    assert "give --yes where there is no terminal" in told
-    assert "ran to its end" in told
-    assert "a simulated printer ends with its print" in told
+    errors = capsys.readouterr().err
+    assert "--machine gives another machine" in errors
+    assert "give --yes where there is no terminal" in errors
+    assert "ran to its end" in errors
+    assert "a simulated printer ends with its print" in errors
 
 
 def test_a_cancel_is_heeded_while_the_printer_is_asked_where_it_stands(text: GcodeFile) -> None:
     printer, stop = VirtualPrinter(PROFILE.machine), Flag()
     deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
     stop.set()
-    outcome = print_lines(text, PATH, stop=stop, medium=deaf, profile=PROFILE, begin=lambda found: ResumePoint(1, ()))
+    outcome = print_lines(text, PATH, stop=stop, medium=deaf, profile=PROFILE, begin=lambda seen: ResumePoint(1, ()))
     assert (outcome.cancelled, outcome.sent, outcome.heaters_off) == (True, 0, None)
     assert printer.now_s < 1.0
 
@@ -637,5 +637,5 @@ def test_the_last_line_is_known_by_a_refusal_or_by_what_is_wanted_next(said: byt
         return said + b"ok\n" if b"N999999" in data else b"ok T:20.0 /0.0\n" if b"M105" in data else b""
 
     with on_terminal(answer) as path, open_port(path, 115200) as port:
-        told = status.query_status(port, SERIAL, lambda: None)
-    assert told.last_number == 41
+        seen = status.query_status(port, SERIAL, lambda: None)
+    assert seen.last_number == 41

@@ -76,8 +76,8 @@ class Print:
 
     def after(self, words: bytes) -> bytes:
         """All bytes sent after these words were heard."""
-        place = next(k for k, (_, way, data) in enumerate(self.traffic) if way == "<" and words in data)
-        return b"".join(data for _, way, data in self.traffic[place:] if way == ">")
+        index = next(k for k, (_, way, data) in enumerate(self.traffic) if way == "<" and words in data)
+        return b"".join(data for _, way, data in self.traffic[index:] if way == ">")
 
 
 def printed(
@@ -113,8 +113,8 @@ def assert_exact(done: Print, whole: bool = True, strokes: Sequence[str] = STROK
     got = np.column_stack([record.end[:, :2], pushed])[moved & (pushed > 1e-9)]
     wanted = np.array([[float(word[1:]) for word in line.split()[1:4]] for line in strokes])
     assert len(got) == len(wanted) if whole else len(got) <= len(wanted)
-    kept = len(got) if whole else max(0, len(got) - 1)
-    assert np.abs(got[:kept] - wanted[:kept]).max(initial=0.0) < 1e-6
+    compared = len(got) if whole else max(0, len(got) - 1)
+    assert np.abs(got[:compared] - wanted[:compared]).max(initial=0.0) < 1e-6
 
 
 def assert_cold(done: Print) -> None:
@@ -330,9 +330,9 @@ def test_scenario_20_a_reset_without_banner_is_no_reason_to_repeat_from_line_1(b
 
 @pytest.mark.parametrize("unit", ["byte", "line"])
 def test_scenario_21_the_cable_pulled_for_good(unit: str) -> None:
-    place = byte(LINE, 5) if unit == "byte" else LINE
+    at = byte(LINE, 5) if unit == "byte" else LINE
     before = set(threading.enumerate())
-    done = printed([Fault("disconnect", place, unit=unit)])  # type: ignore[arg-type]
+    done = printed([Fault("disconnect", at, unit=unit)])  # type: ignore[arg-type]
     assert isinstance(done.error, PortError)
     assert str(done.error).count("was lost") == 1
     assert "its heaters may still be on" in str(done.error)
@@ -361,10 +361,10 @@ def test_scenario_23_a_board_that_restarts_when_the_port_opens(late_s: float) ->
 
 
 def test_scenario_24_a_printer_silent_for_ever() -> None:
-    told: dict[str, float] = {}
-    done = printed([Fault("stall", LINE)], on_progress=lambda progress: told.setdefault(progress.message, progress.elapsed_s))
+    said_s: dict[str, float] = {}
+    done = printed([Fault("stall", LINE)], on_progress=lambda progress: said_s.setdefault(progress.message, progress.elapsed_s))
     last_s = max(now_s for now_s, way, _ in done.traffic if way == "<" and now_s < 60)
-    assert told["no answer from the printer, it is asked again"] - last_s < 31.0
+    assert said_s["no answer from the printer, it is asked again"] - last_s < 31.0
     assert isinstance(done.error, SilenceError | PrinterError)
     assert done.printer.now_s < 600
     assert "its heaters may still be on, look at the printer" in str(done.error)
@@ -537,8 +537,8 @@ def test_scenario_36_two_waits_with_a_line_in_flight_find_the_lost_one() -> None
 
 
 def test_scenario_37_the_c_axis_and_the_chamber_are_not_confused() -> None:
-    place = read_event(b"X:1.00 Y:2.00 Z:3.00 A:-30.00 C:725.00 E:0.10 Count X:80 Y:160 Z:1200 A:-240 C:5800")
-    assert place == Position((("X", 1.0), ("Y", 2.0), ("Z", 3.0), ("A", -30.0), ("C", 725.0), ("E", 0.1)))
+    position = read_event(b"X:1.00 Y:2.00 Z:3.00 A:-30.00 C:725.00 E:0.10 Count X:80 Y:160 Z:1200 A:-240 C:5800")
+    assert position == Position((("X", 1.0), ("Y", 2.0), ("Z", 3.0), ("A", -30.0), ("C", 725.0), ("E", 0.1)))
     heat = read_event(b" T:210.10 /210.00 B:60.00 /60.00 C:35.20 /40.00 @:50 B@:20 C@:0")
     assert heat == Temperature(210.1, 210.0, 60.0, 60.0)
     assert read_event(b"X:1.00 Y:2.00 Z:3.00 B:30.00 C:5.00 E:0.00") == Position((
@@ -558,12 +558,12 @@ def test_scenario_38_odd_line_ends_blanks_and_rubbish_are_survived(size: int) ->
 def test_scenario_39_a_pause_comes_back_to_tilt_turn_filament_and_feed() -> None:
     control, states = Control(), list[str]()
 
-    def progress(told: Progress) -> None:
-        if told.state == "printing" and told.acknowledged > 60 and "paused" not in states:
+    def progress(moment: Progress) -> None:
+        if moment.state == "printing" and moment.acknowledged > 60 and "paused" not in states:
             control.ask(Command.PAUSE)
-        if told.state == "paused" and "paused" not in states:
+        if moment.state == "paused" and "paused" not in states:
             control.ask(Command.RESUME)
-        states.append(told.state)
+        states.append(moment.state)
 
     tilted = ["G1 Z60 F900", "G92 A0 C0", "G1 A30 C725 F6000", "G1 X20 Y30 F6000"]
     strokes = [line.replace("F6000", "").strip() for line in STROKES]
@@ -592,9 +592,9 @@ def journal_of(lines: Sequence[str], done_after: int, path: Path) -> tuple[int, 
 
 @pytest.mark.parametrize("line", range(10, 150, 9))
 def test_scenario_40_after_a_power_cut_at_any_line_the_journal_is_never_ahead_of_the_printer(line: int, tmp_path: Path) -> None:
-    told, executed = journal_of([*HEAT, *STROKES], line, tmp_path / "j")
-    assert told <= executed
-    assert executed - told <= 64
+    journalled, executed = journal_of([*HEAT, *STROKES], line, tmp_path / "j")
+    assert journalled <= executed
+    assert executed - journalled <= 64
 
 
 def test_scenario_41_a_torn_last_record_leaves_the_one_before(tmp_path: Path) -> None:
@@ -628,15 +628,15 @@ def test_scenario_43_a_cancel_while_lines_are_being_repeated(build: BuildOptions
 
 
 def test_scenario_44_a_soft_limit_is_refused_before_printing() -> None:
-    found = dry_run(["G21", "G90", "G28", "G0 A200"], PROFILE).findings
-    assert {finding.line for finding in found if finding.severity == "error"} == {4}
-    assert any("A goes to 200 deg" in finding.message for finding in found)
+    findings = dry_run(["G21", "G90", "G28", "G0 A200"], PROFILE).findings
+    assert {finding.line for finding in findings if finding.severity == "error"} == {4}
+    assert any("A goes to 200 deg" in finding.message for finding in findings)
 
 
 @pytest.mark.parametrize(("turned", "errors"), [("G0 A30", 2), ("G0 C90", 2), ("G0 A0 C0", 0)])
 def test_scenario_45_the_tool_centre_point_switched_while_the_table_is_turned_is_refused(turned: str, errors: int) -> None:
-    found = dry_run(["G21", "G90", "G28", "G0 Z100", turned, "G43.4", "G49"], PROFILE).findings
-    assert sum(finding.code == "following-switched" for finding in found if finding.severity == "error") == errors
+    findings = dry_run(["G21", "G90", "G28", "G0 Z100", turned, "G43.4", "G49"], PROFILE).findings
+    assert sum(finding.code == "following-switched" for finding in findings if finding.severity == "error") == errors
 
 
 @pytest.mark.parametrize("surplus", [1, 2, 3])

@@ -125,10 +125,10 @@ def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_ask
     assert print_lines(HOMING, PATH, medium=printer.medium, profile=SLOW).acknowledged == len(HOMING)
     wire = printer.medium.open(PATH, 0)
     last = printer.firmware.last_number
-    told = query_status(wire, printer.medium, lambda: None)
-    assert told.last_number == last
-    assert told.position is not None
-    assert dict(told.position.axes)["X"] == 10.0
+    seen = query_status(wire, printer.medium, lambda: None)
+    assert seen.last_number == last
+    assert seen.position is not None
+    assert dict(seen.position.axes)["X"] == 10.0
     assert heaters_off(wire, printer.medium) is Heaters.OFF
 
 

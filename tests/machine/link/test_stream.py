@@ -84,11 +84,11 @@ def test_the_end_of_a_print_is_the_end_of_its_moves() -> None:
 
 
 def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
-    told: list[Progress] = []
+    shown: list[Progress] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + body, printer.path, 250000, on_progress=told.append, timing=PATIENT)
-    last = told[-1]
+        print_lines(HEAT + body, printer.path, 250000, on_progress=shown.append, timing=PATIENT)
+    last = shown[-1]
     assert (last.sent, last.acknowledged, last.total) == (6, 6, 6)
     assert (last.part, last.parts, last.layer, last.share) == (2, 2, 2, 0.5)
     assert last.left_s == pytest.approx(180.0, abs=60.0)
@@ -105,29 +105,29 @@ COMMENTED = {
 
 @pytest.mark.parametrize("slicer", COMMENTED)
 def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) -> None:
-    told: list[Progress] = []
+    shown: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=told.append, timing=PATIENT)
+        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=shown.append, timing=PATIENT)
     parsed = parse_gcode(COMMENTED[slicer], MACHINE)
-    assert (told[-1].layer, told[-1].part or 0) == (2, parsed.part[-1]) == (parsed.layer[-1], parsed.part[-1])
+    assert (shown[-1].layer, shown[-1].part or 0) == (2, parsed.part[-1]) == (parsed.layer[-1], parsed.part[-1])
 
 
 def test_m73_and_m220_count_in_lower_case_too() -> None:
-    told: list[Progress] = []
+    shown: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, on_progress=told.append, timing=PATIENT)
-    assert (told[-1].share, told[-1].feed_percent) == (0.5, 80.0)
+        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, on_progress=shown.append, timing=PATIENT)
+    assert (shown[-1].share, shown[-1].feed_percent) == (0.5, 80.0)
 
 
 def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
-    told: list[Progress] = []
+    shown: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
         schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
         print_lines(
-            iter(["G21", "M220 S50", "G90"]), printer.path, 250000, on_progress=told.append, schedule=schedule, timing=PATIENT
+            iter(["G21", "M220 S50", "G90"]), printer.path, 250000, on_progress=shown.append, schedule=schedule, timing=PATIENT
         )
-    assert told[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
-    assert told[-1].total is None
+    assert shown[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
+    assert shown[-1].total is None
 
 
 def test_where_the_pace_is_not_known_the_one_so_far_holds() -> None:
@@ -172,11 +172,11 @@ def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], No
     """Told of the progress of a print, does something as soon as so many commands are sent."""
     waiting = [act]
 
-    def told(progress: Progress) -> None:
+    def watch(progress: Progress) -> None:
         if progress.sent >= count and waiting:
             waiting.pop()()
 
-    return told
+    return watch
 
 
 @pytest.mark.parametrize("lines", [HEAT + strokes(3000), ["M109 S250"]])
@@ -240,11 +240,11 @@ def test_random_faults_end_in_the_exact_moves_or_in_an_error(seed: int) -> None:
 
 def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
-        other = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
-        kill = _once_sent(9, lambda: os.write(other, b"\nM112\n"))
+        intruder = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
+        kill = _once_sent(9, lambda: os.write(intruder, b"\nM112\n"))
         with pytest.raises(FirmwareError, match="Printer halted"):
             print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=kill, timing=PATIENT)
-        os.close(other)
+        os.close(intruder)
         assert printer.record.nozzle_target_c == 0.0
 
 

@@ -144,7 +144,10 @@ def test_a_printer_that_waits_for_a_person_says_so_until_it_goes_on() -> None:
         PROFILE.machine, faults=FaultScript((Fault("error", at=9, unit="line", text="echo:busy: paused for user"),))
     )
     print_lines(
-        ["G28", "G1 X5 F600", *["G4 S1"] * 8], PATH, medium=printer.medium, on_progress=lambda told: shown.append(told.message)
+        ["G28", "G1 X5 F600", *["G4 S1"] * 8],
+        PATH,
+        medium=printer.medium,
+        on_progress=lambda progress: shown.append(progress.message),
     )
     assert list(dict.fromkeys(shown)) == ["", "the printer waits for a person: look at its display"]
     assert shown[-1] == ""

@@ -96,10 +96,10 @@ class Handler(BaseHTTPRequestHandler):
         fields = {}
         for part in parts:
             head, _, content = part.removeprefix(b"\r\n").partition(b"\r\n\r\n")
-            found = re.search(rb'form-data; name="([^"]*)"(?:; filename="([^"]*)")?', head)
-            assert found is not None
+            disposition = re.search(rb'form-data; name="([^"]*)"(?:; filename="([^"]*)")?', head)
+            assert disposition is not None
             assert content.endswith(b"\r\n")
-            fields[found[1].decode()] = ((found[2] or b"").decode(), content[:-2])
+            fields[disposition[1].decode()] = ((disposition[2] or b"").decode(), content[:-2])
         return fields
 
 
@@ -343,8 +343,8 @@ def stand_in(
 ) -> Iterator[tuple[Job, str]]:
     """A print server of a kind: its job and the address of it. certificate: a PEM file with its key, for TLS."""
     job = Job()
-    made = type(kind, (handler or STAND_INS[kind],), {"job": job, "key": key, "sessions": set(), **more})
-    server = _Server(("127.0.0.1", 0), made)
+    bound = type(kind, (handler or STAND_INS[kind],), {"job": job, "key": key, "sessions": set(), **more})
+    server = _Server(("127.0.0.1", 0), bound)
     if certificate is not None:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.load_cert_chain(certificate)

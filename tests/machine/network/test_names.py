@@ -120,9 +120,9 @@ def test_a_host_is_the_same_in_capitals() -> None:
 def test_the_variable_goes_before_the_file_and_no_key_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     write_servers('[servers."octopi"]\nkey = "one"\n')
     monkeypatch.setenv(VARIABLE, "other")
-    found = read_credentials(parse_server_address("octoprint:octopi"))
-    assert found.key == "other"
-    assert "other" not in repr(found)
+    credentials = read_credentials(parse_server_address("octoprint:octopi"))
+    assert credentials.key == "other"
+    assert "other" not in repr(credentials)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows keeps a user's folders to the user")

@@ -132,8 +132,8 @@ def test_a_stop_for_which_the_key_cannot_be_read_is_told_as_not_confirmed() -> N
     servers_file().parent.mkdir(parents=True)
     servers_file().write_text("key")
     servers_file().chmod(0o600)
-    told = rescue("octoprint:printer", 115200, emergency=True)
-    assert told.startswith("emergency stop: octoprint:printer did not confirm it: cut the power (file of servers ")
+    sentence = rescue("octoprint:printer", 115200, emergency=True)
+    assert sentence.startswith("emergency stop: octoprint:printer did not confirm it: cut the power (file of servers ")
 
 
 @every_kind
@@ -242,9 +242,13 @@ def test_a_moonraker_that_speaks_as_octoprint_is_told_apart() -> None:
             server.greet()
 
 
-@pytest.mark.parametrize(("kind", "other"), [("octoprint", "moonraker"), ("moonraker", "duet"), ("duet", "octoprint")])
-def test_another_kind_of_server_is_none(kind: str, other: str) -> None:
-    with stand_in(other) as (_, address), open_server(address.replace(other, kind, 1)) as server, pytest.raises(ServerError):
+@pytest.mark.parametrize(("kind", "real"), [("octoprint", "moonraker"), ("moonraker", "duet"), ("duet", "octoprint")])
+def test_another_kind_of_server_is_none(kind: str, real: str) -> None:
+    with (
+        stand_in(real) as (_, address),
+        open_server(address.replace(real, kind, 1)) as server,
+        pytest.raises(ServerError),
+    ):
         server.greet()
 
 
@@ -369,8 +373,8 @@ def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("openssl makes the certificate")
     file = tmp_path_factory.mktemp("tls") / "server.pem"
     words = "req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=printer"
-    made = ["openssl", *words.split(), "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(file), "-out", f"{file}.crt"]
-    subprocess.run(made, check=True, capture_output=True)
+    command = ["openssl", *words.split(), "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(file), "-out", f"{file}.crt"]
+    subprocess.run(command, check=True, capture_output=True)
     file.write_text(file.read_text() + Path(f"{file}.crt").read_text())
     return file
 
@@ -457,8 +461,8 @@ def follow_unanswered(status: Callable[[], JobStatus]) -> End:
 
 
 def test_a_print_whose_start_was_not_answered_is_followed_all_the_same() -> None:
-    told = iter([Phase.PRINTING] * 20)
-    assert follow_unanswered(lambda: JobStatus(next(told, Phase.DONE), "box.gcode")) is End.DONE
+    phases = iter([Phase.PRINTING] * 20)
+    assert follow_unanswered(lambda: JobStatus(next(phases, Phase.DONE), "box.gcode")) is End.DONE
 
 
 def test_the_end_of_an_earlier_print_is_not_taken_for_ours(monkeypatch: pytest.MonkeyPatch) -> None:

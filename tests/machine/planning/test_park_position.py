@@ -38,7 +38,7 @@ def program_of(machine: str, upright: bool) -> tuple[Profile, MachineProgram]:
         parts.append(part(2, mesh, plane, allowed_poses(profile.machine, plane.normal, mesh.vertices)[0], profile.machine))
     whole = Decomposition("post", from_manifold(post), tuple(parts), len(parts), "classic", 100.0, 0.0, 0, 1, 0.0)
     layers = {1: 150 if upright else 105, 2: 5}
-    return profile, plan(whole, [squares(each, profile, layers[each.index]) for each in parts], profile)
+    return profile, plan(whole, [squares(piece, profile, layers[piece.index]) for piece in parts], profile)
 
 
 ENDS = [(machine, upright) for machine in MACHINES for upright in (True, False) if upright or load(machine=machine).machine.tilts]

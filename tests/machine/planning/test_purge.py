@@ -40,7 +40,7 @@ def test_every_shipped_machine_fills_its_nozzle_beside_the_print(machine: str) -
     assert line.filament_mm.sum() == pytest.approx(3.9 * (profile.machine.head.nozzle_mm / 0.4) ** 1.05, rel=0.15)
     assert program.moves.index(line) < next(k for k, move in enumerate(program.moves) if isinstance(move, BeginPart))
     findings = dry_run(tuple(write_gcode(program, profile)), profile).findings
-    assert [each.code for each in findings if each.code != "uncalibrated"] == []
+    assert [finding.code for finding in findings if finding.code != "uncalibrated"] == []
 
 
 def test_the_line_keeps_clear_of_the_print_and_is_folded_or_left_out_where_there_is_little_room() -> None:

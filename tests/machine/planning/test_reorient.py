@@ -59,8 +59,8 @@ def _turned(machine: Machine, pose: Pose) -> np.ndarray:
         around, radii = np.linspace(0, 2 * np.pi, 72, endpoint=False), np.linspace(0, table.radius_mm, 16)
         plate = np.array([[r * np.cos(a), r * np.sin(a), 0.0] for r in radii for a in around])
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
-    found = [machine_points(machine, pose, np.vstack([plate, _filled(PRINT.min(axis=0), PRINT.max(axis=0))]))]
-    return np.vstack(found + [machine_points(machine, tilted, _filled(box.min_mm, box.max_mm)) for box in machine.cradle])
+    bodies = [machine_points(machine, pose, np.vstack([plate, _filled(PRINT.min(axis=0), PRINT.max(axis=0))]))]
+    return np.vstack(bodies + [machine_points(machine, tilted, _filled(box.min_mm, box.max_mm)) for box in machine.cradle])
 
 
 def _least_distance(name: str, tips: np.ndarray) -> np.ndarray:
@@ -100,13 +100,13 @@ def test_through_the_whole_turn_the_head_keeps_the_lift_from_table_cradle_and_pr
 @pytest.mark.parametrize("name", ["disc", "cradle"])
 def test_no_stand_of_the_family_is_quicker_and_safe_too(name: str) -> None:
     machine, way = _machine(name), _route(name)
-    found = []
+    quicker = []
     for x, y in list(stands(machine, _turn_of(machine)))[::4]:
         for z in np.arange(AT[2] + machine.clearance_mm, way.z_mm + 40.0, 4.0):
             seconds = way_s(_turn_of(machine), (x, y), (z, max(z, TARGET[2] + 1)), machine, SPEEDS)
             if seconds < way.seconds - 0.25:
-                found.append((x, y, z))
-    assert not found or (_least_distance(name, np.array(found)) < machine.lift_mm).all()
+                quicker.append((x, y, z))
+    assert not quicker or (_least_distance(name, np.array(quicker)) < machine.lift_mm).all()
 
 
 def test_a_cradle_in_the_way_costs_time() -> None:

@@ -40,7 +40,7 @@ def test_the_print_stops_before_a_layer_in_the_words_of_the_firmware(dialect: st
 def test_the_tip_waits_above_all_that_stands_there_with_the_filament_pulled_back() -> None:
     lines = written("marlin", ["1:3"], [])
     findings = dry_run(lines, load()).findings
-    assert [each.code for each in findings if each.severity == "error"] == ["air"]  # the post is three layers high
+    assert [finding.code for finding in findings if finding.severity == "error"] == ["air"]  # the post is three layers high
     at = next(k for k, line in enumerate(lines) if ";PAUSE:" in line)
     assert lines[at - 2 : at] == [";WIPE_END", "G0 Z10.400 F600"]
     assert lines[at - 3].endswith("E-0.80000 F5250")
@@ -70,6 +70,6 @@ def test_pressure_advance_is_set_in_the_words_of_the_firmware(dialect: str, line
     assert lines.index(line) < lines.index(";LAYER_CHANGE")
 
 
-@pytest.mark.parametrize("place", ["2:15", "1:8.4mm", "1:1234.56789mm", "1:0.00001mm", "3:20mm"])
-def test_a_stop_is_named_as_it_was_typed(place: str) -> None:
-    assert [stop.option for stop in parse_stops([place], [])] == [f"--pause {place}"]
+@pytest.mark.parametrize("typed", ["2:15", "1:8.4mm", "1:1234.56789mm", "1:0.00001mm", "3:20mm"])
+def test_a_stop_is_named_as_it_was_typed(typed: str) -> None:
+    assert [stop.option for stop in parse_stops([typed], [])] == [f"--pause {typed}"]

@@ -27,8 +27,8 @@ def _towers(*settings: str) -> tuple[MachineProgram, Profile]:
     far = mesh.vertices + np.array([12.0, 0.0, 0.0])
     both = Mesh(np.vstack([mesh.vertices, far]), np.vstack([mesh.faces, mesh.faces + len(far)]).astype(mesh.faces.dtype))
     part = whole(both)
-    found = Decomposition("towers", both, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
-    return plan(found, [slice_part(part, profile)], profile), profile
+    decomposition = Decomposition("towers", both, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    return plan(decomposition, [slice_part(part, profile)], profile), profile
 
 
 def _filament(program: MachineProgram) -> tuple[float, float]:
@@ -66,7 +66,7 @@ def test_a_wipe_goes_over_the_path_just_printed_at_the_pace_of_the_filament() ->
 def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
     layer, checked, pulled = BeginLayer(1, 1, 0.0, 0.2, 0.0), 0, False
     moves = _towers("process.lift_mm=0.4")[0].moves
-    last = max(place for place, move in enumerate(moves) if isinstance(move, Stroke))  # then the tip goes aside
+    last = max(index for index, move in enumerate(moves) if isinstance(move, Stroke))  # then the tip goes aside
     for before, move in pairwise(moves[:last]):
         layer = move if isinstance(move, BeginLayer) else layer
         pulled = isinstance(move, Wipe) or (pulled and not isinstance(move, Stroke))

@@ -43,8 +43,8 @@ class TestSlicers:
         text = (tmp_path / "box.gcode").read_text()
         machine = load("three_axis", settings=[f"machine.dialect={dialect}"]).machine
         parsed = parse_gcode(text.splitlines(), machine)
-        told = float(re.search(r"filament used \[mm\] = ([0-9.]+)", text)[1])  # type: ignore[index]
-        assert parsed.filament_mm.max() == pytest.approx(told, abs=0.02)
+        used_mm = float(re.search(r"filament used \[mm\] = ([0-9.]+)", text)[1])  # type: ignore[index]
+        assert parsed.filament_mm.max() == pytest.approx(used_mm, abs=0.02)
         assert parsed.layers == text.count(";LAYER_CHANGE")
         assert parsed.ignored == {}
 
@@ -171,11 +171,11 @@ def test_any_scraps_are_read_or_refused_with_a_line(lines: list[str], machine: M
 
 @settings(max_examples=60, deadline=None)
 @given(st.sampled_from(list(dialects())), st.integers(0, 5000), st.binary(min_size=1, max_size=3), st.booleans())
-def test_our_own_text_with_a_few_bytes_changed_never_crashes(dialect: str, place: int, rubbish: bytes, insert: bool) -> None:
+def test_our_own_text_with_a_few_bytes_changed_never_crashes(dialect: str, begin: int, rubbish: bytes, insert: bool) -> None:
     chosen, lines, _ = both(dialect, "table")
     text = "\n".join(lines[:200])
-    place %= len(text)
-    edited = text[:place] + rubbish.decode("latin-1") + text[place + (0 if insert else len(rubbish)) :]
+    begin %= len(text)
+    edited = text[:begin] + rubbish.decode("latin-1") + text[begin + (0 if insert else len(rubbish)) :]
     said, numbers = outcome(edited.split("\n"), chosen.machine)
     assert said is None or said.startswith("line ")
     assert np.isfinite(numbers).all()
@@ -204,8 +204,8 @@ def test_a_macro_of_the_machine_s_own_may_home_and_heat_unseen(start: str, end: 
     print_ = ["M104 S210", "G1 Z0.2 F600", "G1 X50 Y50", "M83", "G1 X90 E1"]
 
     def severities(lines: list[str]) -> dict[str, str]:
-        found = dry_run(lines, klipper).findings
-        return {f.code: f.severity for f in found if f.code in ("not-homed", "cold-extrusion", "heater-on")}
+        findings = dry_run(lines, klipper).findings
+        return {f.code: f.severity for f in findings if f.code in ("not-homed", "cold-extrusion", "heater-on")}
 
     assert severities(print_) == dict.fromkeys(("not-homed", "cold-extrusion", "heater-on"), "error")
     assert severities([start, *print_]) == {"not-homed": "warning", "cold-extrusion": "warning", "heater-on": "error"}

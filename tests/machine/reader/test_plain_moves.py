@@ -34,9 +34,9 @@ def in_turn(lines: list[str]) -> list[str]:
     return [line if line.startswith(";") else f"{line} ;" for line in lines]
 
 
-def assert_same(one: ParsedProgram, other: ParsedProgram) -> None:
+def assert_same(first: ParsedProgram, second: ParsedProgram) -> None:
     for field in fields(ParsedProgram):
-        a, b = getattr(one, field.name), getattr(other, field.name)
+        a, b = getattr(first, field.name), getattr(second, field.name)
         assert np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b, field.name
 
 

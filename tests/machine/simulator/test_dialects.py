@@ -21,10 +21,10 @@ SERIAL = [name for name, dialect in dialects().items() if dialect.serial]
 
 
 def said(firmware: SimulatedFirmware, *lines: str) -> str:
-    return "".join([_told(firmware, line) for line in lines])
+    return "".join([_reply(firmware, line) for line in lines])
 
 
-def _told(firmware: SimulatedFirmware, line: str) -> str:
+def _reply(firmware: SimulatedFirmware, line: str) -> str:
     firmware.receive(f"{line}\n".encode())
     return firmware.advance(inf).decode()
 

@@ -142,9 +142,9 @@ def test_a_cable_that_is_out_carries_nothing_until_it_is_back() -> None:
 @given(st.integers(0, 10**6), st.floats(0.001, 1.0))
 def test_chance_strikes_as_often_as_it_says_and_the_same_for_a_seed(seed: int, chance: float) -> None:
     script = FaultScript((Fault("drop", chance=chance),), seed)
-    struck = len(list(takewhile(lambda place: place < 20000, script.places(0))))
+    struck = len(list(takewhile(lambda count: count < 20000, script.strikes(0))))
     assert abs(struck - 20000 * chance) <= 6 * (20000 * chance * (1 - chance)) ** 0.5 + 1
-    assert list(islice(script.places(0), 50)) == list(islice(script.places(0), 50))
+    assert list(islice(script.strikes(0), 50)) == list(islice(script.strikes(0), 50))
 
 
 def test_a_random_script_is_the_same_for_a_seed_and_knows_all_kinds() -> None:

@@ -32,13 +32,13 @@ def resend(complaint: str, last: int) -> list[str]:
 # Numbers and checksums
 
 
-@pytest.mark.parametrize(("told", "following"), [
+@pytest.mark.parametrize(("line", "following"), [
     ("N0 M110 N0*125\n", 1), ("M110 N0\n", 1), ("M110 N-1\n", 0), ("N-1 M110 N-1*125\n", 0), ("M110 N41\n", 42),
     ("N7 M110*36\n", 8),
 ])  # fmt: skip
-def test_line_numbers_begin_anew_in_every_way_that_hosts_write_it(told: str, following: int) -> None:
+def test_line_numbers_begin_anew_in_every_way_that_hosts_write_it(line: str, following: int) -> None:
     firmware = printer()
-    assert answer(firmware, told) == ["ok"]
+    assert answer(firmware, line) == ["ok"]
     assert answer(firmware, frame(following, "G21")) == ["ok"]
 
 
@@ -207,7 +207,7 @@ def test_a_reset_greets_and_begins_numbers_and_places_anew() -> None:
     answer(firmware, frame(1, "G1 X5") + frame(2, "M104 S200"))
     firmware.reset()
     assert answer(firmware, frame(1, "M114"))[: len(SIMULATED.banner)] == list(SIMULATED.banner)
-    assert (firmware.last_number, firmware.record().nozzle_target_c, firmware.board.motion.place[0]) == (1, 0.0, 0.0)
+    assert (firmware.last_number, firmware.record().nozzle_target_c, firmware.board.motion.position[0]) == (1, 0.0, 0.0)
 
 
 # Urgent orders
@@ -276,7 +276,7 @@ def test_an_axis_driven_against_its_end_stays_there_unknown_to_the_firmware() ->
     record = firmware.record()
     assert record.happened("X driven against its end")
     assert record.end[:, 0].tolist() == [162.0, 152.0]
-    assert firmware.board.motion.place[0] == 190.0
+    assert firmware.board.motion.position[0] == 190.0
 
 
 def test_after_a_reset_the_axes_stand_where_they_stood() -> None:

@@ -110,8 +110,8 @@ def test_a_host_that_sends_line_by_line_prints_a_whole_file(first: bytes, number
         for line in lines():
             command = line.partition(";")[0].strip()
             if command:
-                told = command.replace("G1 X", "G1X") if number is None else framed(number, command).decode().rstrip("\n")
-                assert b"Error" not in b"".join(ask(host, f"{told}\n".encode()))
+                sent = command.replace("G1 X", "G1X") if number is None else framed(number, command).decode().rstrip("\n")
+                assert b"Error" not in b"".join(ask(host, f"{sent}\n".encode()))
                 number = None if number is None else number + 1
         ask(host, b"M400\n")
         assert_printed(printer.record)

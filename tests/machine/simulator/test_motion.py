@@ -6,10 +6,10 @@ from machine.simulator.motion import Motion
 from profiles.profile import load
 
 
-def _seconds(words: dict[str, float], told: dict[str, float]) -> float:
+def _seconds(words: dict[str, float], limits: dict[str, float]) -> float:
     """How long one move takes that stands alone, with a corner speed of nothing."""
     motion = Motion(load().machine.model_copy(update={"junction_speed_mm_s": 0.0}), home_start=False)
-    motion.accelerate(told)
+    motion.accelerate(limits)
     motion.reach(motion.target(words), 0.0)
     return motion.planner.ahead()[0].duration_s
 
@@ -18,19 +18,19 @@ STROKE = {"X": 20.0, "E": 1.0, "F": 60000.0}
 TRAVEL = {"X": 20.0, "F": 60000.0}
 
 
-@pytest.mark.parametrize("told", [{"P": 500.0}, {"S": 500.0}, {"P": 500.0, "T": 1000.0}])
-def test_a_stroke_is_accelerated_as_m204_p_tells(told: dict[str, float]) -> None:
-    assert _seconds(STROKE, told) == pytest.approx(2 * sqrt(20 / 500))
+@pytest.mark.parametrize("limits", [{"P": 500.0}, {"S": 500.0}, {"P": 500.0, "T": 1000.0}])
+def test_a_stroke_is_accelerated_as_m204_p_tells(limits: dict[str, float]) -> None:
+    assert _seconds(STROKE, limits) == pytest.approx(2 * sqrt(20 / 500))
 
 
-@pytest.mark.parametrize("told", [{"T": 500.0}, {"S": 500.0}, {"P": 1000.0, "T": 500.0}])
-def test_a_travel_is_accelerated_as_m204_t_tells(told: dict[str, float]) -> None:
-    assert _seconds(TRAVEL, told) == pytest.approx(2 * sqrt(20 / 500))
+@pytest.mark.parametrize("limits", [{"T": 500.0}, {"S": 500.0}, {"P": 1000.0, "T": 500.0}])
+def test_a_travel_is_accelerated_as_m204_t_tells(limits: dict[str, float]) -> None:
+    assert _seconds(TRAVEL, limits) == pytest.approx(2 * sqrt(20 / 500))
 
 
-@pytest.mark.parametrize("told", [{}, {"S": 0.0}, {"P": 1e6, "T": 1e6}, {"T": 500.0}])
-def test_more_than_the_axes_allow_or_nothing_changes_nothing(told: dict[str, float]) -> None:
-    assert _seconds(STROKE, told) == pytest.approx(2 * sqrt(20 / 1500))
+@pytest.mark.parametrize("limits", [{}, {"S": 0.0}, {"P": 1e6, "T": 1e6}, {"T": 500.0}])
+def test_more_than_the_axes_allow_or_nothing_changes_nothing(limits: dict[str, float]) -> None:
+    assert _seconds(STROKE, limits) == pytest.approx(2 * sqrt(20 / 1500))
 
 
 def test_a_turn_keeps_the_axis_s_own_acceleration() -> None:

@@ -109,7 +109,7 @@ def test_a_halt_leaves_the_axes_where_the_ramps_had_brought_them() -> None:
     firmware.board.motion.halt(FIRST_MOVE_DELAY_S + 0.02)
     record = firmware.record()
     assert record.end[-1, 0] == pytest.approx(0.5 * 1500 * 0.02**2)
-    assert firmware.board.motion.place[0] == record.end[-1, 0]
+    assert firmware.board.motion.position[0] == record.end[-1, 0]
     assert (record.moves, record.moving_s) == (1, pytest.approx(0.02))
 
 
@@ -125,7 +125,7 @@ def test_a_halt_forgets_the_filament_that_was_not_pushed() -> None:
     firmware.board.motion.halt(1.0)
     record = firmware.record()
     assert record.end[-1, 5] == pytest.approx(record.end[-1, 0] * 0.2)
-    assert firmware.board.motion.place[5] == pytest.approx(2 * record.end[-1, 5])
+    assert firmware.board.motion.position[5] == pytest.approx(2 * record.end[-1, 5])
 
 
 def test_a_short_record_keeps_the_last_moves_and_all_sums() -> None:

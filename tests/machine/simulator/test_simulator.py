@@ -80,7 +80,7 @@ def test_m114_and_g92_tell_all_axes() -> None:
 def test_homing_is_on_record_as_an_event() -> None:
     firmware = ran("G28 X Y\n")
     assert firmware.record().events[-1][1] == "homed XY"
-    assert firmware.board.motion.place[:3] == [-160.0, -160.0, 0.0]
+    assert firmware.board.motion.position[:3] == [-160.0, -160.0, 0.0]
 
 
 def test_heaters_and_fan_at_the_end_are_on_record() -> None:

@@ -58,11 +58,11 @@ def test_following_switched_at_a_turned_table_believes_the_axes_elsewhere_withou
 
 
 @given(st.lists(st.floats(-90, 90), min_size=5, max_size=5))
-def test_place_and_positions_are_each_other_s_inverse_and_agree_with_the_dry_run_s(place: list[float]) -> None:
+def test_place_and_positions_are_each_other_s_inverse_and_agree_with_the_dry_run_s(tip: list[float]) -> None:
     tcp = TcpKinematics(CHOSEN.machine)
-    positions = tcp.positions(place)
-    assert tcp.place(positions) == pytest.approx(place, abs=1e-9)
-    assert positions[:3] == pytest.approx(axis_positions(CHOSEN.machine, np.array([place]))[0].tolist(), abs=1e-9)
+    positions = tcp.positions(tip)
+    assert tcp.tip(positions) == pytest.approx(tip, abs=1e-9)
+    assert positions[:3] == pytest.approx(axis_positions(CHOSEN.machine, np.array([tip]))[0].tolist(), abs=1e-9)
 
 
 def test_a_turn_keeps_the_tip_on_the_workpiece_within_a_hair() -> None:

@@ -46,8 +46,8 @@ def test_a_script_imports_what_the_others_export_and_uses_it(script: Path) -> No
     text = script.read_text("utf-8")
     assert sum(line.startswith("import ") for line in text.splitlines()) == len(IMPORT.findall(text))
     body = IMPORT.sub("", text)
-    for names, place in IMPORT.findall(text):
-        exported = {name for _, name in EXPORT.findall((script.parent / place).read_text("utf-8"))}
+    for names, path in IMPORT.findall(text):
+        exported = {name for _, name in EXPORT.findall((script.parent / path).read_text("utf-8"))}
         assert set(names.split(", ")) <= exported
         assert [name for name in names.split(", ") if name not in body] == []
 

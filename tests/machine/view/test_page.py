@@ -31,17 +31,17 @@ class Elements(HTMLParser):
 
     def __init__(self, text: str) -> None:
         super().__init__()
-        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.texts: dict[str, str] = {}
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found.append((tag, dict(attrs)))
+        self.tags.append((tag, dict(attrs)))
 
     def handle_data(self, text: str) -> None:
-        last, told = self.found[-1] if self.found else ("", {})
+        last, attributes = self.tags[-1] if self.tags else ("", {})
         if last in ("script", "style", "title"):
-            self.texts.setdefault(last + str(told.get("id", "")), text)
+            self.texts.setdefault(last + str(attributes.get("id", "")), text)
 
 
 def shown(name: str = NASTY, live: bool = False) -> tuple[bytes, Elements]:
@@ -53,25 +53,25 @@ def shown(name: str = NASTY, live: bool = False) -> tuple[bytes, Elements]:
 
 def policy(elements: Elements) -> dict[str, str]:
     """The directives of the content security policy."""
-    (told,) = [a for tag, a in elements.found if tag == "meta" and a.get("http-equiv") == "Content-Security-Policy"]
-    return {name: values for name, _, values in (each.strip().partition(" ") for each in str(told["content"]).split(";"))}
+    (attributes,) = [a for tag, a in elements.tags if tag == "meta" and a.get("http-equiv") == "Content-Security-Policy"]
+    return {name: values for name, _, values in (rule.strip().partition(" ") for rule in str(attributes["content"]).split(";"))}
 
 
 def test_a_name_is_text_and_nothing_else() -> None:
     plain, nasty = (Elements(shown(name)[0].decode()) for name in ("plain.stl", NASTY))
-    assert [tag for tag, _ in plain.found] == [tag for tag, _ in nasty.found]
+    assert [tag for tag, _ in plain.tags] == [tag for tag, _ in nasty.tags]
     assert nasty.texts["title"].startswith("<img src=x onerror=alert(1)></title>")
     assert nasty.texts["script"] == plain.texts["script"]
 
 
 def test_the_policy_allows_this_script_and_this_style_alone() -> None:
     _, elements = shown()
-    told = policy(elements)
+    policy_words = policy(elements)
     for directive, element in (("script-src", "script"), ("style-src", "style")):
         digest = sha256(elements.texts[element].encode()).digest()
-        assert told[directive] == f"'sha256-{base64.b64encode(digest).decode()}'"
-    assert told["default-src"] == "'none'"
-    assert "connect-src" not in told
+        assert policy_words[directive] == f"'sha256-{base64.b64encode(digest).decode()}'"
+    assert policy_words["default-src"] == "'none'"
+    assert "connect-src" not in policy_words
 
 
 def test_only_a_served_page_may_ask_its_server() -> None:
@@ -80,18 +80,18 @@ def test_only_a_served_page_may_ask_its_server() -> None:
 
 def test_nothing_is_fetched_and_nothing_stands_in_attributes() -> None:
     content, elements = shown()
-    for tag, told in elements.found:
-        assert not [name for name in told if name.startswith("on") or name in ("src", "srcset", "style", "action", "formaction")]
+    for tag, attrs in elements.tags:
+        assert not [name for name in attrs if name.startswith("on") or name in ("src", "srcset", "style", "action", "formaction")]
         assert tag not in ("base", "iframe", "object", "embed", "img")
-        assert str(told.get("href", "data:")).startswith("data:")
+        assert str(attrs.get("href", "data:")).startswith("data:")
     assert set(re.findall(rb"https?://[\w./]+", content)) <= {b"http://www.w3.org/2000/svg"}
 
 
 def test_the_data_say_what_they_are_called() -> None:
     content, _ = shown()
-    header, found = opened(content)
+    header, arrays = opened(content)
     assert header["title"] == "post and arm"
-    assert len(found["faces"]) > 0
+    assert len(arrays["faces"]) > 0
 
 
 def test_a_name_of_broken_letters_is_shown_with_marks() -> None:
@@ -110,11 +110,11 @@ MOVES = "G28\nM109 S200\nG1 Z0.2 F600\n;TYPE:Perimeter\nG1 X10 E1\nG1 Y10 E2\nM1
 def test_view_names_the_page_after_the_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("moves.gcode").write_text(MOVES)
     assert main(["view", "moves.gcode"]) == 0
-    told = capsys.readouterr().out
-    assert told.startswith("moves.html: 0.2 MB, 3 moves")
-    header, found = opened(Path("moves.html").read_bytes())
+    output = capsys.readouterr().out
+    assert output.startswith("moves.html: 0.2 MB, 3 moves")
+    header, arrays = opened(Path("moves.html").read_bytes())
     assert (header["source"], header["machine"]["known"]) == ("foreign", False)
-    assert found["end"][-1].tolist() == [10.0, 10.0, 0.2, 0.0, 0.0]
+    assert arrays["end"][-1].tolist() == [10.0, 10.0, 0.2, 0.0, 0.0]
 
 
 def test_a_machine_that_is_named_is_known(folder: Path) -> None:
@@ -146,9 +146,9 @@ def test_what_cannot_be_shown_is_one_sentence(
 ) -> None:
     Path(name).write_text(text)
     assert main(["view", name]) == 1
-    told = [line for line in capsys.readouterr().err.splitlines() if "compil" not in line]
-    assert len(told) == 1
-    assert said in told[0]
+    lines = [line for line in capsys.readouterr().err.splitlines() if "compil" not in line]
+    assert len(lines) == 1
+    assert said in lines[0]
     assert [file.name for file in folder.iterdir()] == [name]
 
 
@@ -186,10 +186,10 @@ def test_a_model_with_a_nasty_name_goes_all_the_way(folder: Path) -> None:
 def test_export_writes_the_page_of_its_own_file(folder: Path) -> None:
     Path("tee.stl").write_bytes(stl(tee()))
     assert main(["export", "tee.stl", *COARSE, "-o", "a.gcode", "--html", "a.html"]) == 0
-    header, found = opened(Path("a.html").read_bytes())
+    header, arrays = opened(Path("a.html").read_bytes())
     lines = Path("a.gcode").read_text().splitlines()
     assert (header["source"], header["live"]) == ("model", False)
-    assert [lines[int(line) - 1][0] for line in found["line"][::100]] == ["G"] * len(found["line"][::100])
+    assert [lines[int(line) - 1][0] for line in arrays["line"][::100]] == ["G"] * len(arrays["line"][::100])
 
 
 def test_the_packed_report_tells_the_changed_settings_first(folder: Path) -> None:
@@ -215,13 +215,13 @@ KITTEN = Path(__file__).parents[3].parent / "shared" / "models" / "kitten.off"
 
 @pytest.mark.slow
 def test_a_page_takes_a_third_of_what_it_may_and_holds_the_path_to_a_hundredth() -> None:
-    profile = load(settings=["process.scale=0.6", "search.beam_width=1", "search.directions=60"])
+    profile = load(settings=["process.scale=0.45", "search.beam_width=1", "search.directions=60"])
     model = str(KITTEN) if KITTEN.exists() else "demo:figure"
     program = build(decompose_model(ModelRequest(model, profile), to_build=True).decomposition, profile)
     content = print_page(model, program, profile)
-    header, found = opened(content)
+    header, arrays = opened(content)
     moves = len(program.run.program.line)
     assert len(content) < 8e6 / 3 * moves / 300_000 + 0.3e6
-    on_work = workpiece_path(profile.machine, found["end"])
+    on_work = workpiece_path(profile.machine, arrays["end"])
     assert np.linalg.norm(on_work - workpiece_path(profile.machine, program.run.program.end), axis=1).max() < 0.01
-    assert header["time_s"] == pytest.approx(found["time"][-1], abs=0.001)
+    assert header["time_s"] == pytest.approx(arrays["time"][-1], abs=0.001)

@@ -16,9 +16,9 @@ from tests.machine.view.test_view import STEPS, example
 UNITS = {"h": 3600, "m": 60, "s": 1}
 
 
-def seconds(told: str) -> int:
+def seconds(text: str) -> int:
     """The seconds of 1h 6m 15s."""
-    return sum(int(number) * UNITS[unit] for number, unit in re.findall(r"(\d+)([hms])", told))
+    return sum(int(number) * UNITS[unit] for number, unit in re.findall(r"(\d+)([hms])", text))
 
 
 def tables(program: Program, alternatives: tuple[Alternative, ...] = ()) -> dict[str, Any]:
@@ -35,10 +35,10 @@ def of_text(text: str) -> dict[str, Any]:
 
 def test_times_and_material_of_all_kinds_are_the_whole_print() -> None:
     program = example()[1]
-    told = tables(program)["Time and material"]["rows"]
-    assert sum(seconds(row[1]) for row in told) == pytest.approx(program.run.time_s, abs=0.5 * len(told))
-    assert sum(float(row[3]) for row in told) == pytest.approx(program.run.program.e_mm.sum() / 1000, abs=0.005 * len(told))
-    assert {row[0] for row in told} >= {"External perimeter", "Perimeter", "travel", "turning the table"}
+    rows = tables(program)["Time and material"]["rows"]
+    assert sum(seconds(row[1]) for row in rows) == pytest.approx(program.run.time_s, abs=0.5 * len(rows))
+    assert sum(float(row[3]) for row in rows) == pytest.approx(program.run.program.e_mm.sum() / 1000, abs=0.005 * len(rows))
+    assert {row[0] for row in rows} >= {"External perimeter", "Perimeter", "travel", "turning the table"}
 
 
 def test_waiting_is_a_kind_of_its_own() -> None:
@@ -48,18 +48,18 @@ def test_waiting_is_a_kind_of_its_own() -> None:
 
 
 def test_each_part_has_its_shape_its_layers_and_its_time() -> None:
-    told = tables(example()[1])["Parts"]
-    assert told["head"] == ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²", "layers", "time", "g"]
-    assert [row[0] for row in told["rows"]] == ["1", "2"]
-    assert told["rows"][1][3:7] == ["1.00", "100.0", "0.0", "3"]
+    table = tables(example()[1])["Parts"]
+    assert table["head"] == ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²", "layers", "time", "g"]
+    assert [row[0] for row in table["rows"]] == ["1", "2"]
+    assert table["rows"][1][3:7] == ["1.00", "100.0", "0.0", "3"]
 
 
 def test_a_file_without_parts_and_layers_is_told_as_a_whole() -> None:
-    found = of_text(STEPS.replace(";LAYER_CHANGE", ""))
-    assert found["facts"]["layers"] == "5, by their heights"
-    assert "parts" not in found["facts"]
-    assert [row[:2] for row in found["Parts"]["rows"]] == [["all", "5"]]
-    assert "Compared" not in found
+    report = of_text(STEPS.replace(";LAYER_CHANGE", ""))
+    assert report["facts"]["layers"] == "5, by their heights"
+    assert "parts" not in report["facts"]
+    assert [row[:2] for row in report["Parts"]["rows"]] == [["all", "5"]]
+    assert "Compared" not in report
 
 
 def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -> None:
@@ -68,13 +68,15 @@ def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -
     assert [row[0] for row in areas["rows"]] == ["straight up", "best single orientation", "in 2 parts"]
     assert areas["rows"][2] == ["in 2 parts", "0.0", "100.0 %"]
     alternatives = (
-        Alternative("in 2 parts", "", 2, 60.0, 1000.0, 3.0, 0.0, 0.0, seam_mm=43.7, interface_mm3={2: 170.0}, findings=2),
+        Alternative(
+            "in 2 parts", "", 2, 60.0, 1000.0, 3.0, 0.0, 0.0, seam_mm=43.7, stairs_mm2=12.4, interface_mm3={2: 170.0}, findings=2
+        ),
         Alternative("straight up", "", 1, *[None] * 4, 100.0, "too high"),
     )
     known = tables(program, alternatives)["Compared"]
     assert known["head"] == ["", "in 2 parts", "straight up"]
-    assert [row[1] for row in known["rows"]] == ["1m 0s", "1.00", "3.0", "0.00", "0.17", "44", "2", "0.0"]
-    assert [row[2] for row in known["rows"]] == ["-"] * 7 + ["100.0"]
+    assert [row[1] for row in known["rows"]] == ["1m 0s", "1.00", "3.0", "0.00", "0.17", "44", "12", "2", "0.0"]
+    assert [row[2] for row in known["rows"]] == ["-"] * 8 + ["100.0"]
     assert known["notes"] == ["straight up: too high"]
 
 

@@ -33,16 +33,16 @@ def test_the_text_of_our_own_programs_is_in_the_page(machine: str) -> None:
 
 
 def test_the_text_of_another_slicer_is_in_the_page_and_its_numbers_are_not() -> None:
-    header, found = read(FOREIGN)
-    assert text_of(header, found) == FOREIGN.split("\n")
+    header, columns = read(FOREIGN)
+    assert text_of(header, columns) == FOREIGN.split("\n")
     assert header["text"]["patterns"][6:8] == ["G1 X\x02 Y\x01 E\x05", "G2 X\x02 Y\x02 I-5 J5 E\x05"]
     assert header["text"]["zeros"] == [[9, 1151000]]
 
 
 def test_a_text_whose_lines_are_all_unlike_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(text, "MOST_LETTERS", 40)
-    header, found = read(FOREIGN)
-    assert (header["text"], header["lines"], len(found["text"])) == (None, 15, 0)
+    header, columns = read(FOREIGN)
+    assert (header["text"], header["lines"], len(columns["text"])) == (None, 15, 0)
     assert read("G28\n;\x01 a letter that stands for a number\nG1 X1 F600\n")[0]["text"] is None
 
 
@@ -50,6 +50,6 @@ def test_a_text_whose_lines_are_all_unlike_is_left_out(monkeypatch: pytest.Monke
 def test_whatever_a_line_looks_like_it_is_read_back_letter_for_letter(words: list[tuple[str, str]]) -> None:
     line = " ".join(letter + number for letter, number in words)
     rows = {"line": Column(np.array([2]), "i32"), "end": Column(np.array([[1.5, 0.0, -0.25]]), "i32", 0.001)}
-    told, found = text.line_patterns(("G92 E1", f"G1 {line}"), rows | {"filament": Column(np.array([0.5]), "f64", 1e-5)})
-    arrays = {name: np.asarray(column.values) for name, column in (rows | found).items()}
-    assert text_of({"text": told}, arrays | {"filament": np.array([0.5])}) == ["G92 E1", f"G1 {line}"]
+    packed_text, columns = text.line_patterns(("G92 E1", f"G1 {line}"), rows | {"filament": Column(np.array([0.5]), "f64", 1e-5)})
+    arrays = {name: np.asarray(column.values) for name, column in (rows | columns).items()}
+    assert text_of({"text": packed_text}, arrays | {"filament": np.array([0.5])}) == ["G92 E1", f"G1 {line}"]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -52,77 +52,77 @@ def read(text: str, profile: Profile = PLAIN) -> tuple[dict[str, Any], Arrays]:
 
 @given(arrays.arrays(np.int64, st.tuples(st.integers(0, 40), st.integers(1, 5)), elements=WHOLE))
 def test_differences_in_planes_give_the_whole_numbers_back(values: Any) -> None:
-    _, found = unpacked(pack({}, {"a": Column(values * 0.001, "i32", 0.001, delta=True), "b": Column(values, "i32")}))
-    np.testing.assert_allclose(found["a"], values * 0.001, atol=1e-9)
-    np.testing.assert_array_equal(found["b"], values)
+    _, columns = unpacked(pack({}, {"a": Column(values * 0.001, "i32", 0.001, delta=True), "b": Column(values, "i32")}))
+    np.testing.assert_allclose(columns["a"], values * 0.001, atol=1e-9)
+    np.testing.assert_array_equal(columns["b"], values)
 
 
 def test_sums_may_grow_beyond_32_bits() -> None:
     pushed = np.arange(1, 50) * 1e4
-    _, found = unpacked(pack({}, {"filament": Column(pushed, "f64", 1e-5, delta=True)}))
-    np.testing.assert_allclose(found["filament"], pushed, atol=1e-5)
+    _, columns = unpacked(pack({}, {"filament": Column(pushed, "f64", 1e-5, delta=True)}))
+    np.testing.assert_allclose(columns["filament"], pushed, atol=1e-5)
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "trident_5axis", "linuxcnc_xyzac"])
 def test_the_rows_are_the_programs_moves(machine: str) -> None:
     profile, program = example(machine)
     parsed = parse_gcode(program.lines, profile.machine)
-    _, found = shown(machine)
-    assert np.abs(found["end"] - parsed.end).max() <= 0.0005 + 1e-9
+    _, columns = shown(machine)
+    assert np.abs(columns["end"] - parsed.end).max() <= 0.0005 + 1e-9
     for name in ("line", "part", "layer", "type"):
-        np.testing.assert_array_equal(found[name], getattr(parsed, name))
-    np.testing.assert_allclose(found["filament"], parsed.filament_mm, atol=1e-5)
+        np.testing.assert_array_equal(columns[name], getattr(parsed, name))
+    np.testing.assert_allclose(columns["filament"], parsed.filament_mm, atol=1e-5)
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro", "trident_5axis"])
 def test_the_described_chain_leads_to_the_places_on_the_work(machine: str) -> None:
     profile, program = example(machine)
-    header, found = shown(machine)
-    own = np.array([on_the_work(header["machine"], row) for row in found["end"]])
+    header, columns = shown(machine)
+    own = np.array([on_the_work(header["machine"], row) for row in columns["end"]])
     assert np.abs(own - workpiece_path(profile.machine, program.run.program.end)).max() < 0.01
 
 
 def test_times_are_the_dry_runs_and_end_with_it() -> None:
     _, program = example()
-    header, found = shown()
-    np.testing.assert_allclose(found["time"], np.cumsum(program.run.times_s), atol=0.00051)
+    header, columns = shown()
+    np.testing.assert_allclose(columns["time"], np.cumsum(program.run.times_s), atol=0.00051)
     assert header["time_s"] == program.run.time_s
 
 
 def test_waiting_counts_before_the_move_that_follows_it() -> None:
-    header, found = read("G28\nG1 X60 F3600\nG4 S5\nG1 X0\nG4 P2000")
-    assert found["time"][1] - found["time"][0] == pytest.approx(5.0 + found["time"][0], abs=0.01)
-    assert header["time_s"] == pytest.approx(found["time"][1] + 2.0, abs=0.001)
+    header, columns = read("G28\nG1 X60 F3600\nG4 S5\nG1 X0\nG4 P2000")
+    assert columns["time"][1] - columns["time"][0] == pytest.approx(5.0 + columns["time"][0], abs=0.01)
+    assert header["time_s"] == pytest.approx(columns["time"][1] + 2.0, abs=0.001)
 
 
 def test_a_row_tells_its_kind_bead_heat_and_fan() -> None:
-    _, found = read(
+    _, columns = read(
         "G28\nM104 S200\nM140 S60\nM106 S51\nG0 X5\n;WIDTH:0.5\n;HEIGHT:0.25\nG1 X9 E1 F600\nG1 X8 E0\nM107\nG1 E-1\nG1 E0"
     )
-    assert found["kind"].tolist() == [0, 1, 4, 2, 5]
-    np.testing.assert_allclose(found["width"], [0, 0.5, 0, 0, 0])
-    np.testing.assert_allclose(found["height"], [0, 0.25, 0, 0, 0])
-    np.testing.assert_allclose(found["fan"], [0.2, 0.2, 0.2, 0, 0])
-    assert found["nozzle"].tolist() == [200.0] * 5
-    assert found["bed"].tolist() == [60.0] * 5
-    assert found["speed"][1] == 10.0
+    assert columns["kind"].tolist() == [0, 1, 4, 2, 5]
+    np.testing.assert_allclose(columns["width"], [0, 0.5, 0, 0, 0])
+    np.testing.assert_allclose(columns["height"], [0, 0.25, 0, 0, 0])
+    np.testing.assert_allclose(columns["fan"], [0.2, 0.2, 0.2, 0, 0])
+    assert columns["nozzle"].tolist() == [200.0] * 5
+    assert columns["bed"].tolist() == [60.0] * 5
+    assert columns["speed"][1] == 10.0
 
 
 def test_beads_laid_while_the_table_turns_are_shown_on_the_work() -> None:
-    header, found = read("G28\nM83\nG0 X30 Y0 Z5 F600\nG1 C30 E0.8\nG1 X31 C60 E0.8\nG1 C0\nG1 X0 E1")
-    assert found["kind"].tolist() == [0, 1, 1, 3, 1]
-    ways = np.diff([on_the_work(header["machine"], row) for row in found["end"][:3]], axis=0)
+    header, columns = read("G28\nM83\nG0 X30 Y0 Z5 F600\nG1 C30 E0.8\nG1 X31 C60 E0.8\nG1 C0\nG1 X0 E1")
+    assert columns["kind"].tolist() == [0, 1, 1, 3, 1]
+    ways = np.diff([on_the_work(header["machine"], row) for row in columns["end"][:3]], axis=0)
     pushed = 0.8 * np.pi * 1.75**2 / 4.0
-    for way, width, height in zip(ways, found["width"][1:3], found["height"][1:3], strict=True):
+    for way, width, height in zip(ways, columns["width"][1:3], columns["height"][1:3], strict=True):
         assert pushed == pytest.approx(np.linalg.norm(way) * ((width - height) * height + np.pi * height**2 / 4), rel=0.01)
-    assert found["layer"].tolist() == [0, 1, 1, 1, 2]
+    assert columns["layer"].tolist() == [0, 1, 1, 1, 2]
 
 
 def test_a_row_that_begins_elsewhere_is_a_jump() -> None:
-    _, found = read("G28\nG1 X5 F600\nG92 X0\nG1 X1\nG1 X2")
-    assert found["jump_row"].tolist() == [0, 1]
-    assert found["jump_start"][:, 0].tolist() == [0.0, 0.0]
-    assert found["end"][:, 0].tolist() == [5.0, 1.0, 2.0]
+    _, columns = read("G28\nG1 X5 F600\nG92 X0\nG1 X1\nG1 X2")
+    assert columns["jump_row"].tolist() == [0, 1]
+    assert columns["jump_start"][:, 0].tolist() == [0.0, 0.0]
+    assert columns["end"][:, 0].tolist() == [5.0, 1.0, 2.0]
 
 
 def test_a_fan_without_a_number_blows_fully_and_shares_may_go_to_one() -> None:
@@ -135,22 +135,22 @@ STEPS = "\n".join(f";LAYER_CHANGE\nG0 X0 Z{0.2 * k:.1f}\nG1 X20 E{k}\nG1 Y9\nG1 
 
 
 def test_layers_that_are_not_told_come_from_the_heights() -> None:
-    told, silent = read(STEPS), read(STEPS.replace(";LAYER_CHANGE", ""))
-    assert [header["layers_by"] for header, _ in (told, silent)] == ["comments", "heights"]
-    np.testing.assert_allclose(told[1]["layer_z"], [0.2, 0.4, 0.6, 0.8, 1.0], atol=1e-6)
+    commented, silent = read(STEPS), read(STEPS.replace(";LAYER_CHANGE", ""))
+    assert [header["layers_by"] for header, _ in (commented, silent)] == ["comments", "heights"]
+    np.testing.assert_allclose(commented[1]["layer_z"], [0.2, 0.4, 0.6, 0.8, 1.0], atol=1e-6)
     for name in ("layer_number", "layer_z", "layer_part"):
-        np.testing.assert_array_equal(told[1][name], silent[1][name])
+        np.testing.assert_array_equal(commented[1][name], silent[1][name])
 
 
 def test_layers_cover_their_rows_and_their_time() -> None:
-    _, found = shown()
+    _, columns = shown()
     for first, rows, part, number, seconds in zip(
-        *(found[f"layer_{name}"].astype(float) for name in ("first", "rows", "part", "number", "time")), strict=True
+        *(columns[f"layer_{name}"].astype(float) for name in ("first", "rows", "part", "number", "time")), strict=True
     ):
         mine = slice(int(first), int(first + rows))
-        assert set(found["part"][mine]) == {part}
-        assert set(found["layer"][mine]) == {number}
-        assert seconds == pytest.approx(found["time"][mine][-1] - found["time"][int(first) - 1], abs=0.0011)
+        assert set(columns["part"][mine]) == {part}
+        assert set(columns["layer"][mine]) == {number}
+        assert seconds == pytest.approx(columns["time"][mine][-1] - columns["time"][int(first) - 1], abs=0.0011)
 
 
 def test_a_helix_has_a_layer_a_turn() -> None:
@@ -162,34 +162,34 @@ def test_a_helix_has_a_layer_a_turn() -> None:
 
 def test_parts_are_told_with_pose_time_and_their_place_in_the_rows() -> None:
     _, program = example()
-    header, found = shown()
+    header, columns = shown()
     assert [part["index"] for part in header["parts"]] == [1, 2]
     for part, solid in zip(header["parts"], program.decomposition.parts if program.decomposition else (), strict=True):
         mine = slice(part["first_row"], part["first_row"] + part["rows"])
-        assert set(found["part"][mine]) == {part["index"]}
+        assert set(columns["part"][mine]) == {part["index"]}
         assert part["tilt_deg"] == solid.pose.tilt_deg
         assert part["layers"] == 3
-    begin = found["time"][header["parts"][0]["first_row"] - 1]
+    begin = columns["time"][header["parts"][0]["first_row"] - 1]
     assert sum(part["time_s"] for part in header["parts"]) == pytest.approx(header["time_s"] - begin, abs=0.001)
 
 
 def test_surfaces_are_the_parts_meshes() -> None:
     profile, program = example()
     assert program.decomposition is not None
-    header, found = unpacked(of_parts(program.decomposition, profile))
-    for told, part in zip(header["parts"], program.decomposition.parts, strict=True):
-        (v0, v1), (f0, f1) = told["mesh"]["vertices"], told["mesh"]["faces"]
-        assert np.abs(found["vertices"][v0:v1] - part.mesh.vertices).max() <= 0.0005 + 1e-9
-        np.testing.assert_array_equal(found["faces"][f0:f1] - v0, part.mesh.faces)
-    assert len(found["end"]) == 0
+    header, columns = unpacked(of_parts(program.decomposition, profile))
+    for entry, part in zip(header["parts"], program.decomposition.parts, strict=True):
+        (v0, v1), (f0, f1) = entry["mesh"]["vertices"], entry["mesh"]["faces"]
+        assert np.abs(columns["vertices"][v0:v1] - part.mesh.vertices).max() <= 0.0005 + 1e-9
+        np.testing.assert_array_equal(columns["faces"][f0:f1] - v0, part.mesh.faces)
+    assert len(columns["end"]) == 0
 
 
 def test_faces_are_marked_risky_as_printed_and_straight_up() -> None:
     _, program = example()
-    header, found = shown()
+    header, columns = shown()
     assert program.decomposition is not None
     f0, f1 = header["parts"][1]["mesh"]["faces"]
-    marks, arm = found["face_marks"][f0:f1].astype(int), program.decomposition.parts[1]
+    marks, arm = columns["face_marks"][f0:f1].astype(int), program.decomposition.parts[1]
     assert arm.mesh.areas_mm2[marks & 1 > 0].sum() == 0.0  # printed sideways it carries itself
     assert arm.mesh.areas_mm2[marks & 2 > 0].sum() == pytest.approx(100.0)  # its underside, 10 x 10
 
@@ -219,18 +219,18 @@ def test_the_front_is_told_whole_with_its_planes_in_print_order() -> None:
 
 
 def test_a_finding_stands_at_its_line() -> None:
-    header, found = read("G28\nG1 X10 F600\nG1 X9999\nG1 X10")
+    header, columns = read("G28\nG1 X10 F600\nG1 X9999\nG1 X10")
     mistake = next(finding for finding in header["findings"] if finding["severity"] == "error")
     assert (mistake["line"], mistake["row"]) == (3, 1)
-    assert found["line"][mistake["row"]] == 3
+    assert columns["line"][mistake["row"]] == 3
     assert mistake["machine_mm"] == [9999.0, 0.0, 0.0]
 
 
 def test_a_finding_about_another_layer_stands_where_that_begins() -> None:
     text = ";PART:1\n;UNSUPPORTED:3@2\n;LAYER_CHANGE\nG1 Z0.2 F600\nG1 X9 E1\n;LAYER_CHANGE\nG0 Z0.4\nG1 X0 E2"
-    header, found = read(text)
-    (told,) = [finding for finding in header["findings"] if finding["code"] == "unsupported"]
-    assert (told["line"], told["layer"], found["line"][told["row"]]) == (2, 2, 8)
+    header, columns = read(text)
+    (unsupported,) = [finding for finding in header["findings"] if finding["code"] == "unsupported"]
+    assert (unsupported["line"], unsupported["layer"], columns["line"][unsupported["row"]]) == (2, 2, 8)
 
 
 def test_a_guessed_machine_finds_nothing_of_its_own() -> None:
@@ -254,8 +254,8 @@ def test_the_same_print_gives_the_same_bytes() -> None:
     "text", ["G28\nG1 X5 F600", "G28\nG1 E5 F600", ";PART:3 of 3\n;LAYER_CHANGE\nG1 X5 F600", "T0\nG1 X1e5 F600"]
 )
 def test_texts_without_much_to_see_are_shown_too(text: str) -> None:
-    header, found = read(text)
-    assert len(found["end"]) == 1
+    header, columns = read(text)
+    assert len(columns["end"]) == 1
     assert len(header["parts"]) == 1
 
 
@@ -266,22 +266,22 @@ WAVE = "\n".join(
 
 def test_thinning_keeps_the_ends_of_strokes_and_every_other_move() -> None:
     program = parse_gcode(WAVE.split("\n"), PLAIN.machine)
-    kept = shown_rows(program, most=500)
-    assert len(kept) <= 500
-    assert {0, *np.flatnonzero(program.kind != MoveKind.EXTRUDE).tolist()} <= set(kept.tolist()) | {0}
+    rows = shown_rows(program, most=500)
+    assert len(rows) <= 500
+    assert {0, *np.flatnonzero(program.kind != MoveKind.EXTRUDE).tolist()} <= set(rows.tolist()) | {0}
     corners = np.flatnonzero(np.abs(np.diff(program.end[:, 1])) > 0.5)  # the last points of the rows of the wave
-    assert set(corners.tolist()) <= set(kept.tolist())
+    assert set(corners.tolist()) <= set(rows.tolist())
 
 
 def test_what_is_kept_stays_exact(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("machine.view.paths.shown_rows", lambda program: shown_rows(program, most=500))
     program = parse_gcode(WAVE.split("\n"), PLAIN.machine)
-    header, found = read(WAVE)
-    rows = np.searchsorted(program.line, found["line"])
+    header, columns = read(WAVE)
+    rows = np.searchsorted(program.line, columns["line"])
     assert header["thinned"] == {"rows": len(program.line), "kept": len(rows)}
-    np.testing.assert_allclose(found["end"], program.end[rows], atol=0.00051)
-    np.testing.assert_allclose(found["filament"], program.filament_mm[rows], atol=1e-5)
-    assert found["time"][-1] == pytest.approx(header["time_s"], abs=0.001)
+    np.testing.assert_allclose(columns["end"], program.end[rows], atol=0.00051)
+    np.testing.assert_allclose(columns["filament"], program.filament_mm[rows], atol=1e-5)
+    assert columns["time"][-1] == pytest.approx(header["time_s"], abs=0.001)
 
 
 def test_nothing_is_thinned_that_fits() -> None:
@@ -296,15 +296,16 @@ LINES = (
 )
 
 
+@settings(max_examples=50)
 @given(st.lists(st.sampled_from(LINES), max_size=25))
 def test_whatever_the_order_of_lines_rows_layers_and_parts_fit_together(lines: list[str]) -> None:
-    header, found = read("\n".join(lines))
+    header, columns = read("\n".join(lines))
     parsed = parse_gcode(lines, PLAIN.machine)
     rows = len(parsed.line)
-    assert [len(found[name]) for name in ("end", "time", "line", "kind", "width", "fan")] == [rows] * 6
+    assert [len(columns[name]) for name in ("end", "time", "line", "kind", "width", "fan")] == [rows] * 6
     assert all(0 <= part["first_row"] <= part["first_row"] + part["rows"] <= rows for part in header["parts"])
-    ends = found["layer_first"] + found["layer_rows"]
-    assert (found["layer_first"][1:] >= ends[:-1]).all()
+    ends = columns["layer_first"] + columns["layer_rows"]
+    assert (columns["layer_first"][1:] >= ends[:-1]).all()
     assert all(ends <= rows)
     assert all(-1 <= finding["row"] < max(rows, 1) for finding in header["findings"])
-    assert text_of(header, found) == "\n".join(lines).split("\n")
+    assert text_of(header, columns) == "\n".join(lines).split("\n")

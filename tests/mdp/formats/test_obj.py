@@ -23,8 +23,8 @@ from tests.shapes import tee
 )
 def test_blanks_comments_and_other_lines_change_nothing(tmp_path: Path, old: str, new: str) -> None:
     plain = read_mesh(save(tmp_path / "a.obj", files.obj(tee())))[0]
-    other = read_mesh(save(tmp_path / "b.obj", files.obj(tee()).decode().replace(old, new).encode()))[0]
-    assert (other.vertices.tobytes(), other.faces.tobytes()) == (plain.vertices.tobytes(), plain.faces.tobytes())
+    changed = read_mesh(save(tmp_path / "b.obj", files.obj(tee()).decode().replace(old, new).encode()))[0]
+    assert (changed.vertices.tobytes(), changed.faces.tobytes()) == (plain.vertices.tobytes(), plain.faces.tobytes())
 
 
 def test_negative_indices_count_from_the_line_they_stand_in(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def _tetrahedron(vertex: str, face: str, corners: list[str], sides: list[str]) -
     faces = ["3 0 2 1", "3 0 1 3", "3 1 2 3", "3 0 3 2"]
     header = f"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n{vertex}"
     header += f"element face 4\nproperty list uchar int vertex_indices\n{face}end_header\n"
-    rows = [f"{place} {more}\n" for place, more in [*zip(points, corners, strict=True), *zip(faces, sides, strict=True)]]
+    rows = [f"{values} {more}\n" for values, more in [*zip(points, corners, strict=True), *zip(faces, sides, strict=True)]]
     return (header + "".join(rows)).encode()
 
 

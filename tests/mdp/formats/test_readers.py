@@ -64,10 +64,10 @@ def test_a_file_cut_anywhere_ends_in_a_sentence_or_in_the_whole_solid(tmp_path: 
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
-@given(suffix=st.sampled_from(FORMATS), place=st.floats(0, 0.999), value=st.integers(0, 255))
-def test_a_file_with_one_wrong_byte_never_ends_in_a_traceback(tmp_path: Path, suffix: str, place: float, value: int) -> None:
+@given(suffix=st.sampled_from(FORMATS), share=st.floats(0, 0.999), value=st.integers(0, 255))
+def test_a_file_with_one_wrong_byte_never_ends_in_a_traceback(tmp_path: Path, suffix: str, share: float, value: int) -> None:
     content = bytearray(files.written(tmp_path / f"a{suffix}", tee()).read_bytes())
-    content[int(place * len(content))] = value
+    content[int(share * len(content))] = value
     mesh = outcome(save(tmp_path / f"wrong{suffix}", bytes(content)))
     if mesh is not None:
         assert_closed(mesh)

@@ -36,4 +36,4 @@ def drawn_list(seed: int, size: int) -> RatedList:
 
 def by_column(name: str) -> Scores:
     """Scores that are a feature."""
-    return lambda one: one.table((name,))[:, 0].astype(np.float64)
+    return lambda rated: rated.table((name,))[:, 0].astype(np.float64)

@@ -18,18 +18,18 @@ def test_only_candidates_that_were_cut_are_rated() -> None:
     outcome = np.array([np.nan, 0.3, 0.1, np.nan])
     features = np.arange(24.0).reshape(4, 6)
     never = TrainingList(features, PAPER_COLUMNS, np.full(4, np.nan), np.zeros(4, np.bool_), "a", "a", 2, "a.0.x")
-    (one,) = rate([TrainingList(features, PAPER_COLUMNS, outcome, np.zeros(4, np.bool_), "a", "a", 1, "a.0.x"), never], ("M2",))
-    assert (one.features.tolist(), one.ratings.tolist()) == ([[7], [13]], [4, 5])
+    (rated,) = rate([TrainingList(features, PAPER_COLUMNS, outcome, np.zeros(4, np.bool_), "a", "a", 1, "a.0.x"), never], ("M2",))
+    assert (rated.features.tolist(), rated.ratings.tolist()) == ([[7], [13]], [4, 5])
 
 
 def test_candidates_that_nobody_followed_leave_the_list_unless_they_are_its_best() -> None:
     outcome = np.array([0.4, 0.2, np.nan, 0.3, 0.2])
     censored = np.array([False, True, False, True, False])
-    one = TrainingList(np.arange(30.0).reshape(5, 6), PAPER_COLUMNS, outcome, censored, "a", "a", 1, "a.0.ours")
-    (kept,) = followed([one])
-    assert kept.outcome.tolist() == [0.4, 0.2, 0.2]
-    assert kept.features[:, 0].tolist() == [0, 6, 24]
-    assert rate([kept], ("M2",))[0].terms == "ours"
+    training = TrainingList(np.arange(30.0).reshape(5, 6), PAPER_COLUMNS, outcome, censored, "a", "a", 1, "a.0.ours")
+    (shortened,) = followed([training])
+    assert shortened.outcome.tolist() == [0.4, 0.2, 0.2]
+    assert shortened.features[:, 0].tolist() == [0, 6, 24]
+    assert rate([shortened], ("M2",))[0].terms == "ours"
 
 
 def test_regrets_are_shares_of_the_least_outcome_or_of_a_twentieth_of_the_risky_area() -> None:

@@ -24,7 +24,7 @@ def test_every_stage_of_a_record_is_a_list(tmp_path: Path) -> None:
 def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
     for name in ("a.0.paper.npz", "a.0.ours.npz", "b.1.paper.npz"):
         write_record(tmp_path / name, OUTCOME)
-    assert [one.model for one in read_lists(tmp_path, terms=("paper",))] == ["a", "b"]
+    assert [entry.model for entry in read_lists(tmp_path, terms=("paper",))] == ["a", "b"]
     with pytest.raises(LearningError, match=r"holds no record \(\*\.yours\.npz\)"):
         read_lists(tmp_path, terms=("paper", "yours"))
 
@@ -55,13 +55,13 @@ def test_models_of_one_repository_and_folder_are_of_one_source(tmp_path: Path) -
         write_record(tmp_path / name, OUTCOME)
     manifest = tmp_path / "manifest.csv"
     manifest.write_text("id,source_repo,source_path\na,me/things,cat/a.stl\nb,me/things,cat/b.stl\nc,me/things,dog/c.stl\n")
-    assert [one.source for one in read_lists(tmp_path, manifest)] == ["me/things/cat"] * 3 + ["me/things/dog"]
-    assert [one.source for one in read_lists(tmp_path)] == ["a", "a", "b", "c"]
+    assert [entry.source for entry in read_lists(tmp_path, manifest)] == ["me/things/cat"] * 3 + ["me/things/dog"]
+    assert [entry.source for entry in read_lists(tmp_path)] == ["a", "a", "b", "c"]
 
 
 def test_sources_are_split_as_in_the_paper_and_always_alike() -> None:
     sides = [side(f"source {number}") for number in range(2000)]
-    assert [sides.count(each) / 2000 for each in Side] == pytest.approx([0.60, 0.15, 0.25], abs=0.02)
+    assert [sides.count(wanted) / 2000 for wanted in Side] == pytest.approx([0.60, 0.15, 0.25], abs=0.02)
     assert [side(name) for name in ("a", "b", "c")] == [Side.TEST, Side.TRAIN, Side.TRAIN]
 
 
@@ -69,9 +69,9 @@ def test_a_list_is_on_the_side_of_its_source(tmp_path: Path) -> None:
     for number in range(30):
         write_record(tmp_path / f"m{number}.0.x.npz", OUTCOME)
     lists = read_lists(tmp_path)
-    parts = [of_side(lists, each) for each in Side]
+    parts = [of_side(lists, wanted) for wanted in Side]
     assert sum(len(part) for part in parts) == 30
-    assert all(side(one.source) is each for each, part in zip(Side, parts, strict=True) for one in part)
+    assert all(side(rated.source) is wanted for wanted, part in zip(Side, parts, strict=True) for rated in part)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_a_model_that_the_manifest_does_not_know_and_a_manifest_without_sources_
 def test_the_small_set_holds_lists_of_twenty_models_in_less_than_300_kb() -> None:
     folder = Path(__file__).parent / "data"
     lists = read_lists(folder, columns=COLUMNS, terms=("paper",))
-    assert len({one.model for one in lists}) == 20
+    assert len({entry.model for entry in lists}) == 20
     assert len(lists) >= 70
-    assert {one.model for one in read_lists(folder, terms=("ours",))} == {"bracket", "figure", "lattice", "tree"}
+    assert {entry.model for entry in read_lists(folder, terms=("ours",))} == {"bracket", "figure", "lattice", "tree"}
     assert sum(file.stat().st_size for file in folder.iterdir()) < 300_000

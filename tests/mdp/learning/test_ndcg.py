@@ -36,20 +36,20 @@ def test_the_published_scores_have_the_published_ndcg() -> None:
 
 
 def test_the_best_is_within_the_first_two_when_one_as_good_is() -> None:
-    one = listed(np.array([0.4, 0.1, 0.3, 0.1]))
+    rated = listed(np.array([0.4, 0.1, 0.3, 0.1]))
     scores = np.array([4.0, 1.0, 3.0, 2.0])
-    assert [best_within(first)(scores, one) for first in (1, 2, 3)] == [0, 0, 1]
-    assert [regret(first)(scores, one) for first in (1, 2, 3)] == pytest.approx([3, 2, 0])
+    assert [best_within(first)(scores, rated) for first in (1, 2, 3)] == [0, 0, 1]
+    assert [regret(first)(scores, rated) for first in (1, 2, 3)] == pytest.approx([3, 2, 0])
 
 
 def test_scores_that_a_search_takes_for_equal_leave_candidates_in_the_order_they_come() -> None:
-    one = listed(np.array([0.1, 0.2, 0.3]))
-    scores = as_searched(lambda one: np.array([1.0, 1.00001, 1.0002]))
-    assert order(scores(one)).tolist() == [2, 0, 1]
+    rated = listed(np.array([0.1, 0.2, 0.3]))
+    scores = as_searched(lambda rated: np.array([1.0, 1.00001, 1.0002]))
+    assert order(scores(rated)).tolist() == [2, 0, 1]
 
 
 def test_full_lists_have_fifty_candidates() -> None:
-    assert [len(one.ratings) for one in full_lists([drawn_list(1, 49), drawn_list(2, 50)])] == [50]
+    assert [len(rated.ratings) for rated in full_lists([drawn_list(1, 49), drawn_list(2, 50)])] == [50]
 
 
 def test_an_interval_resamples_models_not_lists() -> None:
@@ -62,5 +62,5 @@ def test_an_interval_resamples_models_not_lists() -> None:
 
 
 def test_ndcg_is_a_measure_of_a_list() -> None:
-    one = drawn_list(3, 12)
-    assert at(3)(-one.outcome, one) == pytest.approx(1)
+    rated = drawn_list(3, 12)
+    assert at(3)(-rated.outcome, rated) == pytest.approx(1)

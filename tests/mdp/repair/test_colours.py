@@ -26,9 +26,9 @@ def _areas_mm2(solid: Surface, colours: object) -> dict[int, float]:
 
 
 def test_united_bodies_keep_the_colours_of_what_is_left_of_their_faces() -> None:
-    one = files.placed(10, 10, 10)
-    other = files.placed(10, 4, 4, (5.0, 3.0, 3.0))
-    painted = [_painted(one, [RED] * 12), _painted(other, [GREEN] * 12)]
+    cube = files.placed(10, 10, 10)
+    bar = files.placed(10, 4, 4, (5.0, 3.0, 3.0))
+    painted = [_painted(cube, [RED] * 12), _painted(bar, [GREEN] * 12)]
     solid, notes = repair(painted)
     assert notes == ["united 2 bodies that overlap or touch"]
     assert _areas_mm2(solid, carry_colours(painted, solid)) == {RED: 600.0 - 16.0, GREEN: 4 * 5 * 4 + 16.0}

@@ -14,6 +14,6 @@ def test_a_body_tangled_everywhere_is_given_up_before_its_union_fills_the_memory
 
 def test_a_body_that_does_not_pass_through_itself_stays() -> None:
     block = m3.Manifold.cube((10.0, 20.0, 30.0))
-    kept = resolve_overlap(block)
-    assert kept is not None
-    assert (kept.num_tri(), kept.volume()) == (12, 6000.0)
+    resolved = resolve_overlap(block)
+    assert resolved is not None
+    assert (resolved.num_tri(), resolved.volume()) == (12, 6000.0)

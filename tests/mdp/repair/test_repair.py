@@ -248,8 +248,8 @@ def test_folds_of_a_coarsely_rounded_model_are_left_out_and_the_difference_is_to
     fine = readers.READERS[".ply"](locate("demo:lattice"))[0]
     step_mm = np.ptp(fine.vertices, axis=0).max() / grid
     surface, notes = repair([Surface(np.round(fine.vertices / step_mm) * step_mm, fine.faces)])
-    kept = surface_of(solid_of(surface))
-    assert volume_of(kept) == pytest.approx(volume_of(surface), rel=1e-5)
+    read_back = surface_of(solid_of(surface))
+    assert volume_of(read_back) == pytest.approx(volume_of(surface), rel=1e-5)
     assert notes[-1].startswith("left out folds where more than two faces share an edge")
     assert change_percent in notes[-1]
 

@@ -61,9 +61,9 @@ def test_support_leans_from_the_side_of_a_post_to_a_short_ledge_but_not_to_the_e
 def test_upright_a_face_that_a_cut_laid_open_needs_support_where_a_bridge_beside_it_does_not() -> None:
     mesh = standing(m3.Manifold.cube((20.0, 8.0, 12.0)) - m3.Manifold.cube((10.0, 9.0, 10.0)).translate((5.0, -0.5, 0.0)))
     need = SupportNeed.of(mesh, PROCESS, 5.0)
-    carried = np.flatnonzero(~need.upright)
-    assert mesh.areas_mm2[carried].sum() == pytest.approx(80.0)
-    last = Mesh(mesh.vertices, np.roll(mesh.faces, -1 - carried[0], axis=0))
+    self_carrying = np.flatnonzero(~need.upright)
+    assert mesh.areas_mm2[self_carrying].sum() == pytest.approx(80.0)
+    last = Mesh(mesh.vertices, np.roll(mesh.faces, -1 - self_carrying[0], axis=0))
     sources = np.array([-1, len(mesh.faces) - 1], np.int32)
     assert ModelPieces(SupportNeed.of(last, PROCESS, 5.0), sources).upright.tolist() == [True, False]
 

@@ -28,11 +28,11 @@ def test_a_triangle_is_near_anchors_where_none_of_it_lies_out_of_their_reach(see
     anchors = MultiLineString(ends[anchored > 0].reshape(-1, 2, 2).tolist())
     inner, outer = (Polygon(triangle) - anchors.buffer(REACH_MM + slack, quad_segs=90) for slack in (-SLACK_MM, SLACK_MM))
     assume(inner.is_empty or not outer.is_empty)
-    found = near_anchors(Sides(ends, anchored), REACH_MM, triangle.ravel(), 0)
-    assert (found >= 0) == inner.is_empty
-    if found >= 0:
-        assert anchored[found]
-        assert LineString(ends[found].reshape(2, 2)).distance(Polygon(triangle)) <= REACH_MM + 1e-6
+    side = near_anchors(Sides(ends, anchored), REACH_MM, triangle.ravel(), 0)
+    assert (side >= 0) == inner.is_empty
+    if side >= 0:
+        assert anchored[side]
+        assert LineString(ends[side].reshape(2, 2)).distance(Polygon(triangle)) <= REACH_MM + 1e-6
 
 
 def test_a_wide_triangle_whose_corners_alone_lie_at_anchors_is_not_near_them() -> None:

@@ -20,16 +20,16 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
     return spanning.spans(sides, area_mm2, longest_mm, width_mm)
 
 
-def sides_of(place: Polygon, anchored: tuple[int, ...] | None = None) -> Sides:
+def sides_of(hanging: Polygon, anchored: tuple[int, ...] | None = None) -> Sides:
     """The sides of a place by their ends, which of them are anchors; None: all."""
-    corners = np.array(place.exterior.coords)
+    corners = np.array(hanging.exterior.coords)
     ends: Floats = np.hstack([corners[:-1], corners[1:]])
     anchors = range(len(ends)) if anchored is None else anchored
     return Sides(ends, np.isin(np.arange(len(ends)), anchors).astype(np.int32))
 
 
-def is_spanned(place: Polygon, longest_mm: float, anchored: tuple[int, ...] | None = None) -> bool:
-    return spans(sides_of(place, anchored), place.area, longest_mm, WIDTH_MM)
+def is_spanned(hanging: Polygon, longest_mm: float, anchored: tuple[int, ...] | None = None) -> bool:
+    return spans(sides_of(hanging, anchored), hanging.area, longest_mm, WIDTH_MM)
 
 
 # The sides of shapely's box run up at x = 10, along y = 6, down at x = 0, back along y = 0.
@@ -43,13 +43,13 @@ def test_a_rectangle_is_spanned_between_two_opposite_sides_that_are_anchors(
     anchored: tuple[int, ...], length_mm: float | None, turn: float, longest: float
 ) -> None:
     assume(length_mm is None or abs(longest - length_mm) > 0.1)
-    place = affinity.translate(affinity.rotate(box(0, 0, 10, 6), turn), 5.0, -70.0)
-    assert is_spanned(place, longest, anchored) == (length_mm is not None and longest > length_mm)
+    hanging = affinity.translate(affinity.rotate(box(0, 0, 10, 6), turn), 5.0, -70.0)
+    assert is_spanned(hanging, longest, anchored) == (length_mm is not None and longest > length_mm)
 
 
-def longest_line_mm(place: Polygon, angle: float) -> float:
+def longest_line_mm(hanging: Polygon, angle: float) -> float:
     """The longest of lines 0.1 mm apart over a place in a direction."""
-    level = affinity.rotate(place, -angle, origin=(0, 0))
+    level = affinity.rotate(hanging, -angle, origin=(0, 0))
     x0, y0, x1, y1 = level.bounds
     lines = [level.intersection(LineString([(x0 - 1, y), (x1 + 1, y)])) for y in np.arange(y0 + 0.05, y1, 0.1)]
     return max(piece.length for line in lines for piece in getattr(line, "geoms", [line]))
@@ -61,10 +61,10 @@ def test_no_place_is_spanned_over_which_lines_of_every_direction_are_too_long(se
     rng = np.random.default_rng(seed)
     angles = np.sort(rng.uniform(0, 2 * np.pi, 9))
     assume(np.diff(angles, append=angles[0] + 2 * np.pi).max() < 3.0)  # else the middle lies outside
-    place = Polygon(rng.uniform(2.0, 9.0, (9, 1)) * np.column_stack([np.cos(angles), np.sin(angles)]))
-    least = min(longest_line_mm(place, angle) for angle in range(0, 180, 10))
+    hanging = Polygon(rng.uniform(2.0, 9.0, (9, 1)) * np.column_stack([np.cos(angles), np.sin(angles)]))
+    least = min(longest_line_mm(hanging, angle) for angle in range(0, 180, 10))
     assume(abs(least - longest) > 0.15 * longest)  # lines are a width apart, angles 22 degrees
-    if is_spanned(place, longest):
+    if is_spanned(hanging, longest):
         assert least < longest
 
 
@@ -77,8 +77,8 @@ def test_a_disc_at_the_end_of_a_strip_is_not_spanned_though_most_lines_over_both
 def test_a_line_may_end_loose_over_a_fiftieth_of_a_place_and_no_more() -> None:
     ends_mm = {0.0: True, 0.1: True, 0.5: False, 2.0: False}  # of 12 mm of a side that carry nothing
     for loose, spanned in ends_mm.items():
-        place = Polygon([(0, 0), (8, 0), (8, 12 - loose), (8, 12), (0, 12)])
-        assert is_spanned(place, 9.0, (1, 4)) == spanned
+        hanging = Polygon([(0, 0), (8, 0), (8, 12 - loose), (8, 12), (0, 12)])
+        assert is_spanned(hanging, 9.0, (1, 4)) == spanned
 
 
 def test_nothing_spans_where_no_line_may_be_long_or_no_side_is_there() -> None:

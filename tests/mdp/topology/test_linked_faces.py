@@ -41,9 +41,9 @@ def test_a_linked_surface_knows_the_faces_and_vertices_next_to_each() -> None:
     surface, mesh = link(random_solid(3)), random_solid(3)
     for f, face in enumerate(mesh.faces.tolist()):
         for k in range(3):
-            other = mesh.faces[surface.neighbours[f, k]].tolist()
-            assert other != face
-            assert {face[k], face[(k + 1) % 3]} <= set(other)
+            neighbour = mesh.faces[surface.neighbours[f, k]].tolist()
+            assert neighbour != face
+            assert {face[k], face[(k + 1) % 3]} <= set(neighbour)
     for v in range(0, len(mesh.vertices), 7):
         around = set(mesh.faces[(mesh.faces == v).any(axis=1)].ravel().tolist()) - {v}
         assert set(surface.around[surface.starts[v] : surface.starts[v + 1]].tolist()) == around
@@ -53,5 +53,5 @@ def test_a_linked_surface_knows_the_faces_and_vertices_next_to_each() -> None:
 def test_flat_places_are_the_sides_of_a_box_and_of_a_tee(mesh: Mesh, flat: int) -> None:
     places = flat_places(link(mesh))
     assert len(set(places.tolist())) == flat
-    for place in set(places.tolist()):
-        assert np.ptp(mesh.normals[places == place], axis=0) == pytest.approx(0.0)
+    for number in set(places.tolist()):
+        assert np.ptp(mesh.normals[places == number], axis=0) == pytest.approx(0.0)

@@ -3,6 +3,7 @@
 from math import pi
 
 import manifold3d as m3
+import numpy as np
 import pytest
 
 from machine.app.pipeline.pipeline import build
@@ -115,7 +116,8 @@ COARSE = ("process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3", "p
 @pytest.mark.parametrize("name", ["bracket", "tree"])
 def test_the_dry_run_of_a_demo_takes_as_long_as_estimated(name: str) -> None:
     settings = profile("search.beam_width=1", "search.most_parts=3", "search.directions=100", *COARSE)
-    decomposition = decompose(read_mesh(locate(f"demo:{name}"))[0], name, settings)
+    mesh = read_mesh(locate(f"demo:{name}"))[0].transform(0.6 * np.eye(3))
+    decomposition = decompose(mesh, name, settings)
     run = build(decomposition, settings).run
     expected = estimate(decomposition.parts, settings)
     assert expected.time_s == pytest.approx(run.time_s, rel=0.15)

@@ -36,17 +36,17 @@ def test_what_is_covered_is_sparse_and_what_is_bare_is_skin() -> None:
 
 def test_a_strip_of_three_beads_keeps_a_gap_between_its_walls() -> None:
     strip = shell_of(Polygons.square((20.0, 1.2)), PROCESS, 0.2, covered=None)
-    assert sum(place.area_mm2 for place in strip.narrow) == pytest.approx(19.0 * (1.2 - 0.45 - SPACING), rel=0.1)
+    assert sum(extent.area_mm2 for extent in strip.narrow) == pytest.approx(19.0 * (1.2 - 0.45 - SPACING), rel=0.1)
     assert strip.skin.area_mm2 == 0.0
 
 
 def test_along_the_face_of_a_cut_runs_one_wall_and_infill_begins_behind_it() -> None:
     model = Polygons.square((40.0, 20.0))
     cut = shell_of(SQUARE, PROCESS, 0.2, covered=SQUARE, model=model)
-    three, one = 0.225 + 2.5 * SPACING, 0.225 + 0.5 * SPACING
+    three_walls, one_wall = 0.225 + 2.5 * SPACING, 0.225 + 0.5 * SPACING
     assert len(cut.walls) == PROCESS.interface_walls == 1
-    assert cut.sparse.area_mm2 == pytest.approx((20.0 - three - one) * (20.0 - 2.0 * three), rel=0.01)
-    assert cut.ending.area_mm2 == pytest.approx((20.0 - 2.0 * one) ** 2 - cut.sparse.area_mm2, rel=0.01)
+    assert cut.sparse.area_mm2 == pytest.approx((20.0 - three_walls - one_wall) * (20.0 - 2.0 * three_walls), rel=0.01)
+    assert cut.ending.area_mm2 == pytest.approx((20.0 - 2.0 * one_wall) ** 2 - cut.sparse.area_mm2, rel=0.01)
 
 
 def test_under_a_later_part_is_a_floor() -> None:
@@ -73,7 +73,7 @@ def test_walls_what_they_leave_and_the_inside_share_out_a_section(seed: int, sca
     shell = shell_of(section, PROCESS, 0.2, covered=None if bare else section)
     widths = [0.225 + 0.5 * SPACING, *[SPACING] * (len(shell.walls) - 1)]
     walls = [sum(length_mm(close_loop(loop)) for loop in loops) for loops in shell.walls]
-    rest = sum(place.area_mm2 for place in shell.narrow) + shell.skin.area_mm2 + shell.sparse.area_mm2
+    rest = sum(extent.area_mm2 for extent in shell.narrow) + shell.skin.area_mm2 + shell.sparse.area_mm2
     assert np.dot(widths, walls) + rest == pytest.approx(section.area(), rel=0.01)
     assert not bare or shell.sparse.area_mm2 == 0.0
 

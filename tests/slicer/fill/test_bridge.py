@@ -59,7 +59,7 @@ def test_a_ring_of_bridges_between_four_legs_is_bridged_arm_by_arm() -> None:
     legs = Polygons.compose([Polygons.square((8, 8), True).translate((x, y)) for x in (-8, 8) for y in (-8, 8)])
     ring = Polygons.square((24, 24), True) - Polygons.square((6, 6), True)
     pieces = find_bridges(ring - legs, edges(offset(legs, 0.25 * WIDTH)), WIDTH)
-    by_angle = {round(piece.angle_deg) % 180: piece.place.area() for piece in pieces if piece.loose == 0.0}
+    by_angle = {round(piece.angle_deg) % 180: piece.hanging.area() for piece in pieces if piece.loose == 0.0}
     assert by_angle == {0: pytest.approx(2 * 8 * 8, rel=0.03), 90: pytest.approx(2 * 8 * 8, rel=0.03)}
 
 
@@ -68,7 +68,7 @@ def test_a_ring_of_bridges_between_four_legs_is_bridged_arm_by_arm() -> None:
 def test_a_place_that_one_direction_holds_is_one_bridge(length: float, span: float, turn: float) -> None:
     hanging, banks = gap(length, span, turn)
     (piece,) = find_bridges(hanging, edges(offset(banks, 0.25 * WIDTH)), WIDTH)
-    assert piece.place.area() == pytest.approx(hanging.area())
+    assert piece.hanging.area() == pytest.approx(hanging.area())
 
 
 def mean_span(shape: shapely.Geometry, angle: float) -> float:

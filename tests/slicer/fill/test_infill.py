@@ -104,7 +104,7 @@ def test_cubic_lines_lie_on_planes_at_right_angles() -> None:
         for bead in filled(square(), "cubic", 0.2, layer, anchor=0, joint=0):
             middle = [*bead.points.mean(axis=0), (layer + 1) * HEIGHT]
             places = [n @ middle / (np.sqrt(2 / 3) * apart) for n in normals]
-            assert min(abs(place % 1 - 0.5) for place in places) < 1e-6
+            assert min(abs(position % 1 - 0.5) for position in places) < 1e-6
 
 
 def test_honeycomb_cells_are_regular_hexagons_of_the_density() -> None:
@@ -130,10 +130,10 @@ def test_clipping_agrees_with_shapely(points: list[tuple[float, float]], angle: 
     waves = gyroid(PatternLayer(0, 1.7, angle, 0.4, 0.4 / apart))
     pieces = clip_pattern(border_of(area), waves)
     bounds = np.append(pieces.starts, len(pieces.points))
-    found = sum(length_mm(pieces.points[a:b]) for a, b in pairwise(bounds))
+    clipped_mm = sum(length_mm(pieces.points[a:b]) for a, b in pairwise(bounds))
     drawn, starts = waves.draw((-60, -60, 60, 60))
     lines = shapely.MultiLineString([line @ rotation_2d(waves.angle_deg).T for line in np.split(drawn, starts[1:])])
-    assert found == pytest.approx(as_shapely(area).intersection(lines).length, rel=1e-6, abs=1e-4)
+    assert clipped_mm == pytest.approx(as_shapely(area).intersection(lines).length, rel=1e-6, abs=1e-4)
 
 
 @settings(max_examples=25, deadline=None)

@@ -34,12 +34,12 @@ def plate(holes: list[tuple[float, float, float]]) -> Polygons:
 def lines_of(beads: list[Bead], angle_deg: float) -> Floats:
     """(n, 3) height, left and right end of every straight line along the angle, in the order of printing."""
     c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
-    found = []
+    rows = []
     for bead in beads:
         points = bead.points @ np.array([[c, -s], [s, c]])
         flat = (np.abs(np.diff(points[:, 1])) < 1e-6) & (np.abs(np.diff(points[:, 0])) > 0.05)
-        found += [(points[k, 1], *sorted((points[k, 0], points[k + 1, 0]))) for k in np.flatnonzero(flat)]
-    return np.array(found).reshape(-1, 3)
+        rows += [(points[k, 1], *sorted((points[k, 0], points[k + 1, 0]))) for k in np.flatnonzero(flat)]
+    return np.array(rows).reshape(-1, 3)
 
 
 def out_of_order(lines: Floats) -> int:
@@ -68,7 +68,7 @@ def test_no_line_is_printed_after_its_upper_neighbour(holes: list[tuple[float, f
 
 @given(HOLES)
 def test_order_loses_no_line(holes: list[tuple[float, float, float]]) -> None:
-    told = [
+    rows = [
         lines_of(
             [
                 b
@@ -79,7 +79,7 @@ def test_order_loses_no_line(holes: list[tuple[float, float, float]]) -> None:
         )
         for mode in (True, False)
     ]
-    assert float((told[0][:, 2] - told[0][:, 1]).sum()) == pytest.approx(float((told[1][:, 2] - told[1][:, 1]).sum()), rel=0.01)
+    assert float((rows[0][:, 2] - rows[0][:, 1]).sum()) == pytest.approx(float((rows[1][:, 2] - rows[1][:, 1]).sum()), rel=0.01)
 
 
 def test_without_it_lines_meet_from_both_sides_of_a_hole() -> None:
@@ -91,5 +91,5 @@ def test_the_order_of_a_layer_keeps_it() -> None:
     area = plate([(3, 2, 3), (-5, -3, 2)])
     beads = skin_beads(area, Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, in_order=True))
     placed = order_beads(beads, area, profile().process, np.array([20.0, 20.0]))
-    printed = [Bead(each.bead.kind, each.points, WIDTH, 2) for each in placed if each.bead.kind is Kind.TOP_SKIN]
+    printed = [Bead(laid.bead.kind, laid.points, WIDTH, 2) for laid in placed if laid.bead.kind is Kind.TOP_SKIN]
     assert out_of_order(lines_of(printed, 45.0)) == 0

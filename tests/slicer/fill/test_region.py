@@ -34,8 +34,8 @@ def alone(sections: Sequence[Polygons], insides: Sequence[Polygons], beneath: Po
 def areas(
     sections: Sequence[Polygons], beneath: Polygons | None = None, top: int = 2, bottom: int = 2, density: float = 0.2
 ) -> list[tuple[float, ...]]:
-    found = alone(sections, sections, beneath, process(top, bottom, density))
-    return [tuple(round(r.area(), 3) for r in (region.top, region.solid, region.sparse)) for region in found]
+    by_layer = alone(sections, sections, beneath, process(top, bottom, density))
+    return [tuple(round(r.area(), 3) for r in (region.top, region.solid, region.sparse)) for region in by_layer]
 
 
 def test_a_tower_is_solid_at_both_ends_and_sparse_between() -> None:
@@ -45,12 +45,12 @@ def test_a_tower_is_solid_at_both_ends_and_sparse_between() -> None:
 
 
 def test_a_step_is_top_skin_where_it_is_bare_and_solid_below_it() -> None:
-    found = areas([square(20)] * 4 + [square(10)] * 6, bottom=0)
-    assert found[3][0] == pytest.approx(300, abs=25)
-    assert found[3][1] == 0
-    assert found[2][0] == 0
-    assert found[2][1] == pytest.approx(300, abs=25)
-    assert found[1] == (0, 0, 400)
+    by_layer = areas([square(20)] * 4 + [square(10)] * 6, bottom=0)
+    assert by_layer[3][0] == pytest.approx(300, abs=25)
+    assert by_layer[3][1] == 0
+    assert by_layer[2][0] == 0
+    assert by_layer[2][1] == pytest.approx(300, abs=25)
+    assert by_layer[1] == (0, 0, 400)
 
 
 def test_what_is_bare_goes_on_as_top_skin_under_the_walls_around_it() -> None:
@@ -65,8 +65,8 @@ def test_what_is_bare_goes_on_as_top_skin_under_the_walls_around_it() -> None:
 @settings(max_examples=30, deadline=None)
 @given(st.floats(3, 12), st.floats(0, 3), st.integers(1, 5), st.booleans())
 def test_no_wall_begins_on_sparse_infill(side: float, aside: float, walls: int, pillar: bool) -> None:
-    place = square(side).translate((aside, -aside))
-    above = place if pillar else square(24) - place
+    footprint = square(side).translate((aside, -aside))
+    above = footprint if pillar else square(24) - footprint
     sections = [square(24)] * 6 + [above] * 4
     insides = [offset(section, -walls * WIDTH) for section in sections]
     below = alone(sections, insides, None, process(top=2, walls=walls))
@@ -84,45 +84,45 @@ def test_a_wall_that_hardly_touches_the_one_below_lies_on_solid_layers(aside: fl
 
 
 def test_an_overhang_gets_bottom_layers() -> None:
-    found = areas([square(10)] * 3 + [square(20)] * 5, top=0)
-    assert found[3][1] == pytest.approx(300 + 4 * 10 * WIDTH, abs=5)
-    assert found[5] == (0, 0, 400)
+    by_layer = areas([square(10)] * 3 + [square(20)] * 5, top=0)
+    assert by_layer[3][1] == pytest.approx(300 + 4 * 10 * WIDTH, abs=5)
+    assert by_layer[5] == (0, 0, 400)
 
 
 def test_a_part_on_plastic_is_sparse_at_once_and_solid_where_it_is_asked_for() -> None:
     tower = [square(10)] * 6
     assert areas(tower, beneath=square(10), top=1)[:2] == [(0, 0, 100), (0, 0, 100)]
-    found = alone(tower, tower, square(10), process(top=1, interface_bottom_layers=2))
-    assert [region.sparse.area() for region in found] == [0, 0, 100, 100, 100, 0]
+    by_layer = alone(tower, tower, square(10), process(top=1, interface_bottom_layers=2))
+    assert [region.sparse.area() for region in by_layer] == [0, 0, 100, 100, 100, 0]
 
 
 def test_grooves_are_filled_by_a_solid_first_layer() -> None:
     tower = [square(10)] * 6
-    found = alone(tower, tower, square(10), process(top=1, interlock_mm=0.2))
-    assert [region.sparse.area() for region in found[:2]] == [0, 100]
+    by_layer = alone(tower, tower, square(10), process(top=1, interlock_mm=0.2))
+    assert [region.sparse.area() for region in by_layer[:2]] == [0, 100]
 
 
 def test_a_later_part_lies_on_as_many_solid_layers_as_an_interface_has() -> None:
     tower, keys = [square(20)] * 6, process(top=3, interface_top_layers=2)
     later = [Polygons()] * 6 + [square(20)] * 3
-    found = regions(tower, Cover(tower, tower, [Polygons()] * 2, later[6:], later), False, keys)
-    assert [region.sparse.area() for region in found] == [0, 0, 400, 400, 0, 0]
-    assert [region.top.area() for region in found] == [0] * 6, "what will be covered is no top skin"
+    by_layer = regions(tower, Cover(tower, tower, [Polygons()] * 2, later[6:], later), False, keys)
+    assert [region.sparse.area() for region in by_layer] == [0, 0, 400, 400, 0, 0]
+    assert [region.top.area() for region in by_layer] == [0] * 6, "what will be covered is no top skin"
 
 
 def test_where_the_model_ends_beside_a_later_part_the_skin_is_as_thick_as_everywhere() -> None:
     tower, keys = [square(20)] * 8, process(top=4, bottom=0, interface_top_layers=1)
     later = [Polygons()] * 8 + [square(10)] * 4
-    found = regions(tower, Cover(tower, tower, [], later[8:], later), False, keys)
-    for region in found[4:]:
+    by_layer = regions(tower, Cover(tower, tower, [], later[8:], later), False, keys)
+    for region in by_layer[4:]:
         assert (square(20) - square(10) - region.solid - region.top).area() == pytest.approx(0, abs=1e-6)
-    assert [region.sparse.area() > 50 for region in found] == [True] * 7 + [False]
+    assert [region.sparse.area() > 50 for region in by_layer] == [True] * 7 + [False]
 
 
 def test_a_part_overhanging_the_plastic_beneath_gets_bottom_skin_there() -> None:
-    found = areas([square(20)] * 6, beneath=square(10), top=0)
-    assert found[1][1] == pytest.approx(300, abs=25)
-    assert found[2] == (0, 0, 400)
+    by_layer = areas([square(20)] * 6, beneath=square(10), top=0)
+    assert by_layer[1][1] == pytest.approx(300, abs=25)
+    assert by_layer[2] == (0, 0, 400)
 
 
 def test_full_density_has_no_infill() -> None:
@@ -133,10 +133,10 @@ def test_an_island_of_infill_too_small_to_bother_with_becomes_solid() -> None:
     assert {row[2] for row in areas([square(2)] * 9)} == {0}
 
 
-@pytest.mark.parametrize(("least", "kept"), [(24.0, 25.0), (26.0, 0.0)])
-def test_sparse_places_below_the_least_area_become_solid(least: float, kept: float) -> None:
-    found = alone([square(5)] * 9, [square(5)] * 9, None, process(solid_below_mm2=least))
-    assert found[4].sparse.area() == pytest.approx(kept)
+@pytest.mark.parametrize(("least", "sparse_mm2"), [(24.0, 25.0), (26.0, 0.0)])
+def test_sparse_places_below_the_least_area_become_solid(least: float, sparse_mm2: float) -> None:
+    by_layer = alone([square(5)] * 9, [square(5)] * 9, None, process(solid_below_mm2=least))
+    assert by_layer[4].sparse.area() == pytest.approx(sparse_mm2)
 
 
 def test_no_infill_leaves_small_places_hollow() -> None:
@@ -157,8 +157,8 @@ def test_no_layers_asked_for_are_none_however_thick() -> None:
 def test_every_vertical_line_meets_enough_wall_or_skin_below_a_slope(step: float) -> None:
     sections = [square(60 - 2 * step * i) for i in range(12)]
     insides = [offset(section, -1.3) for section in sections]
-    found = alone(sections, insides, None, process(3, 0, solid_below_mm2=0))
-    for i, region in enumerate(found[:-1]):
+    by_layer = alone(sections, insides, None, process(3, 0, solid_below_mm2=0))
+    for i, region in enumerate(by_layer[:-1]):
         for above in sections[i + 1 : i + 4]:
             assert (region.sparse - above).area() < 1e-6
 
@@ -166,12 +166,12 @@ def test_every_vertical_line_meets_enough_wall_or_skin_below_a_slope(step: float
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 1000])
 def test_running_intersections_agree_with_intersecting_one_by_one(count: int) -> None:
     layers = [square(10).translate((k * 7 % 5, k * 3 % 4)) for k in range(11)]
-    for i, found in enumerate(_common(layers, count)):
+    for i, common in enumerate(_common(layers, count)):
         window = layers[i : i + count]
         expected = square(100)
         for layer in window:
             expected = expected ^ layer
-        assert found.area() == pytest.approx(expected.area() if len(window) == count else 0.0)
+        assert common.area() == pytest.approx(expected.area() if len(window) == count else 0.0)
 
 
 def test_opening_drops_what_is_too_narrow_only() -> None:

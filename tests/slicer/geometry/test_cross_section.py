@@ -48,8 +48,8 @@ def test_above_and_below_the_part_there_is_nothing() -> None:
 
 def test_a_ball_has_the_circles_of_its_formula() -> None:
     heights = np.array([2.0, 10.0, 17.0])
-    found = [area(loops) for loops in cross_sections(ball(10.0, 512), heights)]
-    assert found == pytest.approx(np.pi * (100 - (heights - 10) ** 2), rel=2e-3)
+    areas = [area(loops) for loops in cross_sections(ball(10.0, 512), heights)]
+    assert areas == pytest.approx(np.pi * (100 - (heights - 10) ** 2), rel=2e-3)
 
 
 def test_middle_sections_times_height_add_up_to_the_volume() -> None:

@@ -187,7 +187,7 @@ def test_no_module_keeps_polygons_of_which_manifold3d_would_complain_when_the_pr
     names = [name for name in modules() if name.startswith(("mdp.", "slicer.", "machine.planning")) and "learning" not in name]
     held = [value for name in names for value in vars(import_module(name)).values()]
     held += [field.default for kind in held if is_dataclass(kind) for field in fields(kind)]
-    held += [default for one in held if isfunction(one) for default in one.__defaults__ or ()]
+    held += [default for function in held if isfunction(function) for default in function.__defaults__ or ()]
     assert [value for value in held if isinstance(value, CrossSection | Manifold)] == []
 
 

@@ -28,8 +28,8 @@ def orientation(line: Segment, x: float, y: float) -> float:
 
 
 @njit
-def crossing(segment: Segment, other: Segment) -> float:
-    return segments.crossing(segment, other)
+def crossing(segment: Segment, crossed: Segment) -> float:
+    return segments.crossing(segment, crossed)
 
 
 @njit

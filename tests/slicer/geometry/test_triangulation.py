@@ -37,9 +37,9 @@ def test_the_triangles_are_those_of_shapely_s_constrained_delaunay_triangulation
 @pytest.mark.parametrize("corners", [64, 128, 180, 256])
 @pytest.mark.parametrize("radius_mm", [3.0, 13.7, 15.3, 60.0])
 def test_points_on_one_circle_are_flipped_only_as_long_as_that_betters_them(corners: int, radius_mm: float) -> None:
-    found = triangulate([resample(loop, 0.17) for loop in contours(Polygons.circle(radius_mm, corners))])
-    assert found is not None
-    assert _flip(found) < 0.01 * len(found.tails)  # it ended by itself; seen from its other end a side may round otherwise
+    mesh = triangulate([resample(loop, 0.17) for loop in contours(Polygons.circle(radius_mm, corners))])
+    assert mesh is not None
+    assert _flip(mesh) < 0.01 * len(mesh.tails)  # it ended by itself; seen from its other end a side may round otherwise
 
 
 def test_a_polygon_without_area_has_no_triangulation() -> None:

@@ -46,9 +46,9 @@ def stacked() -> list[Part]:
 def test_a_point_is_the_same_in_the_workpiece_from_whichever_part_s_frame_it_is_seen() -> None:
     points = np.random.default_rng(1).uniform(-30.0, 30.0, (20, 3))
     for part in stacked():
-        for other in stacked():
-            turn, shift = frame_change(part, other)
-            assert in_workpiece(other, points @ turn.T + shift) == pytest.approx(in_workpiece(part, points))
+        for to in stacked():
+            turn, shift = frame_change(part, to)
+            assert in_workpiece(to, points @ turn.T + shift) == pytest.approx(in_workpiece(part, points))
 
 
 @settings(max_examples=20)
@@ -113,14 +113,14 @@ def test_the_edges_of_an_interface_run_once_round_it_for_the_part_below_and_for_
 @given(st.integers(0, 10_000), st.integers(1, 4))
 def test_a_place_is_shared_out_to_the_least_of_linear_functions(seed: int, count: int) -> None:
     functions = [f * (1.0, 1.0, 8.0) for f in np.random.default_rng(seed).normal(size=(count, 3))]
-    place = Polygons.square((20.0, 20.0), True) - Polygons.circle(4.0, 64)
+    ring = Polygons.square((20.0, 20.0), True) - Polygons.circle(4.0, 64)
     x, y = (np.arange(-9.95, 10.0, 0.1) for _ in range(2))
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    points = points[shapely.contains_xy(as_shapely(place), points)]
+    points = points[shapely.contains_xy(as_shapely(ring), points)]
     least = np.argmin([points @ f[:2] + f[2] for f in functions], axis=0)
-    areas = _nearest_areas(place, functions)
+    areas = _nearest_areas(ring, functions)
     assert areas == pytest.approx(0.01 * np.bincount(least, minlength=count), abs=1.5)
-    assert sum(areas) == pytest.approx(place.area())
+    assert sum(areas) == pytest.approx(ring.area())
 
 
 @pytest.mark.parametrize(

@@ -29,22 +29,22 @@ def assert_sound(overhangs: Sequence[Overhang], supports: Supports) -> None:
     """Gaps are kept, everything stands within the lean, every hanging place is held or reported as missed."""
     sections, process = supports.sections, supports.sections.process
     solid, printed, missed, hanging = (
-        [shapely.make_valid(as_shapely(place)) for place in places]
+        [shapely.make_valid(as_shapely(area)) for area in places]
         for places in (sections.outlines, supports.areas, supports.missed, [overhang.hanging for overhang in overhangs])
     )
     top, bottom = sections.heights.tip_mm, sections.heights.bottom_mm
     slope = tan(radians(min(process.support_branch_angle_deg, process.self_supporting_angle_deg)))
     width = process.line_width_mm
     below = [] if sections.plastic_below is None else [_standing_room(as_shapely(sections.plastic_below), width)]
-    for m in np.flatnonzero([not place.is_empty for place in printed]).tolist():
+    for m in np.flatnonzero([not area.is_empty for area in printed]).tolist():
         _keeps_gaps(m, printed[m], solid, bottom, top, process)
         if m or below:
-            carried = [printed[m - 1].buffer(slope * sections.heights.height_mm[m] + ROUNDING_MM)] if m else []
+            lower = [printed[m - 1].buffer(slope * sections.heights.height_mm[m] + ROUNDING_MM)] if m else []
             stands = [_standing_room(solid[j], width) for j in range(m) if top[j] <= bottom[m] + 1e-6]
-            loose = printed[m] - shapely.union_all([*carried, *stands[-6:], *below])
+            loose = printed[m] - shapely.union_all([*lower, *stands[-6:], *below])
             assert loose.buffer(-ROUNDING_MM).area < SPECK_MM2, f"layer {m} hangs in the air: {loose.bounds}"
     unheld = {}
-    for k in np.flatnonzero([not place.is_empty for place in hanging]).tolist():
+    for k in np.flatnonzero([not area.is_empty for area in hanging]).tolist():
         rest = hanging[k] - missed[k].buffer(0.02)
         deep = process.support_gap_mm + process.support_distance_mm + 2 * process.layer_height_mm
         near = [printed[m] for m in range(k) if 0 <= bottom[k] - top[m] + 1e-6 <= deep + 1e-6]

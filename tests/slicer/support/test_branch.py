@@ -60,7 +60,7 @@ def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: 
     at = np.random.default_rng(seed).uniform(-15.0, 15.0, (count, 2))
     expected = []
     for k, own in enumerate(at):
-        others = sorted((float(np.hypot(*(own - other))), j) for j, other in enumerate(at) if j != k)
+        others = sorted((float(np.hypot(*(own - neighbour))), j) for j, neighbour in enumerate(at) if j != k)
         meets = others and others[0][0] <= 2.0 * MEETING * reach
         expected.append(tuple(0.5 * (own + at[others[0][1]])) if meets else tuple(own))
     assert np.array(_goals(at, reach)).reshape(-1, 2) == pytest.approx(np.array(expected).reshape(-1, 2))

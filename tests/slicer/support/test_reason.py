@@ -45,16 +45,16 @@ NO_BRIDGES = ("process.bridge_longest_mm=1", "process.support_distance_mm=1")
 def test_a_place_without_support_has_the_reason_that_its_part_is_made_for(
     parts: list[Part], settings: tuple[str, ...], reason: str
 ) -> None:
-    places = [place for piece in slice_parts(parts, profile(*settings), processes=1) for place in piece.unsupported]
-    assert {place.reason for place in places} == {reason}
-    assert [place.mm2 for place in places] == sorted((place.mm2 for place in places), reverse=True)
+    areas = [area for piece in slice_parts(parts, profile(*settings), processes=1) for area in piece.unsupported]
+    assert {area.reason for area in areas} == {reason}
+    assert [area.mm2 for area in areas] == sorted((area.mm2 for area in areas), reverse=True)
 
 
 def test_an_arm_farther_out_than_support_may_lean_from_its_part_s_own_foot() -> None:
     gallows = BLOCK((16, 8, 10)) + BLOCK((8, 8, 18)) + BLOCK((26, 8, 4)).translate((0, 0, 18))
     base, top = cut(standing(gallows), ((0, 0, 1), 10.0))
-    (place,) = slice_part(top, profile("process.support_branch_angle_deg=30"), [base]).unsupported
-    assert place.reason == "support would have to lean by more than 30 deg to find ground"
+    (arm,) = slice_part(top, profile("process.support_branch_angle_deg=30"), [base]).unsupported
+    assert arm.reason == "support would have to lean by more than 30 deg to find ground"
 
 
 def test_a_print_that_hangs_nowhere_has_no_reason_to_give() -> None:

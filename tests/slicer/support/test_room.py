@@ -83,10 +83,10 @@ def test_every_bead_of_support_lies_in_its_place_and_the_dense_ones_in_theirs() 
     process, area = profile("process.support_walls=1").process, ragged(5)
     dense = area ^ Polygons.square((30.0, 60.0)).translate((0.0, -30.0))
     beads = support_beads(area, dense, process, 0.2, False)
-    for place, kind in ((area, None), (dense, Kind.SUPPORT_INTERFACE)):
+    for room, kind in ((area, None), (dense, Kind.SUPPORT_INTERFACE)):
         lines = [shapely.LineString(bead.points) for bead in beads if kind in (None, bead.kind)]
         assert lines
-        assert as_shapely(place).buffer(0.01).covers(shapely.union_all(lines))
+        assert as_shapely(room).buffer(0.01).covers(shapely.union_all(lines))
     assert support_beads(Polygons(), dense, process, 0.2, False) == []
 
 

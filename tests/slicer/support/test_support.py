@@ -199,10 +199,10 @@ def test_a_hanging_face_that_no_support_fits_under_is_told_unless_the_plastic_be
     assert slice_part(whole(standing(slit)), profile("process.bridge_longest_mm=1")).unsupported_mm2 == 0.0
     drawer = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.7)).translate((5, 5, 5))
     sliced = slice_part(whole(standing(drawer)), profile("process.bridge_longest_mm=1", "process.support_bottom_gap_mm=0.6"))
-    (place,) = sliced.unsupported
-    assert place.mm2 == pytest.approx(400.0, rel=0.02)
-    assert sliced.layers[place.layer - 1].z_mm == pytest.approx(5.8)
-    assert place.reason == "there is no room for support between it and the plastic below"
+    (face,) = sliced.unsupported
+    assert face.mm2 == pytest.approx(400.0, rel=0.02)
+    assert sliced.layers[face.layer - 1].z_mm == pytest.approx(5.8)
+    assert face.reason == "there is no room for support between it and the plastic below"
 
 
 def test_a_plate_on_its_own_base_plane_cannot_be_supported() -> None:

@@ -45,8 +45,8 @@ def test_travels_leave_the_inside_where_shapely_says_so(seed: int) -> None:
 def _ways_mm(a: Floats, b: Floats, obstacle: shapely.Geometry) -> list[float]:
     """Lengths of the shorter and of the longer way past a convex obstacle between two points: the sides of what encloses all."""
     around = shapely.convex_hull(shapely.union(obstacle, shapely.MultiPoint([a, b]))).exterior
-    one = abs(around.project(shapely.Point(a)) - around.project(shapely.Point(b)))
-    return sorted([one, around.length - one])
+    half_round = abs(around.project(shapely.Point(a)) - around.project(shapely.Point(b)))
+    return sorted([half_round, around.length - half_round])
 
 
 @settings(max_examples=40)
@@ -59,8 +59,8 @@ def test_a_detour_past_a_convex_hole_is_the_shorter_way_round_pulled_taut(seed: 
     b = -random.uniform(9, 20) * np.array([np.cos(turn + spread), np.sin(turn + spread)])
     near, behind = (as_shapely(offset(hole, times * WIDTH)) for times in (SAFE, BEHIND))
     assume(shapely.LineString([a, b]).crosses(near))
-    (least, _), (most, other) = _ways_mm(a, b, near), _ways_mm(a, b, behind)
-    assume(other > most + 1.0)  # which of two nearly equal ways is taken depends on how they lie along the border
+    (least, _), (most, longer) = _ways_mm(a, b, near), _ways_mm(a, b, behind)
+    assume(longer > most + 1.0)  # which of two nearly equal ways is taken depends on how they lie along the border
     detour = Combing(plate, WIDTH).detour(a, b, 1000.0)
     assert detour is not None
     assert least - 1e-6 <= shapely.LineString([a, *detour, b]).length <= most + 1e-6

@@ -30,8 +30,8 @@ def placed(points: Floats, kind: Kind = Kind.OUTER_WALL) -> Placed:
     return Placed(Bead(kind, points, 0.45, 0), points, True, np.array([(7.0, 7.0)]))
 
 
-def parted(line: Placed, place: Polygons, shortest_mm: float) -> list[Placed]:
-    return split([line], place, [Kind.OUTER_WALL], shortest_mm, lambda bead: replace(bead, kind=INSIDE))
+def parted(line: Placed, area: Polygons, shortest_mm: float) -> list[Placed]:
+    return split([line], area, [Kind.OUTER_WALL], shortest_mm, lambda bead: replace(bead, kind=INSIDE))
 
 
 def length_mm(points: Floats) -> float:
@@ -41,10 +41,10 @@ def length_mm(points: Floats) -> float:
 @settings(max_examples=40)
 @given(seeds)
 def test_as_much_of_a_line_is_marked_as_lies_within(seed: int) -> None:
-    place, line = ragged(seed), walk(seed)
-    pieces = parted(placed(line), place, 0.0)
+    area, line = ragged(seed), walk(seed)
+    pieces = parted(placed(line), area, 0.0)
     inside = sum(length_mm(piece.points) for piece in pieces if piece.bead.kind is INSIDE)
-    assert inside == pytest.approx(shapely.LineString(line).intersection(as_shapely(place)).length, abs=1e-6)
+    assert inside == pytest.approx(shapely.LineString(line).intersection(as_shapely(area)).length, abs=1e-6)
     kinds = [piece.bead.kind for piece in pieces]
     assert all(a is not b for a, b in pairwise(kinds))
 
@@ -66,12 +66,12 @@ def test_the_pieces_of_a_line_are_the_line_and_none_is_shorter_than_allowed(seed
 @settings(max_examples=40)
 @given(seeds)
 def test_every_step_of_a_cut_line_lies_within_or_without_as_its_middle_does(seed: int) -> None:
-    place, sides = as_shapely(ragged(seed)), edges(ragged(seed))
+    area, sides = as_shapely(ragged(seed)), edges(ragged(seed))
     sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]))]
     points, within = cut_line(walk(seed), sides)
     middles = 0.5 * (points[1:] + points[:-1])
-    clear = shapely.distance(place.boundary, shapely.points(middles)) > 1e-6
-    assert np.array_equal(within[clear], shapely.contains_xy(place, middles)[clear])
+    clear = shapely.distance(area.boundary, shapely.points(middles)) > 1e-6
+    assert np.array_equal(within[clear], shapely.contains_xy(area, middles)[clear])
 
 
 SQUARE = Polygons.square((10.0, 10.0))

@@ -70,8 +70,8 @@ def test_the_line_in_a_wedge_runs_in_its_middle_and_is_as_wide_as_it(
     for line, wide in strips(beads):
         along, across = (shapely.get_coordinates(line) @ [[np.cos(back), -np.sin(back)], [np.sin(back), np.cos(back)]]).T
         assert across == pytest.approx(0.0, abs=0.03)
-        place = start + (end - start) * 0.5 * (along.min() + along.max()) / length
-        assert wide == pytest.approx(place, rel=0.25, abs=0.05)
+        wedge_width = start + (end - start) * 0.5 * (along.min() + along.max()) / length
+        assert wide == pytest.approx(wedge_width, rel=0.25, abs=0.05)
     assert plastic_mm2(beads) == pytest.approx(wedge.area(), rel=0.05)
 
 
@@ -84,10 +84,10 @@ def test_a_ring_gets_a_line_that_runs_round() -> None:
 
 @pytest.mark.parametrize("diameter", [0.5, 0.7, 1.0, 1.5, 2.5])
 def test_a_round_place_is_filled_by_rings(diameter: float) -> None:
-    place = Polygons.circle(0.5 * diameter, 48)
-    beads = gaps(place, WIDTH, HEIGHT)
-    assert covered(beads).intersection(as_shapely(place)).area > 0.75 * place.area()
-    assert plastic_mm2(beads) == pytest.approx(place.area(), rel=0.1)
+    disc = Polygons.circle(0.5 * diameter, 48)
+    beads = gaps(disc, WIDTH, HEIGHT)
+    assert covered(beads).intersection(as_shapely(disc)).area > 0.75 * disc.area()
+    assert plastic_mm2(beads) == pytest.approx(disc.area(), rel=0.1)
 
 
 @settings(max_examples=60, deadline=None)
@@ -95,10 +95,10 @@ def test_a_round_place_is_filled_by_rings(diameter: float) -> None:
 def test_beads_in_any_place_hold_no_more_than_it_and_keep_to_it(
     points: list[tuple[float, float]], hole: float, aside: float
 ) -> None:
-    place = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
-    beads = gaps(place, WIDTH, HEIGHT)
-    assert plastic_mm2(beads) < 1.005 * place.area() + 1e-6
+    area = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
+    beads = gaps(area, WIDTH, HEIGHT)
+    assert plastic_mm2(beads) < 1.005 * area.area() + 1e-6
     assert all(length_mm(bead.points) > 0.25 * WIDTH for bead in beads)
     assert all(bead.width_mm <= 2.0 * WIDTH for bead in beads)
     wider = 0.5 * (MOST_WIDER - 1.0) * 2.0 * WIDTH + 0.05 * WIDTH
-    assert covered(beads).difference(as_shapely(place).buffer(wider)).area < 1e-6
+    assert covered(beads).difference(as_shapely(area).buffer(wider)).area < 1e-6

@@ -42,7 +42,7 @@ def seam_of(loop: Floats, rule: str, **surroundings: Any) -> tuple[float, float]
 def outer_seams(sliced: SlicedPart, first: int = 2) -> Floats:
     """Where the longest outer wall of each layer begins."""
     walls = [[p.points for p in layer.paths if p.kind in (Kind.OUTER_WALL, Kind.OVERHANG)] for layer in sliced.layers[first:]]
-    return np.array([max(joined(each), key=length_mm)[0] for each in walls if each])
+    return np.array([max(joined(of_layer), key=length_mm)[0] for of_layer in walls if of_layer])
 
 
 def joined(pieces: list[Floats]) -> list[Floats]:

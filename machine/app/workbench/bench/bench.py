@@ -90,7 +90,7 @@ class Step:
 
     word: str
     bench: Bench
-    told: str = ""
+    lost: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +105,12 @@ class History:
         """A further step, none for the same bench; pauses go with their parts, and what was undone is forgotten."""
         if bench is self.now.bench:
             return self
-        kept, gone = renumbered_stops(bench.stops, self.now.bench.cuts or (), bench.cuts or ())
-        after = bench if kept == bench.stops else replace(bench, stops=kept)
+        stops, gone = renumbered_stops(bench.stops, self.now.bench.cuts or (), bench.cuts or ())
+        after = bench if stops == bench.stops else replace(bench, stops=stops)
         lost = [(stop.part, stop.option) for stop in gone] + [
             (own.part, f"--part {option(own)}") for own in _gone(self.now.bench, bench)
         ]
-        return History(Step(word, after, gone_in_words(word, lost)), _kept((*self.before, self.now)[-MOST_STEPS:]))
+        return History(Step(word, after, gone_in_words(word, lost)), _nearest_steps((*self.before, self.now)[-MOST_STEPS:]))
 
     def undo(self) -> "History":
         """One step back, or the same where there is none."""
@@ -129,7 +129,7 @@ class History:
         return History(self.undone[-1], (*self.before, self.now), self.undone[:-1])
 
 
-def _kept(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+def _nearest_steps(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     """The nearest steps whose models are not too much for the memory; the nearest of all whatever it is."""
     models, faces = set[Model](), 0
     for back, step in enumerate(reversed(steps)):
@@ -247,23 +247,23 @@ def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
     return replace(changed, rows=tuple(replace(row, time_s=None, filament_mm=None) for row in bench.rows), priced=False)
 
 
-def places_to_price(bench: Bench) -> list[int]:
+def rows_to_price(bench: Bench) -> list[int]:
     """The rows of the front, by their places, whose time and plastic a person is told."""
-    return [place for place, good in enumerate(pays(bench.rows)) if good]
+    return [row for row, good in enumerate(pays(bench.rows)) if good]
 
 
 def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
     """The front with times and plastic of the rows that were measured, by their places, and what is recommended by them."""
     rows = [
-        replace(row, time_s=prices[place].time_s, filament_mm=prices[place].filament_mm) if place in prices else row
-        for place, row in enumerate(bench.rows)
+        replace(row, time_s=prices[number].time_s, filament_mm=prices[number].filament_mm) if number in prices else row
+        for number, row in enumerate(bench.rows)
     ]
     if not bench.recommended:
         return replace(bench, rows=tuple(rows), priced=True)
     choice = choose(rows, Worth.of(bench.profile), bench.profile.search.most_longer)
     marked = [
-        replace(row, chosen=place == choice.place, reason=choice.reason if place == choice.place else "")
-        for place, row in enumerate(rows)
+        replace(row, chosen=number == choice.place, reason=choice.reason if number == choice.place else "")
+        for number, row in enumerate(rows)
     ]
     return replace(bench, rows=tuple(marked), recommended=rows[choice.place].parts, priced=True)
 

@@ -48,13 +48,13 @@ def _zone(asked: Asked, bench: Bench) -> AnyZone:
             raise PlanError(f"min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
         return Zone(low, high, None if asked.get("axes") is None else rotation_rows(asked, "axes"))
     point = vector(asked, "point_mm", MOST_MM)
-    zone, mesh = Grown(point, number(asked, "angle_deg", 0.0, MOST_GROWN_DEG)), standing_mesh(bench)
+    zone, mesh = Grown(point, number(asked, "angle_deg", 0.0, MOST_GROWN_DEG)), workpiece_mesh(bench)
     if (away_mm := zone.away_mm(mesh)) > FARTHEST_MM:
         raise PlanError(f"point_mm is {list(point)}, {away_mm:.3g} mm from the model: up to {FARTHEST_MM:g} is allowed")
     return zone
 
 
-def standing_mesh(bench: Bench) -> Mesh:
+def workpiece_mesh(bench: Bench) -> Mesh:
     """The model as it stands on the platform or a pedestal, in the workpiece frame."""
     assert bench.model is not None
     standing = standing_still(bench.model.mesh(), bench.turned)
@@ -64,7 +64,7 @@ def standing_mesh(bench: Bench) -> Mesh:
 
 def named_faces(bench: Bench) -> Mask:
     """(kinds, m) which faces of the model the zones that are no boxes mean."""
-    mesh = standing_mesh(bench)
+    mesh = workpiece_mesh(bench)
     rows = np.zeros((len(ZONE_KINDS), len(mesh.faces)), dtype=np.bool_)
     for row, kind in zip(rows, ZONE_KINDS, strict=True):
         for zone in getattr(bench.zones, kind):

@@ -1,4 +1,4 @@
-"""Carried: planes and zones that belong to a model go along when it is turned, scaled or lifted."""
+"""Placing: planes and zones that belong to a model go along when it is turned, scaled or lifted."""
 
 from dataclasses import dataclass, replace
 
@@ -71,8 +71,8 @@ def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:
     if isinstance(zone, Zone):
         return _moved_box(zone, move, label)
     if isinstance(zone, Grown):
-        place = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
-        return replace(zone, point_mm=vector_of(np.round(place, POINT_DIGITS)))
+        point_mm = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
+        return replace(zone, point_mm=vector_of(np.round(point_mm, POINT_DIGITS)))
     return zone
 
 

@@ -56,7 +56,7 @@ def go_on(order: ResumeOrder, person: AtPage, checks: Checks) -> State:
     named = machine_profile(order.machine) if order.machine else None
     cut_off = read_resumption(order.journal, order.printing, named)
     checks.reporter.tell(name=cut_off.name, machine=cut_off.profile.machine.name)
-    for sentence in cut_off.told():
+    for sentence in cut_off.sentences():
         checks.add(sentence)
     compilers.wait_for(compilers.DRY_RUN)
 

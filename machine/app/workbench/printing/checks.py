@@ -67,8 +67,8 @@ def program_of(order: PrintOrder) -> Program:
         raise PlanError("these slices are not there any more: slice what is to be printed again") from None
     compilers.wait_for(compilers.DRY_RUN)
     lines = tuple(text.removesuffix("\n").split("\n"))
-    found = None if order.known is None else order.known.of(lines, order.profile)
-    return Program(lines, dry_run(lines, order.profile, found), None)
+    findings = None if order.known is None else order.known.of(lines, order.profile)
+    return Program(lines, dry_run(lines, order.profile, findings), None)
 
 
 def figures(program: Program) -> dict[str, Any]:

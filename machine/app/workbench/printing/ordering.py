@@ -24,13 +24,13 @@ def order_of(session: Session, printing: PrintRequest, force: bool, starts: bool
     bench, sliced = slices.bench, slices.sliced
     assert bench.model is not None
     known = sliced.known
-    _check_place(printing, known.profile.machine)
+    _check_printer(printing, known.profile.machine)
     if not force:  # what that goes past the print itself says
         refuse_errors(sliced.errors, force=False)
     return PrintOrder(bench.model.name, sliced.gcode, known.profile, printing, force, sliced.key, starts, known)
 
 
-def _check_place(printing: PrintRequest, machine: Machine) -> None:
+def _check_printer(printing: PrintRequest, machine: Machine) -> None:
     if is_server_address(printing.port):
         check_server_dialect(parse_server_address(printing.port), machine)
         return

@@ -171,8 +171,8 @@ class Prints(Observable):
         task.add_done_callback(self._tasks.discard)
 
 
-def _same(one: str, other: str) -> bool:
+def _same(a: str, b: str) -> bool:
     """Whether two names are those of one port, or of one print server."""
-    if is_server_address(one) and is_server_address(other):
-        return parse_server_address(one).url == parse_server_address(other).url
-    return stable_name(one) == stable_name(other)
+    if is_server_address(a) and is_server_address(b):
+        return parse_server_address(a).url == parse_server_address(b).url
+    return stable_name(a) == stable_name(b)

@@ -144,8 +144,8 @@ class RunningPrint:
         """Give the stop or the cancel on a connection of its own."""
         port, sentence = self._order.printing.port, self.state["sentence"]
         if self._emergency:
-            told = await asyncio.to_thread(rescue, port, 0, True)
-            self._become(phase="over", end="failed", sentence=told)
+            outcome = await asyncio.to_thread(rescue, port, 0, True)
+            self._become(phase="over", end="failed", sentence=outcome)
             return
         try:
             cancelled = await asyncio.to_thread(cancel_on_server, port, self.state["name"])
@@ -168,8 +168,8 @@ class RunningPrint:
         elif moved or self._emergency:
             self._become(phase="leaving")
             sentence = await asyncio.to_thread(rescue, printing.port, printing.baud, self._emergency)
-            told = f"{DIED}; {sentence}" if moved and not self._ended else sentence
-            self._become(phase="over", end="failed", sentence=told)
+            outcome = f"{DIED}; {sentence}" if moved and not self._ended else sentence
+            self._become(phase="over", end="failed", sentence=outcome)
         else:
             self._become(phase="over", end="failed", sentence=f"{DIED}; nothing had moved yet")
 

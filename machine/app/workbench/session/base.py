@@ -91,15 +91,15 @@ class SessionBase(Observable):
             self.answers = dict([*self.answers.items(), (ask, refusal)][-MOST_ANSWERS:])
         self.notify()
 
-    def do(self, word: str, bench: Bench, told: str = "") -> None:
-        """Take a further step, which can be undone. told: what it has taken away, beside what its step says itself."""
-        self.advance(self.history.do(word, bench), told)
+    def do(self, word: str, bench: Bench, lost: str = "") -> None:
+        """Take a further step, which can be undone. lost: what it has taken away, beside what its step says itself."""
+        self.advance(self.history.do(word, bench), lost)
 
-    def advance(self, history: History, told: str = "") -> None:
+    def advance(self, history: History, lost: str = "") -> None:
         """Go on with another history; a step forth tells what it has taken away."""
         forth = history.before[-1:] == (self.history.now,)
         self.problem = ""
-        for sentence in (told, history.now.told if forth else ""):
+        for sentence in (lost, history.now.lost if forth else ""):
             self.add_problem(sentence)
         self.become(history)
 

@@ -69,11 +69,11 @@ class Finding:
                 self._session.notify()
 
         try:
-            found: Found = await self._session.long.run("find_parts", bench, way, tell=follow)
-            self.notes = found.notes
+            outcome: Found = await self._session.long.run("find_parts", bench, way, tell=follow)
+            self.notes = outcome.notes
             now = self._session.bench
-            laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
-            self._session.do("find parts", with_front(laid, found.front))
+            laid = now if outcome.turn is None else with_rotation(now, (outcome.turn @ np.array(now.rotation)).tolist())
+            self._session.do("find parts", with_front(laid, outcome.front))
         finally:
             if self.search is not None and self.search.bench is bench:
                 self.search = None
@@ -86,13 +86,13 @@ class Finding:
         """A search ends whose model is not there any more or lies otherwise, or whose settings, marks or locked planes are others
         now."""
         search, bench = self.search, self._session.bench
-        if search is not None and _other(search.bench, bench):
+        if search is not None and _differs(search.bench, bench):
             self.search = None
             if self._task is not None:
                 self._task.cancel()
                 self._session.start(self._session.long.warm())
 
 
-def _other(begun: Bench, now: Bench) -> bool:
+def _differs(begun: Bench, now: Bench) -> bool:
     """Whether a search that has begun with a bench is not one for that of now."""
     return begun.sought != now.sought or locked_plan(begun).parts != locked_plan(now).parts

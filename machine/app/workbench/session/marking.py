@@ -15,12 +15,12 @@ class Marking:
 
     def __init__(self, session: SessionBase, trials: PlaneTrials) -> None:
         self._session, self._trials = session, trials
-        self._one = asyncio.Lock()
+        self._lock = asyncio.Lock()
 
     async def take(self, task: str, asked: Asked) -> None:
         """Do what a task, a function of `bench.marks`, makes of a command; planes that it forbids go, and the reason is told.
         Raises PlanError for what makes no sense, and where a plane that would go is locked."""
-        async with self._one:
+        async with self._lock:
             while not await self._taken(task, asked):
                 pass  # something else came in between
 

@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 
-from machine.app.workbench.bench.bench import Bench, places_to_price, with_prices
+from machine.app.workbench.bench.bench import Bench, rows_to_price, with_prices
 from machine.app.workbench.session.base import SessionBase
 from profiles.errors import UserError
 
@@ -30,7 +30,7 @@ class Pricing:
 
     async def _price(self, bench: Bench) -> None:
         prices = {}
-        for row in places_to_price(bench):
+        for row in rows_to_price(bench):
             with suppress(UserError):  # then it has none
                 prices[row] = await self._session.long.run("price_row", bench, row)
             if self._session.bench is not bench:

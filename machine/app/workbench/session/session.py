@@ -114,7 +114,7 @@ class Session(SessionBase):
                 rows = await self.quick.run("measure_plan", bench, plan)
             self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
-    async def made(self, word: str, task: str, *given: Any) -> Any:
+    async def make(self, word: str, task: str, *given: Any) -> Any:
         """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
         with self.waiting(word):
             return await self.quick.run(task, self.bench, *given)

@@ -26,7 +26,7 @@ class PlaneTrials:
         self.trial: tuple[Bench, Cuts, Trial] | None = None
         self.refused: Obstacle | None = None
         self._session, self._readiness = session, readiness
-        self._one, self._edits = asyncio.Lock(), asyncio.Lock()
+        self._trying, self._edits = asyncio.Lock(), asyncio.Lock()
         self._wanted: Cuts | None = None  # tried next, whatever else was wanted meanwhile
         session.followers.append(self._follow)
 
@@ -59,7 +59,7 @@ class PlaneTrials:
         assert bench.model is not None
         reach_mm = REACH_SHARE * hypot(*bench.model.size_mm)
         with self._session.waiting(f"looking for a neck near the plane of part {number}"):
-            async with self._one:
+            async with self._trying:
                 neck: Plane | None = await self._readiness.ask("near_neck", bench, bench.cuts, number, reach_mm)
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
@@ -70,13 +70,13 @@ class PlaneTrials:
 
     async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
         """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
-        async with self._one:
+        async with self._trying:
             trial: Trial = await self._readiness.ask("try_cuts", bench, cuts, most_cuts)
             return trial
 
     async def _try_newest(self) -> None:
         """Figures at once; where parts are not looked at yet, one after the other as soon as the hand rests."""
-        async with self._one:
+        async with self._trying:
             cuts, self._wanted = self._wanted, None
             bench = self._session.bench
             if cuts is None or bench.model is None:

@@ -28,21 +28,21 @@ async def profile(session: Session, request: Request) -> Response:
 
 async def plan(session: Session, request: Request) -> Response:
     """The plan's file."""
-    text: str = await session.made("cutting the parts", "make_plan")
+    text: str = await session.make("cutting the parts", "make_plan")
     return Response(text, headers=_saved_as(f"{file_stem(session.bench)}-plan.toml"), media_type="application/toml")
 
 
 async def folder(session: Session, request: Request) -> Response:
     """The folder of the parts as a zip."""
     out = session.new_file()
-    await session.made("cutting the parts", "make_folder", out)
+    await session.make("cutting the parts", "make_folder", out)
     return _once(out, "application/zip", f"{file_stem(session.bench)}-parts.zip")
 
 
 async def pictures(session: Session, request: Request) -> Response:
     """The drawings of the parts as a zip."""
     out = session.new_file()
-    await session.made("drawing the parts", "make_pictures", out)
+    await session.make("drawing the parts", "make_pictures", out)
     return _once(out, "application/zip", f"{file_stem(session.bench)}-pictures.zip")
 
 

@@ -25,12 +25,12 @@ class ProfileFiles:
             kind = kind_in(path)
         except ProfileError:
             return False
-        kept = str(shutil.copy(path, self._received.new_file(path.name)))
+        copy = str(shutil.copy(path, self._received.new_file(path.name)))
         try:
-            session.start(session.take_given(f"take {path.name}", lambda given: named(given, kind, kept)))
+            session.start(session.take_given(f"take {path.name}", lambda given: named(given, kind, copy)))
         except ProfileError as error:
-            remove_file(Path(kept))
-            raise ProfileError(str(error).replace(f"{Path(kept).parent}{os.sep}", "")) from None
+            remove_file(Path(copy))
+            raise ProfileError(str(error).replace(f"{Path(copy).parent}{os.sep}", "")) from None
         return True
 
     def as_shown(self, given: Given) -> Given:

@@ -75,8 +75,8 @@ def serve_workbench(
     with own:
         folders = tidy_left()
         if folders:
-            told = f"{folders[0]} and {len(folders) - 1} more" if folders[1:] else str(folders[0])
-            left = f"workbenches that were killed have left the files of their benches in {told}"
+            names = f"{folders[0]} and {len(folders) - 1} more" if folders[1:] else str(folders[0])
+            left = f"workbenches that were killed have left the files of their benches in {names}"
             say(f"{left}: the page offers them, and they go with a start in a day")
         asyncio.run(_serve(make, begin, announce, own, Uploads(upload_mib, files_in(*folders))))
 

@@ -61,7 +61,7 @@ class Found:
 def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
     """What a search as `decompose` makes it has found. Raises RankerError."""
     ranker_named(way.ranker)
-    mesh, name, profile, locked = standing_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
+    mesh, name, profile, locked = turned_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
     price, best = pricing(profile.of_all_parts), None
 
@@ -94,9 +94,9 @@ def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ..
     return cut_bench(bench, plan, prices=True).front
 
 
-def price_row(tell: Tell, bench: Bench, place: int) -> FrontRow:
+def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
     """A row of the front on the bench with its time and plastic; as it is where it cannot be cut any more."""
-    row = bench.rows[place]
+    row = bench.rows[number]
     with suppress(PlanError):
         return cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts_of(row), front=()), prices=True).front[0]
     return row
@@ -133,12 +133,12 @@ def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:
 
 def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
     """The model on the bench cut by a plan; prices: the rows of its front measured, too."""
-    mesh, name = standing_mesh(bench, plan), _name(bench)
+    mesh, name = turned_mesh(bench, plan), _name(bench)
     compilers.wait_for(compilers.JUDGE)
     return cut_by_plan(mesh, name, bench.profile, plan, price=pricing(bench.profile.of_all_parts) if prices else None)
 
 
-def standing_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
+def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
     """The mesh as it is cut, turned as the plan says or else as the bench does."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)

@@ -85,12 +85,12 @@ def _is_begun(folder: Path) -> bool:
 
 
 def _is_done_with(folder: Path) -> bool:
-    found = folder / FOUND
+    marker = folder / FOUND
     if not files_in(folder):
         return True
-    if not found.exists():
-        found.touch()
-    return time.time() - found.stat().st_mtime > KEPT_S
+    if not marker.exists():
+        marker.touch()
+    return time.time() - marker.stat().st_mtime > KEPT_S
 
 
 def _lock(folder: Path) -> int | None:

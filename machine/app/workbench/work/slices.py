@@ -7,7 +7,7 @@ from pathlib import Path
 
 from machine.app.pipeline.comparison import in_one_part, in_parts
 from machine.app.pipeline.copies import in_copies
-from machine.app.pipeline.given_plan import as_it_lies
+from machine.app.pipeline.given_plan import as_turned
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
@@ -53,7 +53,7 @@ class Sliced:
     @property
     def errors(self) -> tuple[Finding, ...]:
         """Those that are errors, with which the command line writes no file and prints nothing without --force."""
-        return tuple(each for each in self.findings if each.severity == "error")
+        return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
 def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
@@ -112,5 +112,5 @@ def share_page(tell: Tell, page: Path, alternatives: tuple[Alternative, ...], ou
 
 def _plated(bench: Bench) -> tuple[Decomposition, Profile]:
     """The parts on the bench, in copies as `export --copies` has them, and what they are printed with."""
-    profile = as_it_lies(bench.profile, bench.turned)
+    profile = as_turned(bench.profile, bench.turned)
     return in_copies(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.copies, profile)

@@ -7,7 +7,7 @@ import numpy as np
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import mesh_blocks
 from machine.app.workbench.bench.values import vector_of
-from machine.app.workbench.work.cutting import standing_mesh
+from machine.app.workbench.work.cutting import turned_mesh
 from machine.app.workbench.work.pieces import out_of_reach
 from machine.app.workbench.work.processes import Tell
 from mdp.overhang import risky_upright
@@ -32,7 +32,7 @@ class Standing:
 
 def stand(tell: Tell, bench: Bench) -> Standing:
     """How the model on the bench stands."""
-    mesh, profile, pedestal, refusal = standing_mesh(bench), bench.profile, b"", ""
+    mesh, profile, pedestal, refusal = turned_mesh(bench), bench.profile, b"", ""
     size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
     height_mm = profile.search.pedestal_mm
     if height_mm > 0.0:

@@ -10,7 +10,7 @@ import numpy as np
 
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.work.cutting import standing_mesh
+from machine.app.workbench.work.cutting import turned_mesh
 from machine.app.workbench.work.processes import Tell
 from mdp.cut import convex_hull
 from mdp.plane import Plane
@@ -51,7 +51,7 @@ def _trials(number: int, bench: Bench) -> Trials:
     if _ready is None or _ready[0] != number:
         _ready = None  # two at once would be too much for the memory
         compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
-        trials = Trials(standing_mesh(bench), bench.profile, bench.zones)
+        trials = Trials(turned_mesh(bench), bench.profile, bench.zones)
         trials.warm()
         _ready = number, trials
     return _ready[1]

@@ -121,18 +121,18 @@ class TaskQueue:
 
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
-        self._one = asyncio.Lock()
+        self._lock = asyncio.Lock()
         self._closed = False
 
     async def warm(self) -> None:
         """Start a process before it is needed."""
-        async with self._one:
+        async with self._lock:
             await self.pool.warm(self)
 
     async def run(self, task: str, *given: Any, tell: Callable[[Any], None] = lambda value: None) -> Any:
         """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
         try:
-            async with self._one, self.pool.worker(self) as process:
+            async with self._lock, self.pool.worker(self) as process:
                 kind, value = await _answer(process, (task, given), tell)
         except (asyncio.IncompleteReadError, ConnectionError):
             raise UserError("the process that did this work has ended before it was done: try it again") from None

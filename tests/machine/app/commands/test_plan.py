@@ -37,27 +37,30 @@ def _values(path: str) -> Any:
 
 
 def test_the_plan_in_the_folder_gives_the_same_parts_and_stays_as_it_is(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _run("decompose", "demo:tree", "-o", "a")
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    _run("decompose", "tee.stl", "-o", "a")
     edited = "# my own remark\n" + Path("a/plan.toml").read_text()
     Path("a/plan.toml").write_text(edited)
-    _run("decompose", "demo:tree", "--plan", "a/plan.toml", "-o", "b")
+    _run("decompose", "tee.stl", "--plan", "a/plan.toml", "-o", "b")
     assert "cut by a plan in" in capsys.readouterr().out
     assert [Path(f"a/{name}").read_bytes() for name in PARTS] == [Path(f"b/{name}").read_bytes() for name in PARTS]
     assert json.loads(Path("b/decomposition.json").read_text())["candidates_evaluated"] == 0
     again = Path("b/plan.toml").read_text()
-    _run("decompose", "demo:tree", "--plan", "a/plan.toml", "-o", "a")
+    _run("decompose", "tee.stl", "--plan", "a/plan.toml", "-o", "a")
     assert Path("a/plan.toml").read_text() == edited
     assert again.split("[[front]]")[0] in edited
 
 
 def test_a_plan_that_is_not_there_yet_is_written_and_then_used(folder: Path) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
     for name in ("first", "second"):
-        _run("decompose", "demo:tree", "--plan", "tree.toml", "--json", f"{name}.json")
+        _run("decompose", "tee.stl", "--plan", "tee.toml", "--json", f"{name}.json")
     first, second = _values("first.json"), _values("second.json")
     assert second["parts"] == first["parts"]
     assert [row["parts"] for row in second["front"]] == [row["parts"] for row in first["front"]]
-    _run("decompose", "demo:tree", "--plan", "tree.toml", "--parts", "2", "--json", "two.json")
-    assert len(_values("two.json")["parts"]) == 2
+    assert len(first["parts"]) == 2
+    _run("decompose", "tee.stl", "--plan", "tee.toml", "--parts", "3", "--json", "three.json")
+    assert len(_values("three.json")["parts"]) == 3
 
 
 def test_settings_of_a_part_are_kept_in_the_plan_and_change_what_is_written(
@@ -78,9 +81,10 @@ def test_settings_of_a_part_are_kept_in_the_plan_and_change_what_is_written(
 
 
 def test_more_parts_than_there_are_give_all_there_are_and_say_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _run("decompose", "demo:tree", "--parts", "50", "--json", "many.json")
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    _run("decompose", "tee.stl", "--parts", "50", "--json", "many.json")
     count = len(_values("many.json")["parts"])
-    assert f"demo:tree: --parts 50: the search found no more than {count}\n" in capsys.readouterr().err
+    assert f"tee.stl: --parts 50: the search found no more than {count}\n" in capsys.readouterr().err
 
 
 HIGH = "version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 500\n"
@@ -113,8 +117,8 @@ def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Pa
     assert main(["export", "tee.stl", "-o", "searched.gcode", *given]) == 0
     assert main(["decompose", "tee.stl", "--plan", "tee.toml", *given]) == 0
     assert main(["export", "tee.stl", "-o", "planned.gcode", "--plan", "tee.toml", *given]) == 0
-    told = Path("tee.toml").read_text()
-    assert (told.count("[[part]]") > 1, "orientation" in told) == (not laid, laid)
+    plan_text = Path("tee.toml").read_text()
+    assert (plan_text.count("[[part]]") > 1, "orientation" in plan_text) == (not laid, laid)
     assert Path("planned.gcode").read_bytes() == Path("searched.gcode").read_bytes()
 
 

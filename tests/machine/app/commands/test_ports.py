@@ -61,11 +61,11 @@ def test_several_ports_are_asked_at_a_time_and_told_in_order(
         hear_out(monkeypatch, port_reports, mute)
         here += [device(printer.path), device(stranger), device(mute), device("/dev/no-such-port")]
         assert main(["ports", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert [each["port"] for each in found] == [each.name for each in here]
-    assert [each["answer"] for each in found] == ["printer", "no printer", "silent", None]
-    assert found[0]["axes"] == ["X", "Y", "Z", "A", "C"]
-    assert found[3]["trouble"].startswith("port /dev/no-such-port does not exist")
+    reports = json.loads(capsys.readouterr().out)
+    assert [port["port"] for port in reports] == [port.name for port in here]
+    assert [port["answer"] for port in reports] == ["printer", "no printer", "silent", None]
+    assert reports[0]["axes"] == ["X", "Y", "Z", "A", "C"]
+    assert reports[3]["trouble"].startswith("port /dev/no-such-port does not exist")
 
 
 def test_an_impossible_rate_is_refused_before_any_port_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,8 +76,8 @@ def test_an_impossible_rate_is_refused_before_any_port_is_asked(capsys: pytest.C
 def test_without_asking_no_port_is_opened(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
     here.append(MEGA)
     assert main(["ports", "--no-ask"]) == 0
-    told_lines = ["/dev/serial/by-id/usb-Mega", "    /dev/ttyACM0, Mega 2560 (2341:0042), serial number 7533"]
-    assert capsys.readouterr() == ("\n".join(told_lines) + "\n", "")
+    lines = ["/dev/serial/by-id/usb-Mega", "    /dev/ttyACM0, Mega 2560 (2341:0042), serial number 7533"]
+    assert capsys.readouterr() == ("\n".join(lines) + "\n", "")
 
 
 def test_a_port_in_use_is_told_without_its_name_twice() -> None:

@@ -73,10 +73,10 @@ def test_a_print_that_a_server_is_at_already_is_followed_to_its_end(kind: str, c
         job.files["vase.gcode"] = bytes(100)
         job.start("vase.gcode")
         assert main(["follow", address]) == 0
-    told = capsys.readouterr()
+    output = capsys.readouterr()
     file = "its file" if kind == "duet" else "vase.gcode"  # a Duet tells no name with its state
-    assert f"it is printing {file}" in told.err
-    assert told.out.startswith(f"printed {file} on {address} in ")
+    assert f"it is printing {file}" in output.err
+    assert output.out.startswith(f"printed {file} on {address} in ")
     assert not any(asked.endswith(("upload", "/start")) for asked in job.asked)
 
 
@@ -212,8 +212,8 @@ def test_a_server_is_no_port_for_what_talks_to_the_printer_itself(command: list[
     assert "--port moonraker:host is a print server, which takes whole files by print and send" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("gone", "kept"), [(0, "keeps nothing of"), (7, "may hold all of")])
-def test_an_upload_that_is_broken_off_tells_what_the_server_has(gone: int, kept: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("gone", "rest"), [(0, "keeps nothing of"), (7, "may hold all of")])
+def test_an_upload_that_is_broken_off_tells_what_the_server_has(gone: int, rest: str, capsys: pytest.CaptureFixture[str]) -> None:
     class Interrupted:
         name = "octoprint:host"
 
@@ -227,7 +227,7 @@ def test_an_upload_that_is_broken_off_tells_what_the_server_has(gone: int, kept:
     server: object = Interrupted()
     with pytest.raises(KeyboardInterrupt):
         hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode")  # type: ignore[arg-type]
-    assert f"upload broken off: octoprint:host {kept} a.gcode" in capsys.readouterr().err
+    assert f"upload broken off: octoprint:host {rest} a.gcode" in capsys.readouterr().err
 
 
 def test_a_person_who_gives_up_breaks_the_upload_off(capsys: pytest.CaptureFixture[str]) -> None:

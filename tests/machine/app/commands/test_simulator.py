@@ -32,8 +32,8 @@ def running(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 def ended(process: subprocess.Popen[str], number: signal.Signals = signal.SIGINT) -> tuple[int, str]:
     """Exit code and the rest of what it prints."""
     process.send_signal(number)
-    told, _ = process.communicate(timeout=PATIENCE_S)
-    return process.returncode, told
+    output, _ = process.communicate(timeout=PATIENCE_S)
+    return process.returncode, output
 
 
 def talk(path: str, text: bytes, until: bytes) -> bytes:
@@ -47,10 +47,10 @@ def test_it_keeps_a_link_while_it_runs_and_sums_up_at_the_end(tmp_path: Path) ->
     with running("--pty", str(link), "--speed", "0") as (path, process):
         assert (path, link.is_symlink()) == (str(link), True)
         assert b"area:" in talk(path, b"G1 X10 F600\nG0 A200\nG77\nM400\nM115\n", b"area:")
-        code, told = ended(process)
+        code, output = ended(process)
     assert code == 0
-    assert told.startswith("2 moves in ")
-    assert "1 coordinates out of limits, 1 unknown commands" in told
+    assert output.startswith("2 moves in ")
+    assert "1 coordinates out of limits, 1 unknown commands" in output
     assert not link.is_symlink()
 
 
@@ -85,9 +85,9 @@ def test_faults_of_a_file_happen(tmp_path: Path) -> None:
 ])  # fmt: skip
 def test_what_cannot_be_is_refused_with_a_sentence(options: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulator", *options]) == 1
-    told = capsys.readouterr().err
-    assert words in told
-    assert told.count("\n") == 1
+    errors = capsys.readouterr().err
+    assert words in errors
+    assert errors.count("\n") == 1
 
 
 def test_a_file_in_the_way_of_the_link_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -146,9 +146,9 @@ def test_a_frame_shows_its_number_and_how_the_table_stands() -> None:
 
 
 def test_the_sheet_is_headed_by_the_model_s_name() -> None:
-    named, other = (contact_sheet(replace(example(), name=name), PROFILE.machine, 160) for name in ("tee.stl", "arm.stl"))
-    assert not np.array_equal(named[: 160 // 12], other[: 160 // 12])
-    assert np.array_equal(named[160 // 12 :], other[160 // 12 :])
+    tee, arm = (contact_sheet(replace(example(), name=name), PROFILE.machine, 160) for name in ("tee.stl", "arm.stl"))
+    assert not np.array_equal(tee[: 160 // 12], arm[: 160 // 12])
+    assert np.array_equal(tee[160 // 12 :], arm[160 // 12 :])
 
 
 def test_the_same_scene_gives_the_same_bytes() -> None:

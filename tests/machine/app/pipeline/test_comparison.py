@@ -20,14 +20,14 @@ COARSE += ("search.directions=60", "search.beam_width=1", "process.infill_densit
 
 
 @cache
-def made() -> tuple[Profile, Program, tuple[Alternative, ...]]:
+def compared() -> tuple[Profile, Program, tuple[Alternative, ...]]:
     profile = load(settings=[*COARSE, "search.stair_weight=0"])  # so that both arms are one part
     program = build(decompose(tee(), "tee", profile), profile)
     return profile, program, compare_with_one_part(program, profile)
 
 
 def test_a_tee_straight_up_needs_support_in_parts_or_upside_down_it_does_not() -> None:
-    ours, up, best = made()[2]
+    ours, up, best = compared()[2]
     assert (up.name, up.parts, best.parts) == ("straight up", 1, 1)
     assert abs(up.risky_mm2 - 300.0) < 6.0
     assert max(ours.risky_mm2, best.risky_mm2) < 1.0
@@ -35,13 +35,13 @@ def test_a_tee_straight_up_needs_support_in_parts_or_upside_down_it_does_not() -
 
 
 def test_the_alternatives_get_support_even_where_the_process_gives_none() -> None:
-    ours, up, _ = made()[2]
+    ours, up, _ = compared()[2]
     assert ours.support_mm3 == 0.0
     assert up.support_mm3 > 100.0
 
 
 def test_an_alternative_that_the_machine_cannot_print_stays_in_the_list_with_the_reason() -> None:
-    _, up, _ = compare_with_one_part(made()[1], load(settings=[*COARSE, "machine.z.limits_mm=[-80,20]"]))
+    _, up, _ = compare_with_one_part(compared()[1], load(settings=[*COARSE, "machine.z.limits_mm=[-80,20]"]))
     assert up.time_s is None
     assert "Z" in up.message
     assert up.message in compare_table((up,))
@@ -58,13 +58,13 @@ def test_stairs_of_a_model_in_one_piece_are_those_of_its_slanted_faces_searched_
 
 
 def test_table_and_json_hold_the_same_figures() -> None:
-    found = made()[2]
-    lines = compare_table(found).splitlines()
-    rows = alternatives_json(found)
+    alternatives = compared()[2]
+    lines = compare_table(alternatives).splitlines()
+    rows = alternatives_json(alternatives)
     assert [line.split("  ")[0] for line in lines[2:5]] == ["in 2 parts", "straight up", "best single orientation"]
     assert [(row["name"], row["parts"]) for row in rows] == [("parts", 2), ("upright", 1), ("oriented", 1)]
     assert f"{rows[1]['support_area_mm2']:.1f} mm2" in lines[3]
-    assert [row["time_s"] for row in rows] == [each.time_s for each in found]
+    assert [row["time_s"] for row in rows] == [alternative.time_s for alternative in alternatives]
     assert rows[0]["seam_mm"] > 0.0 == rows[1]["seam_mm"] == rows[2]["seam_mm"]
-    assert [(each["part"], each["plastic_mm3"] > 0.0) for each in rows[0]["interfaces"]] == [(2, True)]
+    assert [(alternative["part"], alternative["plastic_mm3"] > 0.0) for alternative in rows[0]["interfaces"]] == [(2, True)]
     assert rows[1]["interfaces"] == rows[2]["interfaces"] == []

@@ -1,10 +1,12 @@
 """Copies: they stand apart on the plate, are printed together, and what does not fit is refused."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import manifold3d as m3
 import numpy as np
 import pytest
+import shapely
 
 from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
@@ -37,14 +39,29 @@ def test_copies_stand_in_rows_near_the_middle(count: int, reach_mm: float) -> No
     assert apart.min() >= 25.0 - 1e-9
 
 
+def test_as_many_copies_stand_on_an_oblong_plate_as_have_room_in_rows() -> None:
+    machine = load(settings=["machine.table.size_mm=[196, 99]"]).machine
+    places = places_on_plate((20.0, 20.0), 5.0, 1000, machine)
+    assert len(places) == int((196 - 4 + 5) / 25) * int((99 - 4 + 5) / 25)  # 2 mm are kept free to every edge
+
+
+def test_copies_on_a_round_plate_keep_to_its_edge_and_apart() -> None:
+    machine = plate().machine
+    disc = shapely.Point(0.0, 0.0).buffer(machine.table.radius_mm, quad_segs=1000)
+    boxes = [shapely.box(x - 15, y - 6, x + 15, y + 6) for x, y in places_on_plate((30.0, 12.0), 5.0, 1000, machine)]
+    assert len(boxes) > 20
+    assert all(disc.covers(box.buffer(2.0, join_style="mitre")) for box in boxes)
+    assert min(a.distance(b) for a, b in combinations(boxes, 2)) == pytest.approx(5.0)
+
+
 def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> None:
     many, profile = in_copies(decomposed(whole(box(10, 10, 0.9))), 3, plate())
     program = build(many, profile)
-    assert [each.code for each in program.run.findings if each.code != "uncalibrated"] == []
-    one = build(decomposed(whole(box(10, 10, 0.9))), profile)
-    own = [float(each.run.segment_mm3[_own(each.run)].sum()) for each in (one, program)]
+    assert [finding.code for finding in program.run.findings if finding.code != "uncalibrated"] == []
+    single = build(decomposed(whole(box(10, 10, 0.9))), profile)
+    own = [float(printed.run.segment_mm3[_own(printed.run)].sum()) for printed in (single, program)]
     assert own[1] == pytest.approx(3.0 * own[0], rel=1e-3)
-    assert program.run.program.layers == one.run.program.layers == 3
+    assert program.run.program.layers == single.run.program.layers == 3
 
 
 def _own(run) -> np.ndarray:  # type: ignore[no-untyped-def]

@@ -132,11 +132,11 @@ def test_a_program_for_another_machine_is_refused_unless_forced(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hear_out(monkeypatch, compatibility)
-    made = load("open5x") if "open5x" in _machines() else load(_machines()[0])
-    file = file_of(tmp_path, "G1 X1 F600", *foot(made, 1.0, 1.0))
+    foreign = load("open5x") if "open5x" in _machines() else load(_machines()[0])
+    file = file_of(tmp_path, "G1 X1 F600", *foot(foreign, 1.0, 1.0))
     with SimulatedPrinter(MACHINE) as printer:
         assert printed(printer.path, file, "--machine", "generic_ac") == 1
-        sentence = f"part.gcode was made for the machine {made.machine.name}, not for {MACHINE.name}"
+        sentence = f"part.gcode was made for the machine {foreign.machine.name}, not for {MACHINE.name}"
         assert f"{sentence} (--force goes on)" in capsys.readouterr().err
         assert printer.record.lines == len(["M115", "M114"])
         assert printed(printer.path, file, "--machine", "generic_ac", "--force") == 0

@@ -49,7 +49,7 @@ def is_no_bug(content: bytes) -> None:
     journal.write_bytes(content)
     with redirect_stdout(StringIO()):
         assert list_resumable() == 0
-    json.dumps([each.name for each in resumable_journals()])
+    json.dumps([entry.name for entry in resumable_journals()])
     with suppress(UserError):
         read_resumption(journal, PrintRequest("/dev/none"))
     journal.unlink()
@@ -90,7 +90,7 @@ def test_a_journal_is_not_offered_and_not_thinned_out_before_its_print_has_ended
     with subprocess.Popen([sys.executable, "-c", prints], stdout=subprocess.PIPE, text=True) as printing:
         assert printing.stdout is not None
         path = printing.stdout.readline().strip()
-        assert path not in [str(each.path) for each in resumable_journals()]
+        assert path not in [str(entry.path) for entry in resumable_journals()]
         assert main(["resume", path, "--port", "/dev/none", "--yes"]) == 1
         running = "its print runs now, in another terminal or page: it can be resumed when it has ended"
         assert running in capsys.readouterr().err.replace("\n", " ")
@@ -99,7 +99,7 @@ def test_a_journal_is_not_offered_and_not_thinned_out_before_its_print_has_ended
                 pass
         assert Path(path).exists()
         printing.send_signal(signal.SIGKILL)
-    assert path in [str(each.path) for each in resumable_journals()]
+    assert path in [str(entry.path) for entry in resumable_journals()]
 
 
 def test_a_program_whose_journal_another_process_has_yet_to_begin_is_not_thinned_out() -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from machine.app.printer import network_print
-from machine.app.printer.network_print import ProgressToldByServer
+from machine.app.printer.network_print import ReportedProgress
 from machine.link.protocol.events import Temperature
 from machine.network.server import JobStatus, Phase
 
@@ -11,7 +11,7 @@ from machine.network.server import JobStatus, Phase
 def test_the_temperatures_of_a_server_that_does_not_answer_grow_old(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 100.0
     monkeypatch.setattr(network_print, "monotonic", lambda: now_s)
-    progress = ProgressToldByServer()
+    progress = ReportedProgress()
     first, second = (JobStatus(Phase.PRINTING, temperature=Temperature(209.6, 210.0, 60.0, 60.0)) for _ in range(2))
     assert progress.at(first, "").heat_age_s == 0.0
     now_s += 20.0

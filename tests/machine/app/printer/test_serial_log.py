@@ -70,12 +70,12 @@ def test_the_newest_ten_logs_are_kept_each_with_its_pieces(tmp_path: Path, monke
         with new_log("print", "") as log:
             files.append(log.file)
             piece_of(log.file, 1).write_text("")
-    with new_log("console", "") as other:
+    with new_log("console", "") as console:
         pass
-    kept = sorted(path.name for path in (tmp_path / "tiltprint" / "logs").iterdir())
-    assert oct(other.file.stat().st_mode & 0o777) == "0o600"  # what a person prints concerns nobody else
-    assert oct(other.file.parent.stat().st_mode & 0o777) == "0o700"
-    assert kept == sorted([other.file.name, *(p.name for f in files[3:] for p in (f, piece_of(f, 1)))])
+    names = sorted(path.name for path in (tmp_path / "tiltprint" / "logs").iterdir())
+    assert oct(console.file.stat().st_mode & 0o777) == "0o600"  # what a person prints concerns nobody else
+    assert oct(console.file.parent.stat().st_mode & 0o777) == "0o700"
+    assert names == sorted([console.file.name, *(p.name for f in files[3:] for p in (f, piece_of(f, 1)))])
 
 
 def test_a_log_that_cannot_be_written_says_so_and_stays_silent(tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_the_orders_of_a_safe_end_are_logged_too(tmp_path: Path) -> None:
     with SerialLog(tmp_path / "a.log", "") as log, SimulatedPrinter(load().machine, speed=20.0) as printer:
         lines = ["M104 S200", *["G1 X5 F60", "G1 X0"] * 99]
         medium = tap(log.note)
-        print_lines(lines, printer.path, on_progress=lambda told: told.sent > 5 and stop.set(), stop=stop, medium=medium)
+        print_lines(lines, printer.path, on_progress=lambda progress: progress.sent > 5 and stop.set(), stop=stop, medium=medium)
     lines = logged(tmp_path / "a.log")
     assert any(line.startswith("> N") and "M104 S200" in line for line in lines)
     assert "> M104 S0" in lines

@@ -54,9 +54,9 @@ def test_the_page_and_the_state_are_served(watched: Watched) -> None:
     assert asked(watched, "/")[1] == b"<p>the page</p>"
     assert json.loads(asked(watched, "/state")[1]) == {"state": "waiting"}
     watched.follow(HALF)
-    told = json.loads(asked(watched, "/state")[1])
-    assert (told["state"], told["line"], told["acknowledged"], told["total"]) == ("printing", 123, 50, 100)
-    assert (told["nozzle_c"], told["nozzle_target_c"], told["bed_c"]) == (209.5, 210.0, None)
+    state = json.loads(asked(watched, "/state")[1])
+    assert (state["state"], state["line"], state["acknowledged"], state["total"]) == ("printing", 123, 50, 100)
+    assert (state["nozzle_c"], state["nozzle_target_c"], state["bed_c"]) == (209.5, 210.0, None)
 
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "/../state", "/state/", "/favicon.ico"])
@@ -157,19 +157,19 @@ def test_how_it_ended_is_said_once() -> None:
 def test_print_watch_follows_the_print_to_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    kept: list[Watched] = []
+    pages: list[Watched] = []
 
     @contextmanager
     def remembered(page: bytes, port: int) -> Iterator[Watched]:
         with serve(page, port) as running:
-            kept.append(running)
+            pages.append(running)
             yield running
 
     monkeypatch.setattr("machine.app.printer.watch_page.serve", remembered)
     file = tmp_path / "moves.gcode"
     file.write_text("G28\nM109 S200\nG1 Z0.2 F6000\nG1 X10 E1\nG1 Y10 E2\nM104 S0\nM140 S0\n")
     assert main(["print", str(file), "--port", "sim", "--watch", "--force"]) == 0
-    told, (header, _) = json.loads(kept[0].state()), opened(kept[0].page)
-    assert (told["state"], told["acknowledged"], told["total"]) == ("done", 7, 7)
+    state, (header, _) = json.loads(pages[0].state()), opened(pages[0].page)
+    assert (state["state"], state["acknowledged"], state["total"]) == ("done", 7, 7)
     assert header["live"] is True
-    assert f"watch the print at {kept[0].address}" in capsys.readouterr().err
+    assert f"watch the print at {pages[0].address}" in capsys.readouterr().err

@@ -143,13 +143,13 @@ def test_keys_come_as_they_are_pressed_and_arrows_are_none(keyboard: int) -> Non
         assert pressed.wait_for(2) == "pr"
 
 
-@pytest.mark.parametrize(("one", "other"), [(b"p\x1b", b"[Cr"), (b"p\x1b[", b"Cr"), (b"p\x1bO", b"Pr"), (b"p\x1b[15", b"~r")])
-def test_an_arrow_that_comes_in_pieces_is_no_key_either(keyboard: int, one: bytes, other: bytes) -> None:
+@pytest.mark.parametrize(("begin", "rest"), [(b"p\x1b", b"[Cr"), (b"p\x1b[", b"Cr"), (b"p\x1bO", b"Pr"), (b"p\x1b[15", b"~r")])
+def test_an_arrow_that_comes_in_pieces_is_no_key_either(keyboard: int, begin: bytes, rest: bytes) -> None:
     pressed = Pressed()
     with Typing(pressed):
-        os.write(keyboard, one)
+        os.write(keyboard, begin)
         assert pressed.wait_for(1) == "p"
-        os.write(keyboard, other)
+        os.write(keyboard, rest)
         assert pressed.wait_for(2) == "pr"
 
 

@@ -22,12 +22,12 @@ def part(index: int, mesh: Mesh, base: Plane, pose: Pose, risky_mm2: float = 0.0
 def tee_in_parts() -> Decomposition:
     """A tee with its arms cut off sideways, 300 mm2 of underside that hang printed straight up; 30 of them stay risky."""
     right, left = Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0)
-    one, rest = cut(solid_of(tee()), left)
-    other, stem = cut(rest, right)
+    left_arm, rest = cut(solid_of(tee()), left)
+    right_arm, stem = cut(rest, right)
     parts = (
         part(1, mesh_of(stem), PLATFORM, Pose(0.0, 0.0)),
-        part(2, mesh_of(other), right, Pose(90.0, 90.0), 30.0),
-        part(3, mesh_of(one), left, Pose(90.0, -90.0)),
+        part(2, mesh_of(right_arm), right, Pose(90.0, 90.0), 30.0),
+        part(3, mesh_of(left_arm), left, Pose(90.0, -90.0)),
     )
     return Decomposition("tee.stl", tee(), parts, 2, "classic", 300.0, 30.0, 1234, 2, 0.25)
 
@@ -108,10 +108,10 @@ def test_a_run_is_told_in_four_lines_and_its_findings() -> None:
 
 def test_a_long_finding_is_told_in_lines_with_every_key_whole() -> None:
     machine = load_one("trident_5axis")["machine"]
-    told = run_table(dry_run(["M105"], load(machine="trident_5axis"))).splitlines()
-    first = next(k for k, line in enumerate(told) if line.startswith("warning: 8 numbers of "))
-    assert max(len(line) for line in told) <= 100
-    assert set(machine.uncalibrated) <= set(" ".join(told[first:]).replace(",", "").split())
+    lines = run_table(dry_run(["M105"], load(machine="trident_5axis"))).splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("warning: 8 numbers of "))
+    assert max(len(line) for line in lines) <= 100
+    assert set(machine.uncalibrated) <= set(" ".join(lines[first:]).replace(",", "").split())
 
 
 def test_a_program_without_a_move_says_so() -> None:
@@ -123,6 +123,6 @@ def test_a_table_aligns_words_left_and_numbers_right() -> None:
 
 
 def test_the_plastic_of_every_interface_is_told_and_of_one_piece_none() -> None:
-    told = interfaces_line({2: 174.0, 3: 301.0})
-    assert told == "interfaces take 0.47 cm3 that one piece would not: part 2 0.17, part 3 0.30\n"
+    line = interfaces_line({2: 174.0, 3: 301.0})
+    assert line == "interfaces take 0.47 cm3 that one piece would not: part 2 0.17, part 3 0.30\n"
     assert interfaces_line({}) == ""

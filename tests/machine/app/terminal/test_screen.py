@@ -30,9 +30,9 @@ def lines(progress: Progress, words: tuple[str, ...] = (), hint: str = "", keys:
 
 
 def test_a_moment_of_a_print_is_drawn_whole() -> None:
-    head, place, heat, bar, times, keys = lines(MOMENT)
+    head, position, heat, bar, times, keys = lines(MOMENT)
     assert head.split() == ["tree.gcode", "to", "/dev/ttyACM0", "printing"]
-    assert place == "part 1 of 2   layer 1 of 2   tilt A 0.0 deg   turn C 0.0 deg"
+    assert position == "part 1 of 2   layer 1 of 2   tilt A 0.0 deg   turn C 0.0 deg"
     assert heat == "nozzle 209.8 / 210 deg C   bed 60.1 / 60 deg C   feed 100 %   flow 100 %"
     assert bar.endswith(" 62 %")
     assert bar.count("━") == pytest.approx(0.62 * 95, abs=1.0)
@@ -47,8 +47,8 @@ def test_the_pose_is_that_of_the_acknowledged_line() -> None:
 
 def test_what_is_not_known_is_left_out() -> None:
     unknown = Progress(0.0, Temperature())
-    _, place, heat, bar, times, _ = lines(unknown)
-    assert (place, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
+    _, position, heat, bar, times, _ = lines(unknown)
+    assert (position, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
     assert "%" not in bar
 
 

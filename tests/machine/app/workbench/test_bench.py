@@ -46,13 +46,13 @@ def test_a_face_that_is_laid_down_looks_down() -> None:
 
 
 def test_everything_is_undone_and_done_again() -> None:
-    found = with_front(history().now.bench, FRONT)
-    steps = history().do("find parts", found)
+    searched = with_front(history().now.bench, FRONT)
+    steps = history().do("find parts", searched)
     fewer = changed(steps, take, parts=2)
     turned = changed(fewer, turn, axis="z", deg=30)
     assert [turned.now.bench.parts, fewer.now.bench.parts, steps.now.bench.parts] == [0, 2, 3]
     back = turned.undo().undo()
-    assert back.now.bench is found
+    assert back.now.bench is searched
     assert back.redo().redo().now.bench is turned.now.bench
     assert changed(back, take, parts=1).undone == ()
 
@@ -67,8 +67,8 @@ def test_steps_back_end_where_their_models_would_fill_the_memory(monkeypatch: py
 
 
 def test_what_changes_nothing_is_no_step() -> None:
-    found = history().do("find parts", with_front(history().now.bench, FRONT))
-    assert changed(found, take, parts=3) is found
+    searched = history().do("find parts", with_front(history().now.bench, FRONT))
+    assert changed(searched, take, parts=3) is searched
     assert changed(history(), turn, axis="y", deg=0).before == ()
 
 

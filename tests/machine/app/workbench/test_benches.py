@@ -44,9 +44,9 @@ def test_a_second_model_lies_on_a_bench_of_its_own_that_is_closed_with_its_proce
     number = json.loads(change(bench, "benches?like=1", "POST")[1])["number"]
     second = Running(bench.process, bench.address.replace("/1/", f"/{number}/"))
     with bench.line() as page:  # which hears of the other bench over its own line
-        page.until(lambda state: [each["name"] for each in state["benches"]] == ["first.stl", ""])
+        page.until(lambda state: [entry["name"] for entry in state["benches"]] == ["first.stl", ""])
         second.send(_file(tmp_path, "second.stl"))
-        page.until(lambda state: [each["name"] for each in state["benches"]] == ["first.stl", "second.stl"])
+        page.until(lambda state: [entry["name"] for entry in state["benches"]] == ["first.stl", "second.stl"])
     with second.line() as page:
         assert page.state["given"]["settings"][-1] == "process.walls=5"
         assert set(bench.children()) - before
@@ -55,7 +55,7 @@ def test_a_second_model_lies_on_a_bench_of_its_own_that_is_closed_with_its_proce
             page.until(lambda state: False)
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 4404
-    assert [each["name"] for each in benches(bench)] == ["first.stl"]
+    assert [entry["name"] for entry in benches(bench)] == ["first.stl"]
     assert second.ask("")[0] == 404
     end_s = time.monotonic() + PATIENCE_S
     while set(bench.children()) - before and time.monotonic() < end_s:

@@ -65,9 +65,9 @@ def _sample(profile: Profile, owner: str, key: str) -> object:
 def test_a_search_reads_only_what_takes_the_front_away_and_prices_nothing_that_leaves_it(settings: tuple[str, ...]) -> None:
     profile = load(settings=(*QUICK, "process.first_layer_height_mm=0.4", *settings))
     with reading(profile) as by_search:
-        found = decompose(tee(), "model", profile)
+        decomposition = decompose(tee(), "model", profile)
     with reading(profile) as by_prices:
-        pricing(profile)(found.parts)
+        pricing(profile)(decomposition.parts)
     assert "process.self_supporting_angle_deg" in by_search
     assert {key for key in by_search if effect_of(key) != Effect.FRONT} == set()
     assert "process.infill_density" in by_prices

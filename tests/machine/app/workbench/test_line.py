@@ -1,13 +1,15 @@
 """The websocket of a page: what is no command, what is no fault, and that nothing of it is left."""
 
 import asyncio
+import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
-from machine.app.workbench.web.line import until_either_ends
+from machine.app.workbench.web.line import tell, until_either_ends
+from machine.app.workbench.work.observable import Observable
 from tests.machine.prints import prints_line
 from tests.machine.workbench import workbench
 
@@ -23,6 +25,51 @@ def test_a_frame_of_bytes_is_told_to_be_no_command_and_ends_no_line() -> None:
         assert printing.refused() == no_command
         printing.do("cancel", print=1)
         assert printing.refused() == "this print is not there any more"
+
+
+class Page:
+    """The socket of a page that takes what it is told as long as it is awake."""
+
+    def __init__(self) -> None:
+        self.heard: list[int] = []
+        self.awake = asyncio.Event()
+
+    async def send_text(self, text: str) -> None:
+        await self.awake.wait()
+        self.heard.append(json.loads(text)["version"])
+
+
+def test_fifty_pages_that_read_nothing_hold_up_nobody_and_hear_the_newest_when_they_read_again() -> None:
+    worded: list[int] = []
+
+    async def run() -> tuple[Page, list[Page]]:
+        source, reading, asleep = Observable(), Page(), [Page() for _ in range(50)]
+
+        def state() -> dict[str, int]:
+            worded.append(source.version)
+            return {"version": source.version}
+
+        async def settle() -> None:
+            for _ in range(10):
+                await asyncio.sleep(0)
+
+        reading.awake.set()
+        telling = [asyncio.create_task(tell(source, state, page)) for page in (*asleep, reading)]  # type: ignore[arg-type]
+        await settle()
+        for _ in range(20):
+            source.notify()
+            await settle()
+        for page in asleep:
+            page.awake.set()
+        await settle()
+        for task in telling:
+            task.cancel()
+        return reading, asleep
+
+    reading, asleep = asyncio.run(run())
+    assert reading.heard == list(range(21))
+    assert [page.heard for page in asleep] == 50 * [[0, 20]]
+    assert worded == list(range(21))  # once for all pages
 
 
 class Directions:
@@ -79,4 +126,4 @@ def test_a_bug_of_one_direction_is_not_taken_for_a_page_that_has_gone() -> None:
 
     with pytest.raises(ExceptionGroup) as raised:
         asyncio.run(run())
-    assert [str(each) for each in raised.value.exceptions] == ["a bug"]
+    assert [str(error) for error in raised.value.exceptions] == ["a bug"]

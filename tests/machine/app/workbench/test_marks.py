@@ -14,7 +14,7 @@ from machine.app.workbench.bench.bench import (
     with_rotation,
     with_scaled_model,
 )
-from machine.app.workbench.bench.marks import named_faces, standing_mesh
+from machine.app.workbench.bench.marks import named_faces, workpiece_mesh
 from mdp.directions.orientation import standing_still
 from mdp.directions.turns import turned_by
 from mdp.plans.plan_file import PlannedPart
@@ -43,10 +43,10 @@ def test_marks_stay_where_they_are_on_the_model_however_often_it_is_turned(angle
     for bench in (turned, again):
         (box,), (zone,) = bench.zones.keep, bench.zones.no_support
         assert isinstance(box, Zone)
-        assert (box.touches(standing_mesh(bench)) == BOX.touches(tee())).all()
+        assert (box.touches(workpiece_mesh(bench)) == BOX.touches(tee())).all()
         assert (named_faces(bench) == named_faces(BENCH)).all()
         assert isinstance(zone, Grown)
-        assert zone.away_mm(standing_mesh(bench)) < 0.002
+        assert zone.away_mm(workpiece_mesh(bench)) < 0.002
     back = with_rotation(again, BENCH.rotation).zones
     assert back.keep == (BOX,)
     assert isinstance(back.no_support[0], Grown)
@@ -67,7 +67,7 @@ def test_a_plan_of_boxes_without_end_on_a_model_turned_by_rounded_numbers_is_rea
     file.write_text(plan_text(plan_of_bench(replace(bench, cuts=()), "tiltprint")))
     assert read_plan(file).zones.keep == (box,)
     assert isinstance(box, Zone)
-    assert (box.touches(standing_mesh(bench)) == half.touches(tee())).all()
+    assert (box.touches(workpiece_mesh(bench)) == half.touches(tee())).all()
 
 
 def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> None:
@@ -88,9 +88,9 @@ def test_marks_go_along_with_a_model_that_is_read_turned_otherwise_and_larger() 
     for bench in (turned, stood):
         (box,), (zone,) = bench.zones.keep, bench.zones.no_support
         assert isinstance(box, Zone)
-        assert (box.touches(standing_mesh(bench)) == BOX.touches(tee())).all()
+        assert (box.touches(workpiece_mesh(bench)) == BOX.touches(tee())).all()
         assert isinstance(zone, Grown)
-        assert zone.away_mm(standing_mesh(bench)) < 0.005
+        assert zone.away_mm(workpiece_mesh(bench)) < 0.005
 
 
 def test_what_would_carry_a_box_beyond_what_a_plan_may_have_is_refused() -> None:

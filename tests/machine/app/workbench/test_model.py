@@ -52,7 +52,7 @@ def read(work: Any, path: Path) -> Any:
         tasks = {"read_model": read_model, "stand": stand}
 
         async def here(task: str, *given: Any, **more: Any) -> Any:
-            return tasks[task](lambda told: None, *given) if task in tasks else ()
+            return tasks[task](lambda report: None, *given) if task in tasks else ()
 
         for queue in (session.quick, session.long, session.hand):
             queue.run = here  # type: ignore[method-assign]

@@ -22,7 +22,7 @@ FRESH = ["209.6 of 210 °C", "60.0 °C"]
 
 
 def marked(ago: str) -> list[str]:
-    return [f"{each}, as last known {ago} ago" for each in FRESH]
+    return [f"{text}, as last known {ago} ago" for text in FRESH]
 
 
 @needs_node

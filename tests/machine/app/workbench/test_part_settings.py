@@ -30,7 +30,7 @@ def with_own(bench: Bench, part: int, key: str, value: str | None) -> Bench:
 
 
 def own(bench: Bench) -> dict[int, dict[str, object]]:
-    return {each.part: each.process for each in bench.profile.parts}
+    return {settings.part: settings.process for settings in bench.profile.parts}
 
 
 def test_a_part_has_values_of_its_own_that_are_marked_and_go_back() -> None:
@@ -50,7 +50,7 @@ def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cuts", "stops", "told"),
+    ("cuts", "stops", "lost"),
     [
         ((LOW, HIGH, MIDDLE), "--pause 1:3 --pause 4:15 --filament-change 9:1", ""),
         ((HIGH, MIDDLE), "--pause 1:3 --pause 3:15 --filament-change 9:1", ""),
@@ -58,12 +58,12 @@ def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
     ],
 )
 def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
-    cuts: tuple[PlannedPart, ...], stops: str, told: str
+    cuts: tuple[PlannedPart, ...], stops: str, lost: str
 ) -> None:
     steps = History(Step("", replace(BENCH, stops=parse_stops(["1:3", "3:15"], ["9:1"]))))
     after = steps.do("cut", with_cuts(steps.now.bench, cuts))
     assert " ".join(stop.option for stop in after.now.bench.stops) == stops
-    assert after.now.told == told
+    assert after.now.lost == lost
     assert after.undo().now.bench.stops == steps.now.bench.stops
 
 
@@ -79,14 +79,14 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
     bench = with_own(with_own(BENCH, 3, "ironing", "true"), 1, "walls", "5")
     steps = History(Step("", replace(bench, stops=parse_stops(["3:15"], []))))
     after = steps.do("cut", with_cuts(steps.now.bench, (LOW,)))
-    assert after.now.told == "cut: taken away with part 3: --pause 3:15, --part 3:ironing=true (Undo brings them back)"
+    assert after.now.lost == "cut: taken away with part 3: --pause 3:15, --part 3:ironing=true (Undo brings them back)"
     assert own(after.undo().now.bench) == {1: {"walls": 5}, 3: {"ironing": True}}
     turned = changed(steps, turn, axis="x", deg=90).now
     assert own(turned.bench) == {1: {"walls": 5}}
-    assert "--part 3:ironing=true" in turned.told
+    assert "--part 3:ironing=true" in turned.lost
     assert bench.model is not None
     assert own(with_model_turned_as_read(bench, bench.model, about(UP, 1.0))) == {1: {"walls": 5}}
-    assert changed(steps, reset_part, part=3).now.told == ""
+    assert changed(steps, reset_part, part=3).now.lost == ""
 
 
 @pytest.mark.parametrize(

@@ -64,55 +64,58 @@ class Anything:
             "profile file": lambda n: {},
             "undo": lambda n: {},
             "redo": lambda n: {},
-            "turn": lambda n: {"axis": self.one("xyzw"), "deg": self.one((90, 17.3, 1e9))},
+            "turn": lambda n: {"axis": self.choice("xyzw"), "deg": self.choice((90, 17.3, 1e9))},
             "stand": lambda n: {"rotation": self.rotation()},
             "lay": lambda n: {"face": 9 * n},
             "take": lambda n: {"parts": n},
-            "lock": lambda n: {"part": n, "locked": self.one((True, False))},
-            "set_part": lambda n: {"part": n, "key": self.one(OF_A_PART), "value": self.one(("4", "rear", None))},
+            "lock": lambda n: {"part": n, "locked": self.choice((True, False))},
+            "set_part": lambda n: {"part": n, "key": self.choice(OF_A_PART), "value": self.choice(("4", "rear", None))},
             "reset_part": lambda n: {"part": n},
-            "add_stop": lambda n: {"kind": self.one(("pause", "filament_change")), "at": self.one((f"{n}:3", f"{n}:8.4mm", "x"))},
+            "add_stop": lambda n: {
+                "kind": self.choice(("pause", "filament_change")),
+                "at": self.choice((f"{n}:3", f"{n}:8.4mm", "x")),
+            },
             "remove_stop": lambda n: {"number": n},
             "copies": lambda n: {"count": n},
             "add": lambda n: {**self.plane(), "after": n},
             "move": lambda n: {**self.plane(), "part": n},
             "remove": lambda n: {"part": n},
             "reorder": lambda n: {"part": n, "to": 2},
-            "mark": lambda n: {"kind": self.one(ZONE_KINDS), **self.one(({}, {"number": n})), **self.zone()},
-            "unmark": lambda n: {"kind": self.one(ZONE_KINDS), "number": n},
-            "set": lambda n: self.setting(self.one(tuple(SETTINGS))),
+            "mark": lambda n: {"kind": self.choice(ZONE_KINDS), **self.choice(({}, {"number": n})), **self.zone()},
+            "unmark": lambda n: {"kind": self.choice(ZONE_KINDS), "number": n},
+            "set": lambda n: self.setting(self.choice(tuple(SETTINGS))),
             "reset": lambda n: {},
-            "profile": lambda n: self.profile(self.one(tuple(NAMES))),
+            "profile": lambda n: self.profile(self.choice(tuple(NAMES))),
         }
 
-    def one(self, values: Any) -> Any:
+    def choice(self, values: Any) -> Any:
         return self.any.choice(values)
 
     def command(self) -> dict[str, Any]:
-        name = self.one(tuple(self._ways))
+        name = self.choice(tuple(self._ways))
         return {"do": name, **self._ways[name](self.any.randint(0, 3))}
 
     def setting(self, key: str) -> dict[str, Any]:
-        return {"key": key, "value": self.one((*SETTINGS[key], None))}
+        return {"key": key, "value": self.choice((*SETTINGS[key], None))}
 
     def profile(self, kind: str) -> dict[str, Any]:
-        return {"kind": kind, "name": self.one(NAMES[kind])}
+        return {"kind": kind, "name": self.choice(NAMES[kind])}
 
-    def place(self, reach_mm: float) -> list[float]:
+    def point(self, reach_mm: float) -> list[float]:
         return [self.any.uniform(-reach_mm, reach_mm) for _ in range(3)]
 
     def plane(self) -> dict[str, Any]:
-        return {"normal": self.place(1.0), "offset_mm": self.any.uniform(-9.0, 40.0)}
+        return {"normal": self.point(1.0), "offset_mm": self.any.uniform(-9.0, 40.0)}
 
     def rotation(self) -> list[list[float]]:
-        rows: list[list[float]] = about(unit(self.place(1.0)), self.one((0.5, 3.0))).tolist()
+        rows: list[list[float]] = about(unit(self.point(1.0)), self.choice((0.5, 3.0))).tolist()
         return rows
 
     def zone(self) -> dict[str, Any]:
-        if self.one((True, False)):
-            return {"point_mm": [*self.place(5.0)[:2], 0.0], "angle_deg": self.any.uniform(0.0, 190.0)}
-        low, size_mm = self.place(self.one((30.0, 9.9e4))), self.one((1e-10, 1.0, 400.0))
-        axes = self.one(({}, {"axes": self.rotation()}))
+        if self.choice((True, False)):
+            return {"point_mm": [*self.point(5.0)[:2], 0.0], "angle_deg": self.any.uniform(0.0, 190.0)}
+        low, size_mm = self.point(self.choice((30.0, 9.9e4))), self.choice((1e-10, 1.0, 400.0))
+        axes = self.choice(({}, {"axes": self.rotation()}))
         return {"min_mm": low, "max_mm": [x + size_mm * self.any.random() for x in low], **axes}
 
 
@@ -131,9 +134,9 @@ class Tried:
             case "try_cuts":
                 return Trial(())
             case "read_model":
-                return read_model(lambda told: None, *given)
+                return read_model(lambda report: None, *given)
             case "mark" | "unmark":
-                return TASKS[task](lambda told: None, *given)
+                return TASKS[task](lambda report: None, *given)
             case "stand":
                 return Standing((40.0, 8.0, 40.0), 0.0, "")
             case "price_row":

@@ -27,7 +27,7 @@ time.sleep(60)
 
 
 @pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder for temporary files, of this process and of those that it starts."""
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -48,8 +48,8 @@ def left_by_a_killed_one(*names: str) -> Path:
     return folder
 
 
-def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_goes_with_the_program(place: Path) -> None:
-    sent = place / "sent"
+def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_goes_with_the_program(temporary: Path) -> None:
+    sent = temporary / "sent"
     sent.mkdir()
     (sent / "large.stl").write_bytes(bytes(2**20 + 1))
     (sent / "broken.stl").write_bytes(stl(tee())[:400])
@@ -58,14 +58,14 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
     with workbench("--upload-mib", "1") as bench, bench.line() as page:
         with suppress(OSError):  # it is not heard to its end
             bench.send(sent / "large.stl")
-        told = page.until(lambda state: state["problem"])["problem"]
-        assert told.startswith("large.stl: has more than 1 MiB, at most so many are taken from a page")
+        problem = page.until(lambda state: state["problem"])["problem"]
+        assert problem.startswith("large.stl: has more than 1 MiB, at most so many are taken from a page")
         assert [bench.send(sent / name)[0] for name in ("broken.stl", "tee.stl", "plan.toml")] == [422, 200, 422]
-        assert [names_in(folder) for folder in place.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
-    assert list(place.glob("tiltprint-edit-*")) == []
+        assert [names_in(folder) for folder in temporary.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
+    assert list(temporary.glob("tiltprint-edit-*")) == []
 
 
-def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(place: Path) -> None:
+def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(temporary: Path) -> None:
     folder = left_by_a_killed_one("tee.stl")
     assert tidy_left() == tidy_left() == (folder,)
     assert names_in(folder) == [FOUND, "tee.stl"]
@@ -75,7 +75,7 @@ def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(p
     assert not folder.exists()
 
 
-def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_that_runs_is_not_touched(place: Path) -> None:
+def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_that_runs_is_not_touched(temporary: Path) -> None:
     received = Received()
     received.new_file("tee.stl").write_text("solid")
     empty = left_by_a_killed_one()
@@ -87,13 +87,13 @@ def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_t
     assert not empty.exists()
     assert names_in(received.path) == ["tee.stl"]
     received.remove()
-    assert list(place.iterdir()) == []
+    assert list(temporary.iterdir()) == []
 
 
-def test_what_was_left_in_several_folders_is_listed_together_the_newest_first(place: Path) -> None:
-    one, other = left_by_a_killed_one("old.stl", "newest.stl"), left_by_a_killed_one("newer.stl")
+def test_what_was_left_in_several_folders_is_listed_together_the_newest_first(temporary: Path) -> None:
+    older, newer = left_by_a_killed_one("old.stl", "newest.stl"), left_by_a_killed_one("newer.stl")
     for age_s, name in enumerate(("newest.stl", "newer.stl", "old.stl")):
-        (path,) = place.glob(f"*/*/{name}")
+        (path,) = temporary.glob(f"*/*/{name}")
         os.utime(path, (1e9 - age_s, 1e9 - age_s))
     assert [path.name for path in files_in(*tidy_left())] == ["newest.stl", "newer.stl", "old.stl"]
-    assert {path.parents[1] for path in files_in(*tidy_left())} == {one, other}
+    assert {path.parents[1] for path in files_in(*tidy_left())} == {older, newer}

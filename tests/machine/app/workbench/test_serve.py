@@ -19,7 +19,7 @@ TEE = stl(tee())
 
 
 @pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder for temporary files, of this process and of those that it starts."""
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -57,9 +57,11 @@ def test_two_servers_never_have_one_port() -> None:
         listen(own.getsockname()[1])
 
 
-def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and_opens_its_files(place: Path, port: str) -> None:
+def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and_opens_its_files(
+    temporary: Path, port: str
+) -> None:
     with workbench("--port", port) as killed, killed.line() as page:
-        assert send(killed, place, "tee.stl", TEE) == 200
+        assert send(killed, temporary, "tee.stl", TEE) == 200
         page.until(lambda state: state["model"])
         kill(killed)
     with workbench("--port", port) as running, running.line() as page:
@@ -72,23 +74,23 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
         model = page.until(lambda state: state["model"])["model"]
         assert (model["name"], model["faces"]) == ("tee.stl", len(tee().faces))
         assert running.ask("left/1", "POST", Origin=own)[0] == 422
-        told = page.until(lambda state: state["problem"])["problem"]
-        assert told == "no such file has been left by a workbench that was killed"
+        problem = page.until(lambda state: state["problem"])["problem"]
+        assert problem == "no such file has been left by a workbench that was killed"
         page.do("set", key="process.scale", value="2")  # for which it is read again
         page.until(lambda state: state["model"]["size_mm"][0] > 79)
         assert json.loads(running.ask("left")[1]) == [left]  # it stays where it was
-        (kept,) = (path for path in place.glob("tiltprint-edit-*/*/tee.stl") if path.stat().st_mtime == left["written_s"])
-        kept.unlink()
+        (file,) = (path for path in temporary.glob("tiltprint-edit-*/*/tee.stl") if path.stat().st_mtime == left["written_s"])
+        file.unlink()
         assert running.ask(f"left/{left['number']}", "POST", Origin=own)[0] == 422
-        told = page.until(lambda state: state["problem"].startswith("tee.stl"))["problem"]
-        assert told == "tee.stl, left by a workbench that was killed, cannot be read: no such file or directory"
+        problem = page.until(lambda state: state["problem"].startswith("tee.stl"))["problem"]
+        assert problem == "tee.stl, left by a workbench that was killed, cannot be read: no such file or directory"
 
 
 def test_a_page_of_a_killed_workbench_says_what_to_do_and_the_next_one_offers_its_files(
-    browser: Browser, place: Path, port: str
+    browser: Browser, temporary: Path, port: str
 ) -> None:
     with workbench("--port", port) as killed:
-        assert send(killed, place, "tee.stl", TEE) == 200
+        assert send(killed, temporary, "tee.stl", TEE) == 200
         browser.open(killed.address)
         browser.wait("document.documentElement.dataset.line === 'open' && $('title').textContent === 'tee.stl'")
         assert browser.value("$('left-field').hidden")
@@ -97,8 +99,8 @@ def test_a_page_of_a_killed_workbench_says_what_to_do_and_the_next_one_offers_it
         assert browser.value("$('notice').textContent").startswith("tiltprint has ended. Start it again and open the address")
     with workbench("--port", port) as running:
         browser.wait("document.documentElement.dataset.line === 'replaced'")
-        told = browser.value("$('notice').checkVisibility() && $('notice').textContent")
-        assert told.endswith("Another one is here now: open the address that its terminal has told.")
+        problem = browser.value("$('notice').checkVisibility() && $('notice').textContent")
+        assert problem.endswith("Another one is here now: open the address that its terminal has told.")
         browser.open(running.address)
         browser.wait("!$('left-field').hidden")
         assert browser.value("$('left-files').querySelector('button span').textContent") == "tee.stl"

@@ -45,11 +45,9 @@ def test_a_file_from_another_origin_is_not_taken(bench: Running) -> None:
     assert bench.ask("file?name=a.stl", "POST", b"solid", Origin="http://evil.example")[0] == 403
 
 
-@pytest.mark.parametrize(("origin", "place"), [("http://evil.example", None), (None, "/nobody/")])
-def test_a_line_from_another_origin_or_without_the_token_is_refused(
-    bench: Running, origin: str | None, place: str | None
-) -> None:
-    with pytest.raises(InvalidStatus) as refused, bench.line(origin, place):
+@pytest.mark.parametrize(("origin", "path"), [("http://evil.example", None), (None, "/nobody/")])
+def test_a_line_from_another_origin_or_without_the_token_is_refused(bench: Running, origin: str | None, path: str | None) -> None:
+    with pytest.raises(InvalidStatus) as refused, bench.line(origin, path):
         pass
     assert refused.value.response.status_code == 403
 
@@ -84,12 +82,12 @@ def test_a_model_becomes_the_plan_and_the_parts_of_the_command_line(bench: Runni
         assert bench.send(model)[0] == 200
         page.until(lambda state: state["model"] and state["model"]["name"] == "tee.stl")
         page.do("search", orient=False)
-        found = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
-        assert found["parts"] == found["recommended"]
+        searched = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
+        assert searched["parts"] == searched["recommended"]
     assert bench.ask("plan.toml")[1] == (folder / "parts" / "plan.toml").read_bytes()
-    made = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
-    assert sorted(made.namelist()) == sorted(path.name for path in (folder / "parts").iterdir() if path.suffix != ".json")
-    assert all(made.read(name) == (folder / "parts" / name).read_bytes() for name in made.namelist())
+    archive = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
+    assert sorted(archive.namelist()) == sorted(path.name for path in (folder / "parts").iterdir() if path.suffix != ".json")
+    assert all(archive.read(name) == (folder / "parts" / name).read_bytes() for name in archive.namelist())
     pictures = ["--png", "parts.png", "--sheet", "order.png", "--front", "front.png"]
     assert main(["decompose", "tee.stl", *QUICK, "--plan", "parts/plan.toml", *pictures]) == 0
     drawn = zipfile.ZipFile(io.BytesIO(bench.ask("pictures.zip")[1]))
@@ -103,7 +101,7 @@ def test_a_model_becomes_the_plan_and_the_parts_of_the_command_line(bench: Runni
         page.until(lambda state: not state["front"])
         page.do("undo")
         page.do("undo")
-        assert page.until(lambda state: state["parts"] == found["parts"])["front"] == found["front"]
+        assert page.until(lambda state: state["parts"] == searched["parts"])["front"] == searched["front"]
 
 
 def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: Running, folder: Path) -> None:
@@ -151,6 +149,23 @@ def test_a_model_that_a_person_has_turned_locked_or_marked_stays_as_it_lies(benc
             page.until(lambda state: state["undo"] != "find parts")
 
 
+def test_the_best_of_a_search_that_is_stopped_is_what_the_command_line_cuts_by_its_plan(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        page.do("demo", name="demo:tree")
+        page.until(lambda state: state["model"] and state["model"]["name"] == "demo:tree")
+        page.do("search")
+        page.until(lambda state: state["search"] and state["search"]["planes"])
+        page.do("stop")
+        taken = page.until(lambda state: state["undo"] == "stop the search")
+        assert [row["time_s"] for row in taken["front"]] == [None]
+        (priced,) = page.until(lambda state: state["front"][0]["time_s"])["front"]
+    (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])
+    assert main(["decompose", "demo:tree", *QUICK, "--plan", "plan.toml", "--json", "cut.json"]) == 0
+    (cut,) = json.loads((folder / "cut.json").read_text())["front"]
+    figures = ("parts", "seam_mm", "support_area_mm2", "time_s", "filament_mm")
+    assert {name: priced[name] for name in figures} == {name: cut[name] for name in figures}
+
+
 def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refused(bench: Running, folder: Path) -> None:
     (folder / "other.stl").write_bytes(stl(tee(8.0)))
     assert main(["decompose", "other.stl", *QUICK, "--as-is", "--plan", "plan.toml"]) == 0
@@ -183,15 +198,15 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
         page.until(lambda state: state["undo"] == "move a plane")
         page.do("lock", part=2, locked=True)
         page.do("search")
-        found = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
-        assert (found["cuts"][-1], found["locked"][-1]) == ({"normal": [1.0, 0.0, 0.0], "offset_mm": 9.5}, True)
-        assert found["parts"] > 2
+        searched = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
+        assert (searched["cuts"][-1], searched["locked"][-1]) == ({"normal": [1.0, 0.0, 0.0], "offset_mm": 9.5}, True)
+        assert searched["parts"] > 2
     (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])
     assert main(["decompose", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "parts"]) == 0
-    made = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
-    names = [name for name in made.namelist() if name.endswith(".stl")]
-    assert len(names) == found["parts"]
-    assert all(made.read(name) == (folder / "parts" / name).read_bytes() for name in names)
+    archive = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
+    names = [name for name in archive.namelist() if name.endswith(".stl")]
+    assert len(names) == searched["parts"]
+    assert all(archive.read(name) == (folder / "parts" / name).read_bytes() for name in names)
 
 
 def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_model_turns(bench: Running, folder: Path) -> None:
@@ -270,8 +285,8 @@ def test_copies_and_pauses_are_those_of_the_command_line_and_so_are_their_senten
         page.do("add", normal=[0, 0, 1], offset_mm=2.0)
         page.until(lambda state: state["parts"] == 2 and not state["problem"])
         page.do("slice")
-        told = "--copies 2: box.stl is cut into 2 parts, copies are printed in one piece each: --parts 1"
-        assert page.until(lambda state: state["problem"])["problem"] == told
+        sentence = "--copies 2: box.stl is cut into 2 parts, copies are printed in one piece each: --parts 1"
+        assert page.until(lambda state: state["problem"])["problem"] == sentence
         bench.send(folder / "box.stl")
         page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
 

@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import with_profile
@@ -15,6 +18,7 @@ from machine.app.workbench.session.finding import Search
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.work.cutting import Searched
 from machine.app.workbench.work.standing import Standing
+from machine.app.workbench.work.tasks import TASKS
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
@@ -24,6 +28,16 @@ from profiles.profile import Profile, load
 from tests.machine.app.workbench.models import model
 
 UP = (0.0, 0.0, 1.0)
+EDIT = st.fixed_dictionaries({
+    "do": st.sampled_from(["add", "move", "remove", "reorder"]), "part": st.integers(1, 5), "to": st.integers(2, 5),
+    "after": st.integers(1, 5), "normal": st.just([*UP]), "offset_mm": st.integers(1, 30),
+})  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.app.workbench.session.readiness.CHANGING_S", 0.0)
+    monkeypatch.setattr("machine.app.workbench.session.trials.REST_S", 0.0)
 
 
 def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
@@ -33,27 +47,78 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
         session = Session(load(), Given(), WorkerPools())
 
         async def nothing(task: str, *given: Any, **more: Any) -> Any:
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(0)
             return {"try_cuts": Trial(()), "stand": Standing((40.0, 8.0, 40.0), 0.0, "")}.get(task)
 
         for tasks in (session.quick, session.long, session.hand):
             tasks.run = nothing  # type: ignore[method-assign]
         session.do("open a", replace(session.bench, model=model("a")))
         await work(session)
-        while session._tasks:
-            await asyncio.gather(*session._tasks, return_exceptions=True)
+        await settled(session)
         return session
 
     return asyncio.run(asyncio.wait_for(run(), 20.0))
 
 
-def test_of_edits_that_follow_each_other_quickly_none_is_lost() -> None:
-    async def work(session: Session) -> None:
-        for offset_mm in (5.0, 10.0):
-            obey(session, {"do": "add", "normal": list(UP), "offset_mm": offset_mm, "after": 1})
-        obey(session, {"do": "move", "part": 3, "normal": list(UP), "offset_mm": 6.0})
+async def settled(session: Session) -> None:
+    """Return when no work is under way any more."""
+    while session._tasks:
+        await asyncio.gather(*session._tasks, return_exceptions=True)
 
-    assert [part.offset_mm for part in when_done(work).bench.cuts or ()] == [10.0, 6.0]
+
+def edited(offsets_mm: list[float], edit: dict[str, Any]) -> None:
+    """A list of planes after an edit, as a person would do it; one of a part that is not there changes nothing."""
+    parts, at = range(2, len(offsets_mm) + 2), edit["part"] - 2
+    if edit["do"] == "add" and edit["after"] <= len(parts) + 1:
+        offsets_mm.insert(edit["after"] - 1, edit["offset_mm"])
+    elif edit["do"] == "move" and edit["part"] in parts:
+        offsets_mm[at] = edit["offset_mm"]
+    elif edit["do"] == "remove" and edit["part"] in parts:
+        del offsets_mm[at]
+    elif edit["do"] == "reorder" and edit["part"] in parts and edit["to"] in parts:
+        offsets_mm.insert(edit["to"] - 2, offsets_mm.pop(at))
+
+
+@settings(max_examples=50)
+@given(st.lists(st.tuples(EDIT, st.integers(0, 3)), max_size=12))
+def test_edits_that_follow_each_other_quickly_leave_what_they_leave_one_by_one(edits: list[tuple[dict[str, Any], int]]) -> None:
+    async def work(session: Session) -> None:
+        for edit, turns in edits:
+            obey(session, edit)
+            for _ in range(turns):  # so far the work for the edits before has come meanwhile
+                await asyncio.sleep(0)
+
+    offsets_mm: list[float] = []
+    for edit, _ in edits:
+        edited(offsets_mm, edit)
+    assert [part.offset_mm for part in when_done(work).bench.cuts or ()] == offsets_mm
+
+
+def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_it_rests() -> None:
+    """The stem of the tee is a square of 10 mm: a rim of 40 mm wherever it is cut."""
+    tried: list[tuple[tuple[float, ...], int, float | None]] = []
+
+    async def work(session: Session) -> None:
+        async def really(task: str, *asked: Any, **more: Any) -> Any:
+            return TASKS[task](lambda told: None, *asked)
+
+        def listen() -> None:
+            if session.trials.trial is not None:
+                _, cuts, trial = session.trials.trial
+                seen = tuple(part.offset_mm or 0.0 for part in cuts), trial.unchecked, trial.seam_mm
+                tried.extend([seen] if tried[-1:] != [seen] else [])
+
+        session.hand.run = really  # type: ignore[method-assign]
+        for after, offset_mm in ((1, 12.0), (2, 24.0)):
+            obey(session, {"do": "add", "normal": list(UP), "offset_mm": offset_mm, "after": after})
+        await settled(session)
+        session.listeners.append(listen)
+        for step in range(20):
+            obey(session, {"do": "try", "part": 3, "normal": list(UP), "offset_mm": 23.0 - 0.1 * step})
+
+    when_done(work)
+    held, newest = (12.0, 24.0), (12.0, 23.0 - 0.1 * 19)
+    assert tried == [(held, 0, 80.0), (newest, 1, 80.0), (newest, 0, 80.0)]
 
 
 def test_an_edit_whose_bench_is_another_one_meanwhile_is_not_done_and_says_so() -> None:
@@ -110,7 +175,7 @@ def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_tol
 def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> None:
     async def work(session: Session) -> None:
         obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
-        await asyncio.sleep(0.05)
+        await settled(session)
         for at in ("1:3", "2:8.4mm"):
             obey(session, {"do": "add_stop", "kind": "pause", "at": at})
         obey(session, {"do": "slice"})

@@ -33,7 +33,7 @@ def sessions() -> Iterator[SessionsThread]:
 
 def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsThread, monkeypatch: pytest.MonkeyPatch) -> None:
     given, hangs = Event(), Event()
-    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda one: given.set())
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda job: given.set())
     workbench, prints = Workbench(lambda pools: Session(PROFILE, Given(), pools)), Prints()
     order = PrintOrder("a", Path("a.gcode"), PROFILE, PrintRequest("sim"))
     prints.prints.append(RunningPrint(1, order, "", prints.notify))
@@ -47,12 +47,12 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
 
     async def run() -> bool:
         said: asyncio.Queue[Any] = asyncio.Queue()
-        told: asyncio.Queue[Any] = asyncio.Queue()
+        messages: asyncio.Queue[Any] = asyncio.Queue()
         await sessions.run(begin())
         app = application(workbench, sessions, prints, TOKEN, PORT, Uploads(1))
-        line = asyncio.create_task(app(scope(f"/{TOKEN}/1/prints"), said.get, told.put))  # type: ignore[arg-type]
+        line = asyncio.create_task(app(scope(f"/{TOKEN}/1/prints"), said.get, messages.put))  # type: ignore[arg-type]
         said.put_nowait({"type": "websocket.connect"})
-        while (await told.get())["type"] != "websocket.send":
+        while (await messages.get())["type"] != "websocket.send":
             pass
         hanging = asyncio.create_task(sessions.run(hang()))
         while not hangs.is_set():

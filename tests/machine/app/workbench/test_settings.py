@@ -20,12 +20,12 @@ from profiles.profile import SECTIONS, load
 from profiles.wording import keys
 
 
-def told(key: str, given: Given = USUAL) -> dict[str, Any]:
+def described(key: str, given: Given = USUAL) -> dict[str, Any]:
     return next(row for row in settings_list(profile_as_given(given, load()), given) if row["key"] == key)
 
 
 def test_a_number_has_its_meaning_and_its_range() -> None:
-    height = told("process.layer_height_mm")
+    height = described("process.layer_height_mm")
     assert (height["kind"], height["least"], height["most"], height["value"], height["changed"]) == (
         "number",
         0.02,
@@ -37,9 +37,9 @@ def test_a_number_has_its_meaning_and_its_range() -> None:
 
 
 def test_choices_and_yes_or_no_are_told_as_such() -> None:
-    assert told("process.seam")["choices"] == ["aligned", "corner", "rear", "nearest", "random"]
-    assert told("process.ironing")["kind"] == "boolean"
-    assert told("search.time_limit_s")["value"] is None
+    assert described("process.seam")["choices"] == ["aligned", "corner", "rear", "nearest", "random"]
+    assert described("process.ironing")["kind"] == "boolean"
+    assert described("search.time_limit_s")["value"] is None
 
 
 def test_every_key_can_be_typed_and_what_is_told_of_it_is_taken_back_as_the_same() -> None:
@@ -55,8 +55,8 @@ def test_every_key_can_be_typed_and_what_is_told_of_it_is_taken_back_as_the_same
 
 
 def test_a_block_names_its_placeholders_and_one_that_cannot_be_filled_in_is_refused() -> None:
-    assert "clear_z_mm" in told("machine.gcode.resume")["placeholders"]
-    assert "nozzle_c" in told("machine.gcode.start")["placeholders"]
+    assert "clear_z_mm" in described("machine.gcode.resume")["placeholders"]
+    assert "nozzle_c" in described("machine.gcode.start")["placeholders"]
     given = with_setting(USUAL, "machine.gcode.resume", json.dumps("G28\nG0 Z{nozzle_c}"))
     with pytest.raises(
         ProfileError, match=r"machine\.gcode\.resume: placeholder \{nozzle_c\} is not known: allowed are clear_z_mm"
@@ -78,7 +78,7 @@ def test_a_list_is_refused_in_the_profile_s_own_sentence(typed: str, sentence: s
 
 def test_nothing_leaves_out_what_may_be_left_out_and_is_no_change_where_the_profile_has_nothing() -> None:
     wound = with_setting(USUAL, "machine.turn.budget_deg", "720")
-    assert (told("machine.turn.budget_deg")["optional"], told("machine.clearance_mm")["optional"]) == (True, False)
+    assert (described("machine.turn.budget_deg")["optional"], described("machine.clearance_mm")["optional"]) == (True, False)
     assert profile_as_given(with_setting(wound, "machine.turn.budget_deg", ""), load()).machine.turn.budget_deg is None
     assert with_typed(wound, "machine.turn.budget_deg", "", load()) == USUAL
     with pytest.raises(ProfileError, match=r'machine\.clearance_mm is "": it must be a number from 0 to 100'):
@@ -88,7 +88,7 @@ def test_nothing_leaves_out_what_may_be_left_out_and_is_no_change_where_the_prof
 def test_what_is_set_is_marked_and_goes_back() -> None:
     changed = with_setting(with_setting(USUAL, "process.walls", "3"), "process.walls", "4")
     assert changed.settings == ("process.walls=4",)
-    assert (told("process.walls", changed)["value"], told("process.walls", changed)["changed"]) == (4, True)
+    assert (described("process.walls", changed)["value"], described("process.walls", changed)["changed"]) == (4, True)
     assert with_setting(changed, "process.walls", None) == USUAL
 
 

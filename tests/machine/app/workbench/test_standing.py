@@ -20,7 +20,7 @@ from tests.shapes import tee
 def standing(mesh: Mesh, turns_deg: tuple[float, float, float] = (0.0, 0.0, 0.0), **settings: Any) -> Standing:
     profile = load(settings=[f"{key.replace('__', '.')}={value}" for key, value in settings.items()])
     bench = replace(with_model(Bench(profile), model(mesh=mesh)), rotation=turned_by(turns_deg).tolist())
-    return stand(lambda told: None, bench)
+    return stand(lambda report: None, bench)
 
 
 # A tee is 10 mm thick: its bar of 40 mm hangs over its stem by 15 mm at each side, and seen along its thickness it has 700 mm2.
@@ -35,10 +35,10 @@ def standing(mesh: Mesh, turns_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 def test_what_overhangs_is_what_is_seen_from_below_and_does_not_stand_on_the_platform(
     turns_deg: tuple[float, float, float], overhang_mm2: float, size_mm: tuple[float, float, float] | None
 ) -> None:
-    found = standing(tee(), turns_deg)
-    assert found.overhang_mm2 == pytest.approx(overhang_mm2)
-    assert found.size_mm == pytest.approx(size_mm or found.size_mm)
-    assert (found.problem, found.pedestal, found.refusal) == ("", b"", "")
+    stood = standing(tee(), turns_deg)
+    assert stood.overhang_mm2 == pytest.approx(overhang_mm2)
+    assert stood.size_mm == pytest.approx(size_mm or stood.size_mm)
+    assert (stood.problem, stood.pedestal, stood.refusal) == ("", b"", "")
 
 
 def test_what_is_larger_than_the_machine_reaches_is_told_in_the_sentence_of_export() -> None:
@@ -46,12 +46,12 @@ def test_what_is_larger_than_the_machine_reaches_is_told_in_the_sentence_of_expo
 
 
 def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_its_height() -> None:
-    found = standing(tee(), search__pedestal_mm=10)
-    points, faces = np.frombuffer(found.pedestal, "<u4", 2)
-    places = np.frombuffer(found.pedestal, "<f8", 3 * points, 8).reshape(-1, 3)
-    assert len(found.pedestal) == 8 + 24 * points + 12 * faces
+    stood = standing(tee(), search__pedestal_mm=10)
+    points, faces = np.frombuffer(stood.pedestal, "<u4", 2)
+    places = np.frombuffer(stood.pedestal, "<f8", 3 * points, 8).reshape(-1, 3)
+    assert len(stood.pedestal) == 8 + 24 * points + 12 * faces
     assert np.ptp(places, axis=0) == pytest.approx((14.0, 14.0, 10.3), abs=0.01)  # its feet and 2 mm, and what is sunk in
-    assert (found.overhang_mm2, found.size_mm[2]) == (pytest.approx(300.0), pytest.approx(40.0))
+    assert (stood.overhang_mm2, stood.size_mm[2]) == (pytest.approx(300.0), pytest.approx(40.0))
 
 
 def test_what_cannot_be_put_on_a_pedestal_stands_without_one_and_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,5 +59,5 @@ def test_what_cannot_be_put_on_a_pedestal_stands_without_one_and_that_is_told(mo
         raise MeshError("no feet")
 
     monkeypatch.setattr(work, "pedestal_under", refuse)
-    found = standing(tee(), search__pedestal_mm=10)
-    assert (found.pedestal, found.refusal, found.overhang_mm2) == (b"", "no feet", pytest.approx(300.0))
+    stood = standing(tee(), search__pedestal_mm=10)
+    assert (stood.pedestal, stood.refusal, stood.overhang_mm2) == (b"", "no feet", pytest.approx(300.0))

@@ -74,18 +74,18 @@ def test_many_benches_share_a_bounded_number_of_processes(monkeypatch: pytest.Mo
 def test_one_bench_with_much_to_do_does_not_keep_another_one_waiting_for_all_of_it() -> None:
     pool, done = WorkerPool(1), list[str]()
 
-    async def told(name: str, tasks: TaskQueue) -> None:
+    async def note(name: str, tasks: TaskQueue) -> None:
         await rank(tasks)
         done.append(name)
 
     async def work() -> None:
-        busy, other = TaskQueue(pool), TaskQueue(pool)
-        waiting = [asyncio.create_task(told(f"busy {k}", busy)) for k in range(3)]
+        busy, idle = TaskQueue(pool), TaskQueue(pool)
+        waiting = [asyncio.create_task(note(f"busy {k}", busy)) for k in range(3)]
         await asyncio.sleep(0)
-        await asyncio.gather(*waiting, asyncio.create_task(told("other", other)))
+        await asyncio.gather(*waiting, asyncio.create_task(note("idle", idle)))
 
     run(work(), pool)
-    assert done == ["busy 0", "other", "busy 1", "busy 2"]
+    assert done == ["busy 0", "idle", "busy 1", "busy 2"]
 
 
 def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_ends_none(
@@ -96,7 +96,7 @@ def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_
 
     async def work() -> float:
         begun = asyncio.Event()
-        search = TaskQueue(pool).run("find_parts", tree, SearchWay(), tell=lambda told: begun.set())
+        search = TaskQueue(pool).run("find_parts", tree, SearchWay(), tell=lambda report: begun.set())
         searching = asyncio.create_task(search)
         await begun.wait()
         ranking = asyncio.create_task(rank(TaskQueue(pool)))
@@ -157,20 +157,20 @@ def test_a_search_that_waits_for_the_processes_of_other_benches_says_so() -> Non
     async def work() -> tuple[str, str]:
         session = Session(PROFILE, Given(), pools)
         session.history = History(Step("", with_model(Bench(PROFILE), model())))
-        told = []
+        texts = []
         for others in (0, 1):
             async with AsyncExitStack() as stack:
                 if others:
                     await stack.enter_async_context(pools.long.worker(TaskQueue(pools.long)))
                 session.finding.begin()
                 assert session.finding.search is not None
-                told.append(session.finding.search.searched.text)
+                texts.append(session.finding.search.searched.text)
                 await asyncio.sleep(0)
                 session.finding.stop()
         await asyncio.sleep(0)
         session.close()
         await asyncio.gather(*session._tasks, return_exceptions=True)
-        return told[0], told[1]
+        return texts[0], texts[1]
 
     assert run(work(), pools.long) == ("beginning", "waiting until the work of other benches is done")
 
@@ -190,9 +190,9 @@ def test_planes_are_tried_on_their_own_bench_whoever_had_the_process_in_between(
             session.close()
         return tried
 
-    first, other, again = run(work(), pools.hand)
+    first, of_box, again = run(work(), pools.hand)
     assert first == again == Trials(tee(), PROFILE).attempt([_plane(LEVEL)], 0)
-    assert other.seam_mm == pytest.approx(80.0, rel=0.01)  # around the box
+    assert of_box.seam_mm == pytest.approx(80.0, rel=0.01)  # around the box
 
 
 def _plane(part: PlannedPart) -> Plane:

@@ -105,7 +105,7 @@ def back_of(watcher: Watcher) -> list[str]:
     """The commands that heat again and all behind them up to the next command of the program."""
     lines = watcher.lines()
     begin = len(lines) - lines[::-1].index("M109 S200") - 1
-    return lines[begin : next(place for place in range(begin, len(lines)) if lines[place] in BODY)]
+    return lines[begin : next(index for index in range(begin, len(lines)) if lines[index] in BODY)]
 
 
 def test_a_cooled_nozzle_is_filled_where_the_tip_waits_before_it_goes_back() -> None:

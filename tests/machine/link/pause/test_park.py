@@ -35,10 +35,10 @@ def test_the_way_to_the_parking_place_is_clear_of_table_cradle_and_print(pose: P
     printed, park = bounds.corners(), find_park_position(MACHINE, bounds.corners(), at, pose)
     assert park is not None
     tried = np.vstack([directions(rotation(MACHINE, pose) @ UP), UP])
-    for place in np.linspace(park.lift_mm, park.stand_mm, 40):
+    for point in np.linspace(park.lift_mm, park.stand_mm, 40):
         for name, reach in solids(MACHINE, pose, printed):
             for body in bodies(MACHINE):
-                assert float((tried @ place + body.least(tried) - reach(tried)).max()) >= body.need_mm - 1e-6, name
+                assert float((tried @ point + body.least(tried) - reach(tried)).max()) >= body.need_mm - 1e-6, name
 
 
 @pytest.mark.parametrize("pose", POSES)
@@ -82,15 +82,15 @@ def test_filament_that_the_program_has_pulled_back_already_is_not_pulled_again()
 
 def test_a_lift_under_a_firmware_that_follows_the_table_goes_along_the_nozzle() -> None:
     words = lift_words(MACHINE, Pose(90.0, 0.0), 10.0, True)
-    told = {word[0]: float(word[1:]) for word in words.split()}
-    step = np.array([told.get(letter, 0.0) for letter in "XYZ"])
+    values = {word[0]: float(word[1:]) for word in words.split()}
+    step = np.array([values.get(letter, 0.0) for letter in "XYZ"])
     assert rotation(MACHINE, Pose(90.0, 0.0)) @ step == pytest.approx([0.0, 0.0, 10.0], abs=1e-3)
 
 
 def test_the_place_of_a_program_without_rotary_words_is_that_of_a_level_table() -> None:
-    found = axis_position(MACHINE, (1.0, 2.0, 3.0, None, None, None), False)
-    assert found is not None
-    assert (found[0].tolist(), found[1]) == ([1.0, 2.0, 3.0], Pose(0.0, 0.0))
+    standing = axis_position(MACHINE, (1.0, 2.0, 3.0, None, None, None), False)
+    assert standing is not None
+    assert (standing[0].tolist(), standing[1]) == ([1.0, 2.0, 3.0], Pose(0.0, 0.0))
     assert axis_position(MACHINE, (1.0, 2.0, None, 0.0, 0.0, 0.0), False) is None
 
 

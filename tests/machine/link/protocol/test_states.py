@@ -1,16 +1,96 @@
-"""The table of states: it ends where it must."""
+"""The table of states, by conversations: each state is talked into, then something happens that must end or turn it."""
 
 import re
+from collections.abc import Callable
+from itertools import product
 
-from machine.link.protocol.states import TABLE, Signal, State
+import pytest
+
+from machine.link.protocol.states import TABLE, State
+from tests.machine.link.protocol.test_connection import Table, numbered_to, opened
 from tools.draw_states import PAGE, page
 
+KILLED = b"Error:Printer halted. kill() called!\n"
+REFUSED = b"Error:checksum mismatch, Last Line: 10\nResend: 11\nok\n"
 
-def test_the_table_leads_from_everywhere_to_an_end_and_nowhere_from_there() -> None:
-    assert set(TABLE) == set(State)
-    assert TABLE[State.HALTED] == TABLE[State.LOST] == {}
-    for state in set(State) - {State.DRAIN, State.HALTED, State.LOST}:
-        assert TABLE[state][Signal.FAULT] is State.HALTED
+
+def synced() -> Table:
+    table = Table()
+    table.wait(0.6)
+    return table
+
+
+def greeting() -> Table:
+    table = synced()
+    table.say(b"ok\n")
+    return table
+
+
+def printing(*happens: bytes | float) -> Table:
+    """Three lines are on their way; then the printer says something, or so many seconds pass."""
+    table = opened()
+    table.send("G1 X1", "G1 X2", "G1 X3")
+    for said in happens:
+        table.say(said) if isinstance(said, bytes) else table.wait(said)
+    return table
+
+
+def renumbering() -> Table:
+    table = numbered_to(3)
+    table.send("G1 X1")
+    table.say(b"ok N3 P15 B3\n")
+    table.wait(0.01)
+    return table
+
+
+# How a conversation gets into a state, and where it is after: the firmware's last words, its banner, a port that was away.
+TALKS: dict[State, tuple[Callable[[], Table], State, State, State]] = {
+    State.DRAIN: (Table, State.DRAIN, State.DRAIN, State.DRAIN),  # all of that may be older than the conversation
+    State.SYNC: (synced, State.HALTED, State.DRAIN, State.SYNC),
+    State.HELLO: (greeting, State.HALTED, State.DRAIN, State.HELLO),
+    State.OPEN: (printing, State.HALTED, State.LOST, State.PROBING),
+    State.PROBING: (lambda: printing(4.1), State.HALTED, State.LOST, State.PROBING),
+    State.QUIET: (lambda: printing(REFUSED), State.HALTED, State.LOST, State.PROBING),
+    State.REPEAT: (lambda: printing(REFUSED, 0.13), State.HALTED, State.LOST, State.PROBING),
+    State.RENUMBER: (renumbering, State.HALTED, State.LOST, State.RENUMBER),
+}
+NAMED = pytest.mark.parametrize("state", TALKS, ids=lambda state: state.name)
+
+
+@NAMED
+def test_last_words_a_restart_and_a_lost_port_lead_from_every_state_where_they_must(state: State) -> None:
+    begin, *ends = TALKS[state]
+    happens = [
+        lambda table: table.say(KILLED),
+        lambda table: table.say(b"start\n"),
+        lambda table: table.connection.reconnect(0.0),
+    ]
+    for event, end in zip(happens, ends, strict=True):
+        table = begin()
+        assert table.connection.state is state
+        event(table)
+        assert table.connection.state is end
+
+
+@pytest.mark.parametrize(("state", "last"), [*product(list(TALKS)[1:], [KILLED]), *product(list(TALKS)[3:], [b"start\n"])])
+def test_what_has_ended_stays_so_whatever_is_said_and_nothing_is_sent_any_more(state: State, last: bytes) -> None:
+    table = TALKS[state][0]()
+    table.say(last)
+    ended = table.connection.state
+    assert ended in (State.HALTED, State.LOST)
+    for said in (b"ok N11 P15 B3\n", b"Resend: 11\nok\n", b"start\n", KILLED, b"ok T:20.00 /0.00\n"):
+        table.say(said)
+        table.wait(100.0)
+        assert (table.connection.state, table.wire(), table.connection.can_send("G1 X4")) == (ended, b"", False)
+
+
+@NAMED
+def test_a_printer_that_never_answers_any_more_is_given_up_from_every_state(state: State) -> None:
+    table = TALKS[state][0]()
+    for _ in range(3000):
+        table.wait(0.5)
+    assert table.connection.state is State.LOST
+    assert table.connection.fault is not None
 
 
 def test_the_diagram_of_the_docs_is_the_table() -> None:

@@ -17,7 +17,7 @@ def cells(text: str, name: str) -> list[str]:
 
 
 def test_the_right_order_has_full_marks_in_every_table() -> None:
-    whole, full, sizes = tables({"right": lambda one: -one.outcome, "M2": trade_off(0.0)}, LISTS)
+    whole, full, sizes = tables({"right": lambda rated: -rated.outcome, "M2": trade_off(0.0)}, LISTS)
     for text in (whole, full):
         assert cells(text, "right")[:7] == ["1.000"] * 5 + ["1.000 to 1.000"] * 2
         assert cells(text, "right")[7:] == ["100.0%"] * 3
@@ -33,12 +33,12 @@ def test_tables_say_how_many_lists_and_models_they_are_of() -> None:
 
 
 def test_regret_has_a_table_for_each_terms() -> None:
-    lists = [replace(one, record=f"m.0.{terms}") for one, terms in zip(LISTS, ("paper", "ours") * 20, strict=True)]
-    ours, paper = regret_tables({"right": lambda one: -one.outcome, "wrong": lambda one: one.outcome}, lists)
+    lists = [replace(rated, record=f"m.0.{terms}") for rated, terms in zip(LISTS, ("paper", "ours") * 20, strict=True)]
+    ours, paper = regret_tables({"right": lambda rated: -rated.outcome, "wrong": lambda rated: rated.outcome}, lists)
     assert ours.startswith("Regret, terms ours: 20 of 7 models")
     assert paper.startswith("Regret, terms paper: 20 of 7 models")
     assert cells(ours, "right") == ["0.0000"] * 3 + ["0.0000 to 0.0000"] + ["100.0%"] * 4
-    worst = [float(one.regrets.max()) for one in lists if one.terms == "ours"]
+    worst = [float(rated.regrets.max()) for rated in lists if rated.terms == "ours"]
     assert float(cells(ours, "wrong")[0]) == pytest.approx(np.mean(worst), abs=1e-4)
     assert cells(ours, "wrong")[-1] == "0.0%"
 
@@ -56,18 +56,18 @@ def test_only_features_that_a_ranker_looks_at_are_important() -> None:
 
 
 def test_a_shuffled_feature_keeps_its_values_and_no_other_moves() -> None:
-    before = np.vstack([one.features for one in LISTS])
+    before = np.vstack([rated.features for rated in LISTS])
     dealt = shuffled("M3", LISTS, np.random.default_rng(0))
-    after = np.vstack([one.features for one in dealt])
-    assert [len(one.features) for one in dealt] == [len(one.features) for one in LISTS]
+    after = np.vstack([rated.features for rated in dealt])
+    assert [len(rated.features) for rated in dealt] == [len(rated.features) for rated in LISTS]
     assert np.array_equal(np.sort(after[:, 2]), np.sort(before[:, 2]))
     assert (after != before).any(axis=0).tolist() == [False, False, True, False, False, False]
 
 
 def test_correlation_is_pearson_s_and_nothing_with_a_constant() -> None:
     matrix: Floats = correlation(("M1", "M2", "M3"), LISTS)
-    rows = np.vstack([one.features[:, :3] for one in LISTS]).astype(np.float64)
+    rows = np.vstack([rated.features[:, :3] for rated in LISTS]).astype(np.float64)
     assert matrix == pytest.approx(np.corrcoef(rows.T))
-    for one in LISTS:
-        one.features[:, 4] = 0.5
+    for rated in LISTS:
+        rated.features[:, 4] = 0.5
     assert correlation(("M1", "M5"), LISTS)[0].tolist() == pytest.approx([1, 0])

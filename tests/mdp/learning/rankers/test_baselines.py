@@ -25,26 +25,26 @@ TEST = [drawn_list(seed, 20) for seed in range(80, 140)]
 
 def mean_ndcg(name: str) -> float:
     scores = BASELINES[name](TRAINING, VALIDATION, PAPER_COLUMNS)
-    return float(np.mean([at(5)(scores(one), one) for one in TEST]))
+    return float(np.mean([at(5)(scores(rated), rated) for rated in TEST]))
 
 
 def test_random_scores_come_again_for_the_same_list_and_order_nothing() -> None:
     assert np.array_equal(random_order(TEST[0]), random_order(drawn_list(80, 20)))
-    discounts = [1 / log2(place + 1) for place in range(1, 6)]
+    discounts = [1 / log2(rank + 1) for rank in range(1, 6)]
     expected = sum(discounts) * (31 + 15 + 7 + 3 + 1) / 20 / np.dot(discounts, [31, 15, 7, 3, 1])
     assert mean_ndcg("random") == pytest.approx(expected, abs=0.05)
 
 
 def test_a_trade_off_takes_m6_off_m2() -> None:
-    one = drawn_list(1, 4)
-    expected: Floats = one.features[:, 1] - 0.5 * one.features[:, 5].astype(np.float64)
-    assert trade_off(0.5)(one) == pytest.approx(expected)
+    rated = drawn_list(1, 4)
+    expected: Floats = rated.features[:, 1] - 0.5 * rated.features[:, 5].astype(np.float64)
+    assert trade_off(0.5)(rated) == pytest.approx(expected)
 
 
 def test_the_fitted_trade_off_finds_the_weight_that_the_outcomes_were_drawn_with() -> None:
-    one = drawn_list(1, 4)
-    m2, m6 = one.table(("M2", "M6")).T.astype(np.float64)
-    weight = np.median((m2 - fit_trade_off(TRAINING, VALIDATION, PAPER_COLUMNS)(one)) / m6)
+    rated = drawn_list(1, 4)
+    m2, m6 = rated.table(("M2", "M6")).T.astype(np.float64)
+    weight = np.median((m2 - fit_trade_off(TRAINING, VALIDATION, PAPER_COLUMNS)(rated)) / m6)
     assert weight == pytest.approx(0.5, abs=0.1)
 
 
@@ -53,20 +53,20 @@ def test_what_is_saved_alone_orders_worse_than_less_what_is_lost() -> None:
 
 
 def mean_regret(scores: Scores) -> float:
-    return float(np.mean([regret(1)(scores(one), one) for one in TEST]))
+    return float(np.mean([regret(1)(scores(rated), rated) for rated in TEST]))
 
 
 def test_the_line_with_the_least_regret_has_less_than_m2_alone_and_looks_at_the_feature_that_it_is_told() -> None:
     fitted = fit_least_regret("M6")(TRAINING, VALIDATION, PAPER_COLUMNS)
-    other = fit_least_regret("M1")(TRAINING, VALIDATION, PAPER_COLUMNS)
+    by_m1 = fit_least_regret("M1")(TRAINING, VALIDATION, PAPER_COLUMNS)
     assert mean_regret(fitted) < 0.2 * mean_regret(trade_off(0.0))
-    assert mean_regret(fitted) < 0.2 * mean_regret(other)
+    assert mean_regret(fitted) < 0.2 * mean_regret(by_m1)
 
 
 def test_grades_fall_with_regret() -> None:
     outcome = np.array([0.5, 0.502, 0.508, 0.52, 0.58, 0.9])
-    one = RatedList(np.zeros((6, 0), np.float32), (), outcome, ratings(outcome), "a")
-    assert grades(one).tolist() == [5, 4, 3, 2, 1, 0]
+    rated = RatedList(np.zeros((6, 0), np.float32), (), outcome, ratings(outcome), "a")
+    assert grades(rated).tolist() == [5, 4, 3, 2, 1, 0]
 
 
 @pytest.mark.train

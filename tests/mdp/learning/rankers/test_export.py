@@ -23,26 +23,26 @@ def test_the_graph_scores_as_the_network_does(size: int) -> None:
     network = Network(6, seed=3)
     session = onnxruntime.InferenceSession(export(network.weights(), PAPER_COLUMNS, METADATA))
     for seed in range(20):
-        one = drawn_list(seed, size)
-        (given,) = session.run(["scores"], {"features": one.features})
+        rated = drawn_list(seed, size)
+        (given,) = session.run(["scores"], {"features": rated.features})
         assert given.shape == (size,)
-        assert np.abs(given - scores(network, PAPER_COLUMNS)(one)).max() < 1e-5
+        assert np.abs(given - scores(network, PAPER_COLUMNS)(rated)).max() < 1e-5
 
 
 def test_a_feature_that_is_the_same_for_all_candidates_changes_nothing() -> None:
     session = onnxruntime.InferenceSession(export(Network(6).weights(), PAPER_COLUMNS, METADATA))
-    one = drawn_list(1, 10).features
-    one[:, 2] = 0.25
-    other = one.copy()
-    other[:, 2] = 0.75
-    assert session.run(None, {"features": one})[0].tolist() == session.run(None, {"features": other})[0].tolist()
+    quarter = drawn_list(1, 10).features
+    quarter[:, 2] = 0.25
+    three_quarters = quarter.copy()
+    three_quarters[:, 2] = 0.75
+    assert session.run(None, {"features": quarter})[0].tolist() == session.run(None, {"features": three_quarters})[0].tolist()
 
 
 def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     file = tmp_path / "ranker.onnx"
     write(file, export(Network(6).weights(), PAPER_COLUMNS, METADATA))
     model = onnx.load(file)
-    assert {one.key: one.value for one in model.metadata_props} == {"features": "M1,M2,M3,M4,M5,M6", **METADATA}
+    assert {entry.key: entry.value for entry in model.metadata_props} == {"features": "M1,M2,M3,M4,M5,M6", **METADATA}
     assert 43_000 < file.stat().st_size < 46_000
     assert [path.name for path in tmp_path.iterdir()] == ["ranker.onnx"]
 

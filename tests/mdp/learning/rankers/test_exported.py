@@ -17,12 +17,12 @@ pytestmark = pytest.mark.train
 
 
 def test_a_ranker_read_back_scores_as_the_network_did(tmp_path: Path) -> None:
-    network, one = Network(3), drawn_list(2, 9)
+    network, rated = Network(3), drawn_list(2, 9)
     columns = ("M6", "M2", "M1")
     write(tmp_path / "a.onnx", export(network.weights(), columns, {"kind": "urank"}))
     ranker = read_ranker(tmp_path / "a.onnx")
     assert (ranker.columns, ranker.kind) == (columns, "urank")
-    assert np.abs(ranker.scores(one) - scores(network, columns)(one)).max() < 1e-5
+    assert np.abs(ranker.scores(rated) - scores(network, columns)(rated)).max() < 1e-5
 
 
 def test_what_is_no_ranker_is_refused(tmp_path: Path) -> None:
@@ -34,8 +34,8 @@ def test_what_is_no_ranker_is_refused(tmp_path: Path) -> None:
         read_ranker(file)
     graph = Graph()
     content = graph.model(PAPER_COLUMNS, graph.add("ReduceMax", "features", axes=[1], keepdims=0), {})
-    other = onnx.load_model_from_string(content)
-    del other.metadata_props[:]
-    file.write_bytes(other.SerializeToString())
+    bare = onnx.load_model_from_string(content)
+    del bare.metadata_props[:]
+    file.write_bytes(bare.SerializeToString())
     with pytest.raises(LearningError, match="is an ONNX file of something else"):
         read_ranker(file)

@@ -42,7 +42,7 @@ def small(seed: int = 0) -> Network:
 
 
 def batch(*lists: list[float]) -> torch.Tensor:
-    return torch.nn.utils.rnn.pad_sequence([torch.tensor(one) for one in lists], batch_first=True)
+    return torch.nn.utils.rnn.pad_sequence([torch.tensor(values) for values in lists], batch_first=True)
 
 
 def test_the_loss_is_the_expected_regret_in_percent() -> None:
@@ -70,10 +70,10 @@ def test_a_candidate_that_a_step_does_not_see_changes_no_score() -> None:
     network, lists = small(), OBJECTIVE.pad([planted(1, 6)], CHEAP)
     seen = lists.present.clone()
     seen[0, 2] = False
-    other = lists.features.clone()
-    other[0, 2] = 9.0
+    changed = lists.features.clone()
+    changed[0, 2] = 9.0
     with torch.no_grad():
-        first, second = network(lists.features, seen)[seen], network(other, seen)[seen]
+        first, second = network(lists.features, seen)[seen], network(changed, seen)[seen]
     assert first.tolist() == second.tolist()
 
 
@@ -91,12 +91,12 @@ def test_a_planted_rule_is_learnt() -> None:
     train(network, CHEAP, (lists[:120], lists[120:]), replace(SCHEDULES["regret"], epochs=40, rate=1e-2))
     fresh = [planted(seed) for seed in range(1000, 1100)]
     learnt, within = scores([network], CHEAP), best_within(1)
-    assert np.mean([within(learnt(one), one) for one in fresh]) > 0.8
+    assert np.mean([within(learnt(rated), rated) for rated in fresh]) > 0.8
 
 
 def test_the_loss_falls_on_the_small_set() -> None:
     lists = rate(followed(read_lists(SMALL_SET, columns=CHEAP)), CHEAP)
-    assert {one.terms for one in lists} == {"ours", "paper"}
+    assert {rated.terms for rated in lists} == {"ours", "paper"}
     epochs: list[Epoch] = []
     train(Network(CHEAP), CHEAP, (lists, lists), replace(SCHEDULES["regret"], epochs=15, batch=8), on_epoch=epochs.append)
     assert epochs[-1].loss < 0.7 * epochs[0].loss
@@ -108,21 +108,21 @@ def test_the_graph_of_an_ensemble_scores_as_the_mean_of_its_members_in_torch(siz
     members = [small(seed) for seed in range(3)]
     session = onnxruntime.InferenceSession(export(members, CHEAP, {}))
     for seed in range(10):
-        one = planted(seed, size)
-        (given,) = session.run(["scores"], {"features": one.table(CHEAP)})
-        each = [scores([member], CHEAP)(one) for member in members]
+        rated = planted(seed, size)
+        (given,) = session.run(["scores"], {"features": rated.table(CHEAP)})
+        by_member = [scores([member], CHEAP)(rated) for member in members]
         assert given.shape == (size,)
-        assert np.abs(given - np.mean(each, axis=0)).max() < 1e-5
-        assert np.abs(each[0] - each[1]).max() > 1e-2
+        assert np.abs(given - np.mean(by_member, axis=0)).max() < 1e-5
+        assert np.abs(by_member[0] - by_member[1]).max() > 1e-2
 
 
 def test_a_search_takes_the_file_and_scores_by_it(tmp_path: Path) -> None:
-    members, one = [small(seed) for seed in range(2)], planted(3)
+    members, rated = [small(seed) for seed in range(2)], planted(3)
     write(tmp_path / "a.onnx", export(members, CHEAP, {"kind": "regret"}))
     ranker = ranker_named(str(tmp_path / "a.onnx"))
     assert isinstance(ranker, SearchNetwork)
     assert ranker.columns == CHEAP
-    assert ranker.scores(one.table(CHEAP)) == pytest.approx(scores(members, CHEAP)(one), abs=6e-5)
+    assert ranker.scores(rated.table(CHEAP)) == pytest.approx(scores(members, CHEAP)(rated), abs=6e-5)
 
 
 def test_the_file_of_the_largest_ensemble_is_below_200_kb() -> None:
@@ -138,5 +138,5 @@ def test_a_training_that_goes_on_ends_at_the_same_weights(tmp_path: Path) -> Non
     train(whole, CHEAP, lists, schedule)
     train(Network(CHEAP, (8,)), CHEAP, lists, replace(schedule, epochs=2), tmp_path / "a.pt")
     train(halves, CHEAP, lists, schedule, tmp_path / "a.pt")
-    for one, other in zip(whole.state_dict().values(), halves.state_dict().values(), strict=True):
-        assert torch.equal(one, other)
+    for trained, resumed in zip(whole.state_dict().values(), halves.state_dict().values(), strict=True):
+        assert torch.equal(trained, resumed)

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.train
 
 
 def rows(*lists: list[float]) -> torch.Tensor:
-    return torch.nn.utils.rnn.pad_sequence([torch.tensor(one, dtype=torch.float64) for one in lists], batch_first=True)
+    return torch.nn.utils.rnn.pad_sequence([torch.tensor(values, dtype=torch.float64) for values in lists], batch_first=True)
 
 
 def test_the_loss_of_two_candidates_is_the_better_one_s_log_likelihood_times_its_gain() -> None:

@@ -81,15 +81,15 @@ def test_a_band_is_what_lies_between_two_heights_over_the_plane(
 @pytest.mark.parametrize(("direction", "layer"), [(UP, 49), ((0.4, 0.1, 0.9), 49), ((-0.8, 0.5, 0.3), 30), ((0.0, 1.0, 0.2), 70)])
 def test_what_is_carried_onto_the_plane_comes_back_and_stays_where_the_layer_meets_it(direction: Vector, layer: int) -> None:
     plane = plane_of(part(1, UP, (0.0, 0.0, 0.0)), part(2, direction, (0.0, 0.0, 10.0)))
-    place = Polygons.square((3.0, 2.0), True).rotate(20.0).translate((4.0, -3.0))
-    there_and_back = as_shapely(plane.shadow(plane.project(place, layer), layer))
-    assert there_and_back.symmetric_difference(as_shapely(place)).area < 1e-6
+    area = Polygons.square((3.0, 2.0), True).rotate(20.0).translate((4.0, -3.0))
+    there_and_back = as_shapely(plane.shadow(plane.project(area, layer), layer))
+    assert there_and_back.symmetric_difference(as_shapely(area)).area < 1e-6
     on_plane = plane.points_mm(np.array([[x, y] for x in (-8.0, 0.0, 8.0) for y in (-8.0, 0.0, 8.0)]))
     meeting = on_plane[np.argmin(np.abs(on_plane[:, 2] - plane.z_mm(layer)))]
-    carried = plane.turn @ np.array([*meeting[:2], plane.z_mm(layer)]) + plane.shift
+    projected = plane.turn @ np.array([*meeting[:2], plane.z_mm(layer)]) + plane.shift
     dot = Polygons.square((0.2, 0.2), True).translate((float(meeting[0]), float(meeting[1])))
-    (x0, y0, x1, y1), reach = plane.project(dot, layer).bounds(), 0.2 + abs(float(carried[2]))
-    assert np.hypot(0.5 * (x0 + x1) - carried[0], 0.5 * (y0 + y1) - carried[1]) < reach
+    (x0, y0, x1, y1), reach = plane.project(dot, layer).bounds(), 0.2 + abs(float(projected[2]))
+    assert np.hypot(0.5 * (x0 + x1) - projected[0], 0.5 * (y0 + y1) - projected[1]) < reach
 
 
 @given(directions, st.floats(0.0, 5.0))

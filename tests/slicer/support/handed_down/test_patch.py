@@ -21,8 +21,8 @@ def plane(direction: Vector) -> BasePlane:
 
 
 def test_support_under_a_level_place_begins_from_its_gap_on_as_deep_as_it_has_to() -> None:
-    place = Polygons.square((4.0, 2.0), True)
-    begins = Patch(place, GAP_MM).begins(plane(LEVEL), 100)
+    hanging = Polygons.square((4.0, 2.0), True)
+    begins = Patch(hanging, GAP_MM).begins(plane(LEVEL), 100)
     tips_mm = HEIGHTS.tip_mm[sorted(begins)]
     assert tips_mm.min() == pytest.approx(AT_MM - GAP_MM - DEEP_MM + 0.05)
     assert tips_mm.max() == pytest.approx(AT_MM - GAP_MM - 0.15)
@@ -34,15 +34,15 @@ def test_no_support_begins_in_layers_that_the_earlier_part_has_no_use_for() -> N
 
 
 def test_under_a_tilted_place_every_layer_takes_the_strip_that_lies_below_it() -> None:
-    tilted, place = plane(TILTED), Polygons.square((5.0, 5.0), True)
-    begins = Patch(place, 0.0).begins(tilted, 100)
+    tilted, hanging = plane(TILTED), Polygons.square((5.0, 5.0), True)
+    begins = Patch(hanging, 0.0).begins(tilted, 100)
     covered = as_shapely(Polygons())
     for layer, area in begins.items():
         points = np.array(area.to_polygons()[0])
         depth_mm = points @ tilted.turn[2, :2] + tilted.turn[2, 2] * tilted.z_mm(layer) + tilted.shift[2]
         assert (depth_mm.min() > -DEEP_MM - 1e-6, depth_mm.max() < 1e-6) == (True, True)
         covered = covered.union(as_shapely(tilted.project(area, layer)).buffer(0.3))
-    assert covered.buffer(-0.3).covers(as_shapely(place).buffer(-0.4))
+    assert covered.buffer(-0.3).covers(as_shapely(hanging).buffer(-0.4))
 
 
 @pytest.mark.parametrize("direction", [LEVEL, TILTED])
@@ -53,8 +53,8 @@ def test_support_keeps_off_the_plane_but_under_patches(direction: Vector) -> Non
     for layer in range(100):
         gone = as_shapely(SLAB) - as_shapely(clear[layer])
         near = as_shapely(seen.band(layer, -OFF_MM, seen.far_mm)) & as_shapely(SLAB)
-        kept = as_shapely(Patch(Polygons.square((6.6, 6.6), True), 0.1).under(seen, layer, OFF_MM))
-        assert gone.symmetric_difference(near - kept).area < 1e-5
+        under_patch = as_shapely(Patch(Polygons.square((6.6, 6.6), True), 0.1).under(seen, layer, OFF_MM))
+        assert gone.symmetric_difference(near - under_patch).area < 1e-5
 
 
 def test_support_that_reaches_no_plane_stays_as_it_is() -> None:

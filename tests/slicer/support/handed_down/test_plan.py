@@ -99,7 +99,7 @@ def test_every_support_on_a_base_plane_has_plastic_of_an_earlier_part_or_its_sup
         held = np.zeros(len(points), dtype=bool)
         for below in every[:k]:
             turn, shift = frame_change(below.sections.part, supports.sections.part)
-            held |= [stands_on(place, below) for place in (np.insert(points, 2, 0.0, axis=1) - shift) @ turn]
+            held |= [stands_on(point, below) for point in (np.insert(points, 2, 0.0, axis=1) - shift) @ turn]
         assert held.mean() > 0.97
 
 
@@ -135,10 +135,10 @@ def test_a_place_that_gets_none_is_told_with_the_part_that_is_in_the_way() -> No
     guest = from_manifold(m3.Manifold.cube((4, 4, 4)).translate((30, 0, 30)))
     base = Plane(unit((0.5, 0.0, 0.86)), float(unit((0.5, 0.0, 0.86)) @ (14.0, 0.0, 24.0)))
     first, _ = slice_parts([part, Part(2, guest, base, part.pose, part.rotation, 64.0, 0.0)], profile())
-    place = first.unsupported[0]
-    assert place.mm2 > 10.0
-    assert first.layers[place.layer - 1].z_mm == pytest.approx(30.2)
-    assert place.reason == "support would stand where the head prints part 2"
+    unsupported = first.unsupported[0]
+    assert unsupported.mm2 > 10.0
+    assert first.layers[unsupported.layer - 1].z_mm == pytest.approx(30.2)
+    assert unsupported.reason == "support would stand where the head prints part 2"
 
 
 def corners(supports: Supports) -> list[Floats]:

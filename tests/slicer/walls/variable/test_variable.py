@@ -47,7 +47,7 @@ def across(walls: Sequence[Wall], x: float) -> int:
     """How many beads lie side by side at x."""
     line = shapely.LineString([(x, -50), (x, 50)])
     met = [line.intersection(shapely.LineString(wall.course.points)) for wall in walls]
-    return sum(int(shapely.get_num_geometries(each)) for each in met if not each.is_empty)
+    return sum(int(shapely.get_num_geometries(met_wall)) for met_wall in met if not met_wall.is_empty)
 
 
 def farthest_out_mm(walls: Sequence[Wall], section: Polygons) -> float:

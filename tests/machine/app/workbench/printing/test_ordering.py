@@ -65,12 +65,12 @@ def refusal(given: Any, port: str, **further: Any) -> UserError:
 
 
 def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_in_the_sentence_of_print() -> None:
-    told = str(refusal(session(BAD), "/dev/no-such-port"))
+    sentence = str(refusal(session(BAD), "/dev/no-such-port"))
     silent: Any = Silent()
     by_print = carry_out(PrintOrder("box.stl", file(BAD), PROFILE, PrintRequest("sim")), AtPage(silent), Checks(silent))
-    assert (told, by_print["end"]) == (by_print["sentence"], "refused")
-    assert told.startswith("the dry run found ")
-    assert "X goes to 500 mm" in told
+    assert (sentence, by_print["end"]) == (by_print["sentence"], "refused")
+    assert sentence.startswith("the dry run found ")
+    assert "X goes to 500 mm" in sentence
     assert order_of(session(BAD), PrintRequest("/dev/no-such-port"), True).force
 
 
@@ -116,9 +116,9 @@ def test_what_is_known_of_the_very_lines_for_the_very_profile_is_not_looked_for_
     (GOOD, load(settings=["machine.nozzle_limit_c=290"])),
 ])  # fmt: skip
 def test_what_differs_by_a_byte_or_a_setting_is_dry_run_anew(lines: list[str], profile: Profile) -> None:
-    found = program(lines, profile, known_findings(GOOD, PROFILE, [OTHER]))
-    assert found == dry_run(lines, profile).findings
-    assert OTHER not in found
+    findings = program(lines, profile, known_findings(GOOD, PROFILE, [OTHER]))
+    assert findings == dry_run(lines, profile).findings
+    assert OTHER not in findings
 
 
 def test_a_line_that_would_be_two_when_the_text_is_read_again_is_dry_run_anew() -> None:

@@ -68,74 +68,74 @@ def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable
             return prints.prints[0]
 
         prints.begin("me", order(port))
-        begun = await reach(lambda one: one.state["phase"] == "ready")
+        begun = await reach(lambda current: current.state["phase"] == "ready")
         begun.begin()
-        await reach(lambda one: one.state["progress"] and runs(one))
+        await reach(lambda current: current.state["progress"] and runs(current))
         end(prints, begun)
-        state = (await reach(lambda one: one.over)).state
+        state = (await reach(lambda current: current.over)).state
         await asyncio.gather(*prints._tasks)
         return state
 
     return asyncio.run(asyncio.wait_for(run(), 60.0))
 
 
-def heats(one: RunningPrint) -> bool:
-    return bool(one.state["progress"]["nozzle_target_c"] == 210.0)
+def heats(current: RunningPrint) -> bool:
+    return bool(current.state["progress"]["nozzle_target_c"] == 210.0)
 
 
-def kill(prints: Prints, one: RunningPrint) -> None:
-    assert one._process is not None
-    os.kill(one._process.pid, signal.SIGKILL)
+def kill(prints: Prints, current: RunningPrint) -> None:
+    assert current._process is not None
+    os.kill(current._process.pid, signal.SIGKILL)
 
 
-def hang_up(prints: Prints, one: RunningPrint) -> None:
-    assert one._process is not None
-    assert one._process.stdin is not None
-    one._process.stdin.close()
+def hang_up(prints: Prints, current: RunningPrint) -> None:
+    assert current._process is not None
+    assert current._process.stdin is not None
+    current._process.stdin.close()
 
 
-def freeze(prints: Prints, one: RunningPrint) -> None:
+def freeze(prints: Prints, current: RunningPrint) -> None:
     """Its process does nothing any more, also not what it is told; then a person presses the emergency stop."""
-    assert one._process is not None
-    os.kill(one._process.pid, signal.SIGSTOP)
+    assert current._process is not None
+    os.kill(current._process.pid, signal.SIGSTOP)
     prints.stop_at_once(None)
 
 
 DIED = "the process that printed has ended before the print was done"
 
 
-@pytest.mark.parametrize(("end", "told"), [
+@pytest.mark.parametrize(("end", "expected"), [
     (kill, f"{DIED}; the printer reports its heaters off"),
     (freeze, f"{DIED}; emergency stop: the printer has halted"),
     (hang_up, "the print was stopped"),
 ])  # fmt: skip
 def test_whoever_dies_the_heaters_go_off(
-    end: Callable[[Prints, RunningPrint], None], told: str, monkeypatch: pytest.MonkeyPatch
+    end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(running_print, "EMERGENCY_S", 0.2)
     with SimulatedPrinter(PROFILE.machine, speed=20.0) as printer:
         state = print_until(printer.path, heats, end)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
-    assert state["sentence"] == told
+    assert state["sentence"] == expected
     assert Path(state["journal"]).is_file()
 
 
 GOES_ON = "is printing hour.gcode and goes on without this program: its own page commands it"
 
 
-@pytest.mark.parametrize(("end", "told"), [
+@pytest.mark.parametrize(("end", "expected"), [
     (kill, f"{DIED}; {{address}} {GOES_ON}"),
     (hang_up, "hour goes on printing on {address}: this page follows it no more"),
 ])  # fmt: skip
 def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
-    end: Callable[[Prints, RunningPrint], None], told: str, monkeypatch: pytest.MonkeyPatch
+    end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
     with stand_in("octoprint") as (job, address):
         job.steps = 10_000
-        ended = print_until(address, lambda one: one.state["progress"]["state"] == "printing", end)
+        ended = print_until(address, lambda current: current.state["progress"]["state"] == "printing", end)
         assert job.state == "printing"
-    assert ended["sentence"] == told.format(address=address)
+    assert ended["sentence"] == expected.format(address=address)
     assert job.files["hour.gcode"].decode() == HOUR
     assert KEY not in f"{ended}{Path(ended['log']).read_text()}"
 
@@ -153,20 +153,20 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
 
     async def run(address: str) -> dict[str, Any]:
         prints = Prints()
-        one = RunningPrint(1, order(address), "me", prints.notify)
-        printing = asyncio.create_task(one.run())
+        current = RunningPrint(1, order(address), "me", prints.notify)
+        printing = asyncio.create_task(current.run())
 
         async def reach(phase: str) -> None:
-            while one.state["phase"] != phase:
+            while current.state["phase"] != phase:
                 await prints.changed(prints.version)
 
         await reach("ready")
-        one.begin()
+        current.begin()
         await reach("uploading")
-        one.stop_at_once()
+        current.stop_at_once()
         await printing
         uploading.set()
-        return one.state
+        return current.state
 
     with stand_in("octoprint", handler=Slow) as (job, address):
         ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
@@ -178,10 +178,10 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
 LEAVES = """
 import pickle, struct, sys
 length = struct.Struct(sys.argv[1])
-told = {"phase": "printing", "server": True, "progress": {"state": "printing"}, "end": "left", "sentence": "it goes on"}
-told["stop_given"] = False
+message = {"phase": "printing", "server": True, "progress": {"state": "printing"}, "end": "left", "sentence": "it goes on"}
+message["stop_given"] = False
 for phase in ("printing", "over"):
-    text = pickle.dumps(told | {"phase": phase})
+    text = pickle.dumps(message | {"phase": phase})
     sys.stdout.buffer.write(length.pack(len(text)) + text)
     sys.stdout.flush()
     for heard in range(2 if sys.argv[2] == phase else 0):
@@ -190,7 +190,7 @@ for phase in ("printing", "over"):
 
 
 @pytest.mark.parametrize("waits_for", ["printing", "over"])
-@pytest.mark.parametrize(("kind", "give", "told", "halted", "state"), [
+@pytest.mark.parametrize(("kind", "give", "expected", "halted", "state"), [
     ("octoprint", RunningPrint.stop_at_once, "emergency stop: {0} has taken it; ", True, "printing"),
     ("duet", RunningPrint.cancel, "the print was stopped", False, "cancelled"),
 ])  # fmt: skip
@@ -198,7 +198,7 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
     waits_for: str,
     kind: str,
     give: Callable[[RunningPrint], None],
-    told: str,
+    expected: str,
     halted: bool,
     state: str,
     monkeypatch: pytest.MonkeyPatch,
@@ -208,16 +208,16 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
 
     async def run(address: str) -> dict[str, Any]:
         prints = Prints()
-        one = RunningPrint(1, order(address), "me", prints.notify)
-        one._begun = True
-        printing = asyncio.create_task(one.run())
-        while one.state["phase"] != waits_for:
+        current = RunningPrint(1, order(address), "me", prints.notify)
+        current._begun = True
+        printing = asyncio.create_task(current.run())
+        while current.state["phase"] != waits_for:
             await prints.changed(prints.version)
-        give(one)
+        give(current)
         await printing
-        while not one.over:
+        while not current.over:
             await prints.changed(prints.version)
-        return one.state
+        return current.state
 
     with stand_in(kind) as (job, address):
         job.files["hour.gcode"] = HOUR.encode()
@@ -225,7 +225,7 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
         job.steps = 10_000
         ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
         assert (job.halted, job.state) == (halted, state)
-    assert ended["sentence"].startswith(told.format(address))
+    assert ended["sentence"].startswith(expected.format(address))
 
 
 class Agreeing:
@@ -275,8 +275,8 @@ def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_a
         job.files["vase.gcode"] = bytes(100)
         job.start("vase.gcode")
         job.steps = 10_000
-        kept = replace(order(address), profile=profile, starts=False)
-        end = carry_out(kept, person, Checks(heard))  # type: ignore[arg-type]
+        upload = replace(order(address), profile=profile, starts=False)
+        end = carry_out(upload, person, Checks(heard))  # type: ignore[arg-type]
         assert (job.state, job.files["hour.gcode"].decode()) == ("printing", HOUR)
         assert not any(asked.endswith("/start") for asked in job.asked)
         log = Path(heard.state["log"]).read_text()
@@ -315,24 +315,24 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
     with stand_in("duet") as (job, address):
         job.steps = 10_000
         wanted = PrintOrder("hour", written(HOUR), load("gen5x"), PrintRequest(address), force=True)
-        one = Attended(wanted)
+        current = Attended(wanted)
         assert job.files["hour.gcode"].decode() == HOUR
-        one.person.hear(Command.FEED, 150.0)
-        one.person.hear(Command.PAUSE)
-        one.until(lambda state: (state["progress"]["state"], state["progress"]["feed_percent"]) == ("paused", 150.0))
+        current.person.hear(Command.FEED, 150.0)
+        current.person.hear(Command.PAUSE)
+        current.until(lambda state: (state["progress"]["state"], state["progress"]["feed_percent"]) == ("paused", 150.0))
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
-        one.person.hear(Command.RESUME)
-        one.until(lambda state: state["progress"]["state"] == "printing")
+        current.person.hear(Command.RESUME)
+        current.until(lambda state: state["progress"]["state"] == "printing")
         for word, sentence, state in ((Command.CANCEL, "the print was stopped", "cancelled"), (LEAVE, left, "printing")):
-            one.person.hear(word)
-            assert one.until(lambda told: told.get("end"))["sentence"] == sentence.format(address)
+            current.person.hear(word)
+            assert current.until(lambda state: state.get("end"))["sentence"] == sentence.format(address)
             assert job.state == state
             job.state = "idle"
-            one = Attended(wanted)
-        one.person.hear(Command.EMERGENCY_STOP)
-        assert one.until(lambda told: told.get("end"))["sentence"].startswith(stopped.format(address))
+            current = Attended(wanted)
+        current.person.hear(Command.EMERGENCY_STOP)
+        assert current.until(lambda state: state.get("end"))["sentence"].startswith(stopped.format(address))
         assert job.halted
-        assert one.person.has_stopped()
+        assert current.person.has_stopped()
 
 
 def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
@@ -409,19 +409,19 @@ def test_an_emergency_stop_goes_before_all_that_was_asked_earlier() -> None:
 
 def test_a_print_that_is_begun_twice_is_begun_once(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[object] = []
-    monkeypatch.setattr(RunningPrint, "say", lambda one, value: said.append(value))
-    one = RunningPrint(1, order("sim"), "me", lambda: None)
+    monkeypatch.setattr(RunningPrint, "say", lambda current, value: said.append(value))
+    current = RunningPrint(1, order("sim"), "me", lambda: None)
     with pytest.raises(PrinterError, match="cannot begin now"):
-        one.begin()
-    one.state["phase"] = "ready"
-    one.begin()
-    one.begin()
+        current.begin()
+    current.state["phase"] = "ready"
+    current.begin()
+    current.begin()
     assert said == [(BEGIN,)]
 
 
 def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.MonkeyPatch) -> None:
     stopped: list[int] = []
-    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda one: stopped.append(one.number))
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
 
     async def run() -> None:
         prints = Prints()
@@ -440,9 +440,9 @@ def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.M
 
 def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newest_five(monkeypatch: pytest.MonkeyPatch) -> None:
     stopped: list[int] = []
-    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda one: stopped.append(one.number))
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
 
-    async def runs(one: RunningPrint) -> None:
+    async def runs(current: RunningPrint) -> None:
         """For good."""
 
     async def run() -> None:
@@ -455,6 +455,6 @@ def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newes
         prints.begin("me", order("/dev/port16"))
         prints.stop_at_once(None)
         assert stopped == [1, 2, 3, 4, 5, 6, 7, 8, 16]
-        assert [each.number for each in prints.prints if each.over] == [11, 12, 13, 14, 15]
+        assert [listed.number for listed in prints.prints if listed.over] == [11, 12, 13, 14, 15]
 
     asyncio.run(run())
