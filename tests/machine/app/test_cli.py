@@ -166,7 +166,8 @@ def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.Monkey
 def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png", "--front", "front.png"]
     Path("tee.stl").write_bytes(stl(shapes.tee()))
-    assert main(["decompose", "tee.stl", "--as-is", *FAST, *wanted]) == 0
+    in_parts = ["--as-is", "--set", "search.stair_weight=0.01"]
+    assert main(["decompose", "tee.stl", *in_parts, *FAST, *wanted]) == 0
     record = json.loads(Path("out.json").read_text())
     assert set(record) == {
         "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
