@@ -94,13 +94,13 @@ class Search(Frozen):
         4.0,
         ge=1,
         le=1000,
-        description="how many times a seam counts across a bore or pin, where a ridge spoils a fit; 1: as elsewhere",
+        description="how many times a seam counts across a bore, where a ridge spoils a fit; 1: as elsewhere",
     )
     feature_mm2: float = Field(
         500.0,
         ge=0,
         le=1e5,
-        description="what it costs beside its seam that a cut passes askew through a bore or pin, which then holds and guides "
+        description="what it costs beside its seam that a cut passes askew through a bore, which then holds and guides "
         "nothing, mm2; one across its axis leaves it round and costs nothing",
     )
     unsupportable_weight: float = Field(

@@ -27,7 +27,7 @@ STEPS_OF_MM = 0.2  # search.stair_weight is that of layers so high
 @dataclass(frozen=True, eq=False)
 class SeamPlaces:
     """Where on a model seams cost how much. by_source: (m,) how much a mm of rim counts on each of the model's faces; zones: of
-    the search; where they want no seam it counts NO_SEAM_WEIGHT times; cylinders: its bores and pins."""
+    the search; where they want no seam it counts NO_SEAM_WEIGHT times; cylinders: its bores."""
 
     surface: ModelSurface
     by_source: Floats
@@ -46,7 +46,7 @@ class SeamPlaces:
         feature_weight: float = 1.0,
     ) -> "SeamPlaces":
         """The places of an uncut model; hidden_share: how much a rim counts where it is hidden altogether, feature_weight: on a
-        bore or pin, hidden or not, 1: they are not looked for."""
+        bore, hidden or not, 1: they are not looked for."""
         whole = surface.piece(solid)
         hidden = hidden_shares(whole.mesh) if hidden_share < 1.0 else np.zeros(len(whole.sources))
         by_source = 1.0 - (1.0 - hidden_share) * surface.by_source(whole, hidden)
@@ -55,7 +55,7 @@ class SeamPlaces:
         return cls(surface, by_source, zones, cylinders)
 
     def cylinders_of(self, piece: Piece) -> tuple[Cylinder, ...]:
-        """The bores and pins of which cuts have left something."""
+        """The bores of which cuts have left something."""
         left = np.unique(piece.sources) if self.cylinders else piece.sources[:0]
         return tuple(cylinder for cylinder in self.cylinders if np.isin(cylinder.faces, left, assume_unique=True).any())
 
@@ -71,7 +71,7 @@ class SeamPlaces:
 class CostTerms:
     """What a search counts, as it holds. seam_mm: width of the scar along a rim, 0: seams cost nothing; feather: by how much
     more a rim counts where face and plane meet at a small angle; cut_mm2: what a cut costs beside its seam; stair_weight: how
-    much an area counts whose steps are as high as a layer; feature_mm2: what it costs to cut a bore or pin askew; need: what
+    much an area counts whose steps are as high as a layer; feature_mm2: what it costs to cut a bore askew; need: what
     needs support, None: every face that overhangs, the paper's terms."""
 
     angle_deg: float

@@ -112,7 +112,7 @@ class Surface:
         return _sum_left(self.faces, planes_of(planes), needs) + cuts_mm2
 
     def _crossed_mm2(self, planes: Sequence[Plane]) -> float:
-        """What it costs that bores and pins are cut askew, each as long as something of it is left."""
+        """What it costs that bores are cut askew, each as long as something of it is left."""
         left, crossed = self.remainder.cylinders if self.terms.feature_mm2 > 0.0 else (), 0.0
         for plane in planes:
             crossed += float(crossings(left, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])

@@ -34,7 +34,7 @@ from mdp.search.front import Worth
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
-from mdp.sweep.cylinders import find_cylinders
+from mdp.sweep.cylinders import bores_of
 from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.sweep import gains
 from mdp.zone import NO_ZONES, Zones
@@ -74,7 +74,7 @@ class Problem:
             solid,
             settings.hidden_seam_share,
             self.zones,
-            cylinders=find_cylinders(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else (),
+            cylinders=bores_of(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else (),
             feature_weight=settings.feature_weight,
         )
         self.root = self.start = Node(solid, (), self.terms, places)

@@ -190,7 +190,7 @@ def _feather_notes(parts: Sequence[Part]) -> tuple[str, ...]:
 
 
 def _feature_notes(node: Node) -> tuple[str, ...]:
-    """The bores and pins that the seams of parts cross."""
+    """The bores that the cuts of parts pass askew."""
     notes, step = [], node
     while step.parent is not None:
         plane, before = step.cuts[-1].base, step.parent.remainder.cylinders

@@ -102,6 +102,12 @@ def crossings(cylinders: Sequence[Cylinder], directions: Floats, offsets_mm: Flo
     return total
 
 
+def bores_of(mesh: Mesh) -> tuple[Cylinder, ...]:
+    """The bores of a closed mesh. Pins are left out: the arms and struts of a model look the same, and those are where it is
+    cut."""
+    return tuple(cylinder for cylinder in find_cylinders(mesh) if cylinder.is_bore)
+
+
 def find_cylinders(mesh: Mesh) -> tuple[Cylinder, ...]:
     """The cylinders of a closed mesh, the first faces first."""
     neighbours = opposites(mesh.faces).reshape(-1, 3) // 3

@@ -125,7 +125,7 @@ class Remainder:
     """What the sweep needs to know of a solid, made once for all directions: its mesh, which faces are risky upright, and how
     much a mm of a seam's rim counts on each face (m,), feather edges more; None: seams do not count. pieces: of which faces of
     the model its own are pieces; None: every risky face needs support. stair_weights: (m,) how much an area on each face counts
-    whose steps are as high as a layer; None: stairs do not count, nor do they where seams do not. cylinders: bores and pins that
+    whose steps are as high as a layer; None: stairs do not count, nor do they where seams do not. cylinders: bores that
     are not to be cut askew."""
 
     mesh: Mesh

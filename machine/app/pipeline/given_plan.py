@@ -35,7 +35,7 @@ def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -
 
 def lies_freely(profile: Profile) -> bool:
     """Whether a profile leaves it open how a model lies; turns and the paper's terms mean it as it is."""
-    return profile.search.effective.objective == "scar" and not any(profile.process.rotate_deg)
+    return profile.search.effective.seam_mm > 0.0 and not any(profile.process.rotate_deg)
 
 
 def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
