@@ -277,7 +277,9 @@ STAYS = [
 ]
 
 
-@pytest.mark.parametrize("arguments", STAYS, ids=["turned by the profile", "the paper's terms", "planes by hand"])
+@pytest.mark.parametrize(
+    "arguments", STAYS, ids=["turned by the profile", "seams that cost nothing", "the paper's terms", "planes by hand"]
+)
 def test_a_model_stays_as_it_is_where_something_says_how_it_lies(folder: Path, arguments: list[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     Path("planes.toml").write_text("version = 1\n")
