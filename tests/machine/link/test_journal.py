@@ -163,7 +163,8 @@ def test_a_journal_that_cannot_be_kept_is_one_sentence(monkeypatch: pytest.Monke
         new_journal(["G28"], load(), "a")
 
 
-def test_only_the_newest_journals_and_their_programs_are_kept() -> None:
+def test_only_the_newest_journals_and_their_programs_are_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # what prints before have left there is not counted
     for number in range(KEPT + 3):
         with new_journal([f"G1 X{number}"], load(), f"model {number}") as journal:
             pass
