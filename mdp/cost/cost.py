@@ -45,8 +45,8 @@ class SeamPlaces:
         cylinders: tuple[Cylinder, ...] = (),
         feature_weight: float = 1.0,
     ) -> "SeamPlaces":
-        """The places of an uncut model; hidden_share: how much a rim counts where it is hidden altogether, feature_weight: on a
-        bore, hidden or not, 1: they are not looked for."""
+        """The places of an uncut model; hidden_share: how much a rim counts where it is hidden altogether, feature_weight: on
+        the cylinders, hidden or not."""
         whole = surface.piece(solid)
         hidden = hidden_shares(whole.mesh) if hidden_share < 1.0 else np.zeros(len(whole.sources))
         by_source = 1.0 - (1.0 - hidden_share) * surface.by_source(whole, hidden)
@@ -91,8 +91,8 @@ class CutCost(NamedTuple):
 
     residual_mm2: float
     lost_mm2: float
-    stairs_mm2: float = 0.0
-    seam_mm2: float = 0.0
+    stairs_mm2: float
+    seam_mm2: float
 
 
 def weight_of_stairs(profile: Profile) -> float:

@@ -23,7 +23,10 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     if cuts.planes is not None and request.orient:
         raise PlanError(f"--orient: the planes of {cuts.planes} belong to the model as it lies; process.rotate_deg turns it")
     file = cuts.plan or cuts.planes
-    return None if file is None else read_plan(file)
+    given = None if file is None else read_plan(file)
+    if given is not None and given.orientation is not None and request.orient is False:
+        raise PlanError(f"--as-is: the plan {file} lays the model down by its orientation; leave one of them out")
+    return given
 
 
 def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:

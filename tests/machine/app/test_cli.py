@@ -269,6 +269,15 @@ def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: 
     assert (out["parts"][0]["direction"], out["residual_area_mm2"]) == ([0.0, 0.0, 1.0], pytest.approx(0.0, abs=1e-6))
 
 
+def test_a_plan_that_lays_the_model_down_does_not_go_with_keeping_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    Path("tee.toml").write_text("version = 1\norientation = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]\n")
+    assert main(["decompose", "tee.stl", "--plan", "tee.toml", "--json", "out.json"]) == 0
+    assert json.loads(Path("out.json").read_text())["rotate_deg"] == [90.0, 0.0, 0.0]
+    assert main(["decompose", "tee.stl", "--plan", "tee.toml", "--as-is"]) == 1
+    assert "--as-is: the plan tee.toml lays the model down by its orientation" in capsys.readouterr().err
+
+
 STAYS = [
     ["--set", "process.rotate_deg=[0, 0, 30]"],
     ["--set", "search.seam_mm=0"],
