@@ -11,6 +11,7 @@ from mdp.mesh import Floats, Mesh
 LEAST_SHARE = 0.02  # of the surface that looks one way: on a ball of 5,000 faces no two have so much together
 MOST_FLATS, MOST_DIRECTIONS = 12, 40  # 12 flats have 66 lines in two of them; few of those lie in more than two
 SAME = cos(radians(0.5))
+COARSE = 0.05  # of the parts of a unit vector, in which areas are added up beforehand: several times what SAME allows
 DIGITS = 4  # of the parts of a unit vector: what differs less looks the same way
 
 
@@ -40,17 +41,28 @@ def _flats(mesh: Mesh) -> tuple[Floats, Floats]:
     changed = np.any(np.diff(normals[order], axis=0) != 0.0, axis=1)
     starts = np.concatenate([[0], np.flatnonzero(changed) + 1])
     areas = np.add.reduceat(mesh.areas_mm2[order], starts)
-    alike = mesh.normals[order[starts]]
+    alike, least_mm2 = mesh.normals[order[starts]], LEAST_SHARE * mesh.areas_mm2.sum()
     flats, shares = np.zeros((0, 3)), np.zeros(0)
-    for row in np.argsort(-np.round(areas, 6), kind="stable"):
+    large = np.flatnonzero(_areas_near(alike, areas) >= least_mm2)
+    for row in large[np.argsort(-np.round(areas[large], 6), kind="stable")]:
         near = np.abs(flats @ alike[row]) >= SAME
         if near.any():
             shares[np.argmax(near)] += areas[row]
         else:
             flats, shares = np.concatenate([flats, alike[row][None]]), np.append(shares, areas[row])
-        if areas[row] < 1e-4 * mesh.areas_mm2.sum():
-            break
     shares /= mesh.areas_mm2.sum()
     largest = np.argsort(-shares, kind="stable")[:MOST_FLATS]
     largest = largest[shares[largest] >= LEAST_SHARE]
     return flats[largest], shares[largest]
+
+
+def _areas_near(normals: Floats, areas: Floats) -> Floats:
+    """(n,) area of all that looks about the same way as each of (n, 3) unit normals, or the opposite way; nothing that looks the
+    same way is left out."""
+    cells = np.rint((normals + 1.0) / COARSE).astype(np.int64) + 1
+    around = np.zeros((round(2.0 / COARSE) + 3,) * 3)
+    np.add.at(around, tuple(cells.T), areas)
+    for axis in range(3):
+        around += np.roll(around, 1, axis) + np.roll(around, -1, axis)
+    around += around[::-1, ::-1, ::-1]
+    return around[tuple(cells.T)]
