@@ -11,6 +11,7 @@ from machine.planning.moves import MachineProgram, Stroke
 from machine.planning.reorient import is_way_clear
 from mdp.decomposition import Part
 from mdp.mesh import Floats
+from mdp.overhang import Mask
 from mdp.pose import level
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -58,14 +59,21 @@ def _low_strokes(parts: Sequence[Part], sliced: Sequence[SlicedPart], machine: M
     beads = [np.zeros((0, 2, 2))]
     for piece in sliced:
         part = next(part for part in parts if part.index == piece.index)
-        shift = part_shift(machine, part.pose, part.base.offset_mm)
-        for layer in piece.layers:
-            for path in layer.paths:
-                points = np.column_stack([path.points, np.full(len(path.points), layer.z_mm)]) + shift
-                placed = workpiece_points(machine, part.pose, points)
-                low = np.minimum(placed[:-1, 2], placed[1:, 2]) < LOW_MM
-                beads.append(np.stack([placed[:-1][low, :2], placed[1:][low, :2]], axis=1))
+        points, ends = _all_points(piece)
+        placed = workpiece_points(machine, part.pose, points + part_shift(machine, part.pose, part.base.offset_mm))
+        low = (np.minimum(placed[:-1, 2], placed[1:, 2]) < LOW_MM) & ~ends[:-1]
+        beads.append(np.stack([placed[:-1][low, :2], placed[1:][low, :2]], axis=1))
     return np.concatenate(beads)
+
+
+def _all_points(piece: SlicedPart) -> tuple[Floats, Mask]:
+    """(n, 3) points of all paths in the part's frame, one path after the other, and (n,) which of them end a path."""
+    paths = [(path.points, layer.z_mm) for layer in piece.layers for path in layer.paths]
+    counts = np.array([len(points) for points, _ in paths], dtype=np.int64)
+    ends = np.zeros(int(counts.sum()), np.bool_)
+    ends[np.cumsum(counts) - 1] = True
+    flat = np.concatenate([np.zeros((0, 2)), *(points for points, _ in paths)])
+    return np.column_stack([flat, np.repeat([z_mm for _, z_mm in paths], counts)]), ends
 
 
 def _lanes(machine: Machine, outward: Floats, count: int, length_mm: float, width_mm: float) -> Floats | None:
