@@ -45,6 +45,13 @@ class Material(Frozen):
         description="tensile strength across layers, MPa; PLA printed well reaches 34, 3D Print. Addit. Manuf. 2020; ordinary "
         "prints and other filaments bond less",
     )
+    joint_strength_mpa: float | None = Field(
+        None,
+        gt=0,
+        le=500,
+        description="tensile strength of a part's weld to plastic that has cooled, MPa, measured by `tiltprint coupon`; absent: "
+        "interlayer_strength_mpa",
+    )
     bridge_longest_mm: float = Field(
         10.0,
         ge=1,
@@ -83,3 +90,8 @@ class Material(Frozen):
         "RepRapFirmware's M572; absent: what the firmware has",
     )
     volumetric_limit_mm3_s: float = Field(gt=0, le=200, description="most plastic the hot end melts, mm3/s")
+
+    @property
+    def weld_mpa(self) -> float:
+        """What a joint between parts bears."""
+        return self.interlayer_strength_mpa if self.joint_strength_mpa is None else self.joint_strength_mpa
