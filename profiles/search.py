@@ -145,7 +145,7 @@ class Search(Frozen):
         1.25,
         ge=1,
         le=100,
-        description="by how many times material.joint_strength_mpa must exceed the stress of a base under that push",
+        description="by how many times material.interlayer_strength_mpa must exceed the stress of a base under that push",
     )
     fragile_mm: float = Field(
         0.3, ge=0, le=100, description="no plane leaves a sliver thinner than this, a layer and a half or so, mm"

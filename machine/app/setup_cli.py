@@ -69,6 +69,7 @@ def coupon(
         typer.Option("--vary", metavar="KEY=VALUE", help="what half of the bars have, not the usual four; repeatable, at most 5"),
     ] = None,
     html: HtmlFile = None,
+    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the bars in print order")] = None,
     save: Annotated[
         str | None, typer.Option("--save", metavar="NAME", help="name of your material and process profiles; else theirs")
     ] = None,
@@ -84,11 +85,12 @@ def coupon(
 
     names = (given.machine, given.material, given.process)
     settings, varied = tuple(given.settings or ()), tuple(vary or ())
-    request = CouponRequest(names, settings, shape, varied, html, report, save, replace, force)
+    request = CouponRequest(names, settings, shape, varied, html, png, report, save, replace, force)
     if report is not None and measured is None:
         raise typer.BadParameter(f"--report {report} goes with --measured FILE, whose loads it tells")
-    if html is not None and out is None:
-        raise typer.BadParameter(f"--html {html} goes with -o OUT.gcode, whose bars it shows")
+    for option, file in (("--html", html), ("--png", png)):
+        if file is not None and out is None:
+            raise typer.BadParameter(f"{option} {file} goes with -o OUT.gcode, whose bars it shows")
     if out is not None and measured is None:
         return write_program(request, out)
     if measured is not None and out is None:

@@ -97,32 +97,27 @@ def lower(shape: Shape, lean_rad: float, height_mm: float) -> m3.CrossSection:
     return hull - m3.CrossSection.circle(0.5 * SCREW_MM, 24).translate((right - 0.5 * FOOT_MM, SCREW_HEIGHT_MM))
 
 
-def thick(outline: m3.CrossSection, shape: Shape) -> Solid:
-    """An outline as thick as the bar, lying on its side."""
-    return m3.Manifold.extrude(outline, shape.thickness_mm)
+def bar(shape: Shape, lean_rad: float, height_mm: float, number: int | None = None, lying: bool = False) -> Solid:
+    """A whole bar in the plane of `lower`, lying on its side, its number engraved into the upper one. A thin bar that is to stand
+    on its edge, y up, gets a broader base."""
+    outline = lower(shape, lean_rad, height_mm) + tilted(upper(shape), lean_rad, height_mm)
+    solid = m3.Manifold.extrude(outline, shape.thickness_mm)
+    if number is not None:
+        digits = tilted(_digits(number).translate((0.0, shape.number_mm)), lean_rad, height_mm)
+        solid -= m3.Manifold.extrude(digits, 2.0 * ENGRAVED_MM).translate((0.0, 0.0, shape.thickness_mm - ENGRAVED_MM))
+    return solid if lying or shape.lever_mm > 0.0 else solid + _base(solid, shape)
 
 
-def numbered(shape: Shape, lean_rad: float, height_mm: float, number: int) -> Solid:
-    """What lies above the joint, in the plane of `lower` and lying on its side, its number engraved into the upper one."""
-    number_at = tilted(_digits(number).translate((0.0, shape.number_mm)), lean_rad, height_mm)
-    engraved = m3.Manifold.extrude(number_at, 2.0 * ENGRAVED_MM).translate((0.0, 0.0, shape.thickness_mm - ENGRAVED_MM))
-    return thick(tilted(upper(shape), lean_rad, height_mm), shape) - engraved
+def _base(solid: Solid, shape: Shape) -> Solid:
+    x0, _, _, x1, _, _ = solid.trim_by_plane((0.0, -1.0, 0.0), -BASE_HEIGHT_MM).bounding_box()
+    base = m3.Manifold.cube((x1 - x0 + 2.0 * BASE_AROUND_MM, BASE_HEIGHT_MM, BASE_MM))
+    return base.translate((x0 - BASE_AROUND_MM, 0.0, 0.5 * (shape.thickness_mm - BASE_MM)))
 
 
-def based(bar: Solid, shape: Shape) -> Solid:
-    """A bar lying on its side with the broader base that a thin one needs to stand on its edge, y up."""
-    if shape.lever_mm > 0.0:
-        return bar
-    x0, _, _, x1, _, _ = bar.trim_by_plane((0.0, -1.0, 0.0), -BASE_HEIGHT_MM).bounding_box()
-    wide = BASE_MM - shape.thickness_mm
-    size = (x1 - x0 + 2.0 * BASE_AROUND_MM, BASE_HEIGHT_MM, BASE_MM)
-    return bar + m3.Manifold.cube(size).translate((x0 - BASE_AROUND_MM, 0.0, -0.5 * wide))
-
-
-def stand(bar: Solid, shape: Shape, turn_rad: float, radius_mm: float) -> Solid:
+def stand(lying: Solid, shape: Shape, turn_rad: float, radius_mm: float) -> Solid:
     """A bar that lay on its side stands (y up), its x = 0 at a radius from the plate's middle, x outwards at a turn."""
     out, aside = (cos(turn_rad), sin(turn_rad)), (sin(turn_rad), -cos(turn_rad))
-    moved = bar.translate((radius_mm, 0.0, -0.5 * shape.thickness_mm))
+    moved = lying.translate((radius_mm, 0.0, -0.5 * shape.thickness_mm))
     return moved.transform(np.array([[out[0], 0.0, aside[0], 0.0], [out[1], 0.0, aside[1], 0.0], [0.0, 1.0, 0.0, 0.0]]))
 
 

@@ -60,7 +60,10 @@ def factors(profile: Profile, given: Sequence[str] = ()) -> tuple[Factor, ...]:
 
 
 def _checked(profile: Profile, asked: dict[str, Any]) -> tuple[Factor, ...]:
-    settled = with_part_settings(profile.of_all_parts, [PartSettings(part=2, process=asked)]).of_part(2).process
+    try:
+        settled = with_part_settings(profile.of_all_parts, [PartSettings(part=2, process=asked)]).of_part(2).process
+    except ProfileError as error:
+        raise ProfileError(str(error).replace("part 2: ", "--vary: ")) from None
     found = tuple(Factor(key, getattr(profile.process, key), getattr(settled, key)) for key in asked)
     alike = next((factor for factor in found if factor.own == factor.other), None)
     if alike is not None:

@@ -66,14 +66,13 @@ def evaluate(sheet: Sheet) -> Outcome:
     others = [kind for kind in ("z", "x") if any(KINDS[bar - 1] == kind for bar, _, _ in rows)]
     levels = signs(len(sheet.factors))
     told = np.array([log(sheet.shape.strength_mpa(load)) for _, _, load in rows])
-    design = np.array([_row(bar, plate, plates, others, levels) for bar, plate, _ in rows]).reshape(len(rows), -1)
-    freedom = len(rows) - design.shape[1]
-    if freedom < LEAST_FREEDOM or np.linalg.matrix_rank(design) < design.shape[1]:
-        needed = len(plates) + len(others) + len(sheet.factors) + LEAST_FREEDOM
-        raise ProfileError(
-            f"{len(rows)} loads are too few: at least {needed} are needed, and each setting in two bars or more with its own and "
-            "with its other value"
-        )
+    sought = max(1, len(plates)) + len(others) + len(sheet.factors)
+    freedom = len(rows) - sought
+    if freedom < LEAST_FREEDOM:
+        raise ProfileError(f"{len(rows)} loads are too few for {sought} numbers: at least {sought + LEAST_FREEDOM} are needed")
+    design = np.array([_row(bar, plate, plates, others, levels) for bar, plate, _ in rows])
+    if np.linalg.matrix_rank(design) < sought:
+        raise ProfileError("the loads do not tell the settings apart: those of more jointed bars, 1 to 8, are needed")
     found, *_ = np.linalg.lstsq(design, told, rcond=None)
     scatter = sqrt(float(np.sum((told - design @ found) ** 2)) / freedom)
     sigma = scatter * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))

@@ -12,13 +12,13 @@ from math import cos, pi, radians, sin, sqrt
 import manifold3d as m3
 import numpy as np
 
-from machine.calibration.coupon.bars import Shape, based, least_height_mm, lower, numbered, stand, thick
+from machine.calibration.coupon.bars import Shape, bar, least_height_mm, stand
 from machine.calibration.coupon.design import JOINTS, KINDS
 from mdp.clearance import allowed_poses, find_obstacle
-from mdp.cut import Solid, mesh_of
+from mdp.cut import Solid, cut, mesh_of
 from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, Part
 from mdp.plane import PLATFORM, Plane
-from mdp.pose import least_rotation, level, poses, rotation
+from mdp.pose import least_rotation, level, poses, rotation, shift
 from profiles.errors import MoveError
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -58,7 +58,8 @@ def coupon(shape: Shape, profile: Profile) -> Decomposition:
     if not machine.tilts:
         raise MoveError(f"{machine.name} has three axes: the joints of a coupon are made on a table that tilts")
     ring, whole = _ring(shape, profile), _in_one_piece(shape)
-    stubs, tops = zip(*(_jointed(shape, ring, joint) for joint in range(JOINTS)), strict=True)
+    bars = [_jointed(shape, ring, joint) for joint in range(JOINTS)]
+    tops, stubs = zip(*(cut(jointed, ring.base(joint)) for joint, jointed in enumerate(bars)), strict=True)
     pieces = [mesh_of(m3.Manifold.compose([*stubs, *whole])), *(mesh_of(top) for top in tops)]
     bases = [PLATFORM, *(ring.base(joint) for joint in range(JOINTS))]
     options = [allowed_poses(machine, base.normal, mesh.vertices) for base, mesh in zip(bases, pieces, strict=True)]
@@ -67,29 +68,25 @@ def coupon(shape: Shape, profile: Profile) -> Decomposition:
         Part(k + 1, mesh, base, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
         for k, (mesh, base, pose) in enumerate(zip(pieces, bases, chosen, strict=True))
     )
-    model = mesh_of(m3.Manifold.batch_boolean([*stubs, *whole, *tops], m3.OpType.Add))
+    model = mesh_of(m3.Manifold.compose([*bars, *whole]))
     return Decomposition(f"coupon of {shape.name} bars", model, parts, 1, "none", 0.0, 0.0, 0, 0, 0.0)
 
 
-def _jointed(shape: Shape, ring: Ring, joint: int) -> tuple[Solid, Solid]:
-    """What of a jointed bar lies below its joint, and what above."""
+def _jointed(shape: Shape, ring: Ring, joint: int) -> Solid:
+    """A jointed bar as a whole."""
     turn, radius, height = ring.place(joint)
-    stub = based(thick(lower(shape, ring.lean_rad, height), shape), shape)
-    top = numbered(shape, ring.lean_rad, height, joint + 1)
-    return stand(stub, shape, turn, radius), stand(top, shape, turn, radius)
+    return stand(bar(shape, ring.lean_rad, height, joint + 1), shape, turn, radius)
 
 
 def _in_one_piece(shape: Shape) -> list[Solid]:
     """Two bars upright beside the plate's middle, two lying along X before and behind them."""
     height = least_height_mm(shape, 0.0)
-    foot = thick(lower(shape, 0.0, height), shape)
-    bars = [foot + numbered(shape, 0.0, height, JOINTS + 1 + k) for k in range(4)]
-    upright = [stand(based(bar, shape), shape, 0.0, 0.0) for bar in bars[:2]]
-    lying = [bar.rotate((0.0, 0.0, -90.0)) for bar in bars[2:]]
+    upright = [stand(bar(shape, 0.0, height, JOINTS + k), shape, 0.0, 0.0) for k in (1, 2)]
+    lying = [bar(shape, 0.0, height, JOINTS + k, True).rotate((0.0, 0.0, -90.0)) for k in (3, 4)]
     (wide, deep), across = _size(upright[0]), _size(lying[0])[1]
     beside, before = 0.5 * (wide + GAP_MM), 0.5 * (deep + across) + GAP_MM
     places = ((-beside, 0.0), (beside, 0.0), (0.0, -before), (0.0, before))
-    return [_centred(bar).translate((x, y, 0.0)) for bar, (x, y) in zip([*upright, *lying], places, strict=True)]
+    return [_centred(solid).translate((x, y, 0.0)) for solid, (x, y) in zip([*upright, *lying], places, strict=True)]
 
 
 def _size(solid: Solid) -> tuple[float, float]:
@@ -107,6 +104,9 @@ def _ring(shape: Shape, profile: Profile) -> Ring:
     stands in the way of the one that comes nearest to it."""
     machine = profile.machine
     leans = [lean for lean in LEANS_DEG if lean <= profile.process.self_supporting_angle_deg]
+    if not leans:
+        allowed = f"at least {LEANS_DEG[-1]:g} deg, by which bars lean, is allowed"
+        raise MoveError(f"process.self_supporting_angle_deg is {profile.process.self_supporting_angle_deg:g}: {allowed}")
     reached = [lean for lean in leans if all(poses(machine, Ring(radians(lean), *FLAT).base(k).normal) for k in range(JOINTS))]
     if not reached:
         raise MoveError(
@@ -124,14 +124,16 @@ def _ring(shape: Shape, profile: Profile) -> Ring:
 
 
 def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
-    """Rings as far out as the plate allows, low and narrow ones first."""
+    """Rings as far out as the plate and the level table's X and Y allow, low and narrow ones first."""
     table = machine.table
     edge = (table.radius_mm if table.size_mm is None else 0.5 * min(table.size_mm)) - GAP_MM
+    middle = shift(machine, level(machine))
+    reach = min(abs(limit - middle[k]) for k, axis in enumerate((machine.x, machine.y)) for limit in axis.limits_mm)
+    farthest = float(reach) - 0.5 * shape.depth_mm * cos(lean_rad)
 
     def radius(height: float) -> float:
-        stub = based(thick(lower(shape, lean_rad, height), shape), shape)
-        _, _, z0, x1, _, z1 = stub.trim_by_plane((0.0, -1.0, 0.0), -LOW_MM).bounding_box()
-        return sqrt(max(0.0, edge**2 - (0.5 * (z1 - z0)) ** 2)) - float(x1)
+        _, _, z0, x1, _, z1 = bar(shape, lean_rad, height).trim_by_plane((0.0, -1.0, 0.0), -LOW_MM).bounding_box()
+        return min(farthest, sqrt(max(0.0, edge**2 - (0.5 * (z1 - z0)) ** 2)) - float(x1))
 
     for low in (least_height_mm(shape, lean_rad) + more for more in HEIGHTS_MM):
         for rise in RISES_MM:
@@ -140,12 +142,16 @@ def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
 
 def _problem(shape: Shape, ring: Ring, whole: Sequence[Solid], machine: Machine) -> tuple[int, str] | None:
     """What stands in the way of a ring, and how near it comes to being printed; None: nothing."""
-    stubs, tops = zip(*(_jointed(shape, ring, joint) for joint in range(JOINTS)), strict=True)
+    bars = (_jointed(shape, ring, joint) for joint in range(JOINTS))
+    tops, stubs = zip(*(cut(jointed, ring.base(joint)) for joint, jointed in enumerate(bars)), strict=True)
     ground = [*stubs, *whole]
     around = [solid.project().offset(0.5 * GAP_MM - 1e-3, m3.JoinType.Miter) for solid in ground]
     if sum(area.area() for area in around) > m3.CrossSection.batch_boolean(around, m3.OpType.Add).area() + 0.01:
-        return 1, f"its plate has no room for {len(KINDS)} bars side by side"
+        return 1, f"its plate, {machine.table.radius_mm:g} mm in radius, has no room for {len(KINDS)} bars side by side"
     below = np.vstack([mesh_of(solid).vertices for solid in ground])
+    obstacle = find_obstacle(machine, level(machine), below)
+    if obstacle is not None:
+        return 1, obstacle
     for joint, top in enumerate(tops):
         base, vertices = ring.base(joint), mesh_of(top).vertices
         if float(base.heights_mm(below).max()) > ORDER_TOLERANCE_MM:

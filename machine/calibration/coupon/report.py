@@ -33,7 +33,7 @@ def report_lines(sheet: Sheet, outcome: Outcome, version: str) -> list[str]:
             ["strength", "MPa", "of one piece upright"], [(n, f"{m:.1f}", s.strip(" ,") or "") for n, m, s in _strengths(outcome)]
         ),
     ]
-    effects = [(_setting(e), f"{100 * (e.ratio - 1.0):+.0f} %", f"{e.by_chance:.3f}", _verdict(e)) for e in outcome.effects]
+    effects = [(_setting(e), f"{100 * (e.ratio - 1.0):+.0f} %", _chance(e), _verdict(e)) for e in outcome.effects]
     lines += ["", *_table(["setting", "effect", "by chance", "so"], effects), ""]
     bars = []
     for bar, loads in enumerate(sheet.loads_n, start=1):
@@ -65,6 +65,10 @@ def _strengths(outcome: Outcome) -> list[tuple[str, float, str]]:
     if outcome.lying_mpa is not None:
         rows.append(("in one piece, lying", outcome.lying_mpa, share(outcome.lying_mpa)))
     return rows
+
+
+def _chance(effect: Effect) -> str:
+    return f"{effect.by_chance:.3f}" if effect.by_chance >= 0.001 else "< 0.001"
 
 
 def _setting(effect: Effect) -> str:

@@ -6,12 +6,19 @@ from typing import Any
 import tomlkit
 
 from machine.calibration.coupon.fit import Outcome
+from profiles.material import Material
 
 
-def material_tables(outcome: Outcome, day: date) -> dict[str, Any]:
-    """The strengths of the material: across layers, of bars in one piece, and of joints as they are printed now."""
-    strengths = {"interlayer_strength_mpa": outcome.upright_mpa, "joint_strength_mpa": outcome.best_joint_mpa}
-    return {"material": {key: _with_source(round(mpa, 2), outcome, day) for key, mpa in strengths.items() if mpa is not None}}
+def material_tables(outcome: Outcome, before: Material, day: date) -> dict[str, Any]:
+    """What the material bears across layers, by the bars in one piece, and which share of it a joint with what won does; a joint
+    that bears more counts as one piece. before: whose strength stays where no such bar was broken."""
+    measured = outcome.upright_mpa is not None
+    upright = round(outcome.upright_mpa, 2) if outcome.upright_mpa is not None else before.interlayer_strength_mpa
+    factor = round(min(1.0, outcome.best_joint_mpa / upright), 3)
+    values = {"interlayer_strength_mpa": upright} if measured else {}
+    return {
+        "material": {key: _with_source(value, outcome, day) for key, value in (values | {"cold_weld_factor": factor}).items()}
+    }
 
 
 def process_tables(outcome: Outcome, day: date) -> dict[str, Any]:

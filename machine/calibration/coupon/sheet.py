@@ -21,8 +21,9 @@ PULLED = {"bend": "across its axis, at the notch", "tensile": "along its axis"}
 
 @dataclass(frozen=True)
 class Sheet:
-    """A coupon's shape, the profiles it was printed with, the factors of its jointed bars, and of every bar, by number, the loads in
-    N at which it broke: one for each time that the plate was printed, nan where it is not told."""
+    """A coupon's shape, the profiles it was printed with, the factors of its jointed bars, and by number the loads in N at which
+    each bar broke: one for each time that the plate was printed, nan where it is not told.
+    """
 
     shape: Shape
     machine: str

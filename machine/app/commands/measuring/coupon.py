@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from machine.app.commands.measuring.coupon_dialogue import ask_loads
-from machine.app.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
+from machine.app.output import check_outputs, check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
+from machine.app.pictures.picture import contact_sheet
+from machine.app.pictures.png import write_png
 from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.programs import refuse_errors
-from machine.app.requests import STDOUT, CouponRequest
+from machine.app.requests import STDOUT, CouponRequest, Outputs
 from machine.app.terminal.plain import show
 from machine.app.terminal.report import print_table
 from machine.calibration.coupon.bars import SHAPES, Shape
@@ -33,11 +35,10 @@ UNSUPPORTED = ("process.support=none",)  # the bars carry themselves; support wo
 def write_program(request: CouponRequest, out: Path) -> int:
     """Write the G-code and, beside it, the sheet to fill in; a page that shows the bars where asked."""
     sheet_file = out.with_suffix(".toml")
-    files = [out, sheet_file, *([request.html] if request.html else [])]
-    for file in files:
+    for file in (out, sheet_file):
         check_writable(file)
-    for file in files[:2]:
         refuse_to_overwrite(file, request.replace)
+    check_outputs(Outputs(html=request.html, png=request.png))
     shape = _shape(request)
     profile = load(*request.names, settings=(*request.settings, *UNSUPPORTED))
     chosen = factors(profile, request.vary)
@@ -49,6 +50,8 @@ def write_program(request: CouponRequest, out: Path) -> int:
     write_bytes(sheet_file, sheet_text(empty_sheet(shape, request.names, chosen)).encode())
     if request.html is not None:
         write_bytes(request.html, print_page(decomposition.name, program, profile))
+    if request.png is not None:
+        write_png(request.png, contact_sheet(decomposition, profile.machine))
     show(print_table(program, profile))
     show(
         f"print {out}, break the bars, note the loads in {sheet_file}\n"
@@ -98,7 +101,8 @@ def ask_for_loads(request: CouponRequest) -> int:
 def _save(request: CouponRequest, outcome: Outcome) -> None:
     """Strengths and what won in the user's own profiles, the files before beside them."""
     day = date.today()
-    found = {"material": material_tables(outcome, day), "process": process_tables(outcome, day)}
+    before = load(*request.names, settings=request.settings).material
+    found = {"material": material_tables(outcome, before, day), "process": process_tables(outcome, day)}
     profiles = {kind: _own_profile(request, kind, tables) for kind, tables in found.items() if tables}
     for file, _ in profiles.values():
         refuse_to_overwrite(file, request.replace)

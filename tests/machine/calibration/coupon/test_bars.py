@@ -6,7 +6,7 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from machine.calibration.coupon.bars import BEND, TENSILE, Shape, dumbbell, lower, numbered, thick, tilted, upper
+from machine.calibration.coupon.bars import BEND, TENSILE, Shape, bar, dumbbell, lower, upper
 from mdp.mesh import Floats
 
 
@@ -65,9 +65,8 @@ def test_a_screw_fits_through_the_foot_and_its_hole_stays_inside() -> None:
 
 
 def test_a_number_is_engraved_and_two_numbers_differ() -> None:
-    plain = thick(tilted(upper(BEND), 0.0, 10.0), BEND)
-    bars = [numbered(BEND, 0.0, 10.0, number) for number in range(1, 13)]
-    assert all((plain - bar).volume() > 1.0 for bar in bars)
+    plain, bars = bar(BEND, 0.0, 10.0), [bar(BEND, 0.0, 10.0, number) for number in range(1, 13)]
+    assert all((plain - numbered).volume() > 1.0 for numbered in bars)
     assert all((one - other).volume() + (other - one).volume() > 0.3 for one, other in combinations(bars, 2))
 
 
