@@ -82,7 +82,12 @@ def read_sheet(path: Path) -> Sheet:
         raise ProfileError(f"{path}: coupon is {document.get('coupon')!r}: it must be one of {', '.join(SHAPES)}")
     machine, material, process = (_name(path, document, key) for key in ("machine", "material", "process"))
     factors = tuple(_factor(path, row) for row in _rows(path, document, "factor"))
-    loads = dict(_loads(path, shape, row) for row in _rows(path, document, "bar"))
+    loads: dict[int, tuple[float, ...]] = {}
+    for row in _rows(path, document, "bar"):
+        number, told = _loads(path, shape, row)
+        if number in loads:
+            raise ProfileError(f"{path}: bar {number} is told twice: a plate printed again has one more load in its list")
+        loads[number] = told
     if not 1 <= len(factors) <= MOST_FACTORS or len({factor.key for factor in factors}) < len(factors):
         raise ProfileError(f"{path}: {len(factors)} [[factor]] tables: 1 to {MOST_FACTORS} of different keys are expected")
     empty = (float("nan"),)
