@@ -25,6 +25,7 @@ CONFINED = {
         "slicer/interface/interlock",
         "machine/kinematics/collision",
         "machine/app/pipeline/precompile",
+        "machine/calibration/coupon/",
     ),
     "numba": ("mdp/kernels/kernel",),
     "shapely": ("slicer/travel/islands", "machine/dryrun/placement"),

@@ -13,8 +13,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from machine.app import model_cli, printer_cli
-from machine.app.setup_cli import calibrate, profiles_app
+from machine.app import model_cli, printer_cli, setup_cli
 from machine.app.terminal.interrupts import outside_compiler
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.usage import sentence
@@ -29,9 +28,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="From a mesh to a finished multi-directional print on a 5-axis printer.",
 )
-for word, command in (model_cli.COMMANDS | printer_cli.COMMANDS | {"calibrate": calibrate}).items():
+for word, command in (model_cli.COMMANDS | printer_cli.COMMANDS | setup_cli.COMMANDS).items():
     app.command(word)(command)
-app.add_typer(profiles_app, name="profiles")
+app.add_typer(setup_cli.profiles_app, name="profiles")
 
 
 def _version(wanted: bool) -> None:

@@ -96,6 +96,21 @@ def write_bytes(path: Path, content: bytes, private: bool = False) -> None:
         raise _not_written(path, error) from None
 
 
+def refuse_to_overwrite(file: Path, replace: bool) -> None:
+    """Raise OutputError for a file that exists, unless it may be replaced."""
+    if file.exists() and not replace:
+        raise OutputError(f"{file} exists: --replace writes over it, another name leaves it")
+
+
+def write_own(file: Path, text: str, replace: bool) -> None:
+    """Write a profile of the user's own, the file before beside it. Raises OutputError."""
+    refuse_to_overwrite(file, replace)
+    make_folder(file.parent)
+    if file.exists():
+        write_bytes(file.with_suffix(".toml.before"), file.read_bytes())
+    write_bytes(file, text.encode())
+
+
 def delete(path: Path) -> None:
     """Delete a file. Raises OutputError."""
     try:

@@ -163,3 +163,29 @@ class CalibrationRequest:
     save: str | None = None
     replace: bool = False
     force: bool = False
+
+
+@dataclass(frozen=True)
+class CouponRequest:
+    """Bars that tell what joints hold. names: of machine, material and process; shape: how the bars are broken; vary: KEY=VALUE
+    that half of them are printed with, none: the usual ones; html, png: what shows them; report: a table and nothing else.
+
+    save: name of the user's own material and process, None: theirs. replace: write over files that exist. force: write a program
+    although its dry run found errors.
+    """
+
+    names: tuple[str, str, str]
+    settings: tuple[str, ...] = ()
+    shape: str = "bend"
+    vary: tuple[str, ...] = ()
+    html: Path | None = None
+    png: Path | None = None
+    report: Path | None = None
+    save: str | None = None
+    replace: bool = False
+    force: bool = False
+
+    @property
+    def named(self) -> str:
+        """The names as options."""
+        return " ".join(f"--{kind} {name}" for kind, name in zip(("machine", "material", "process"), self.names, strict=True))

@@ -1,4 +1,4 @@
-"""The command line of profiles and calibration. Heavy imports stay inside the commands."""
+"""The command line of profiles, calibration and coupons. Heavy imports stay inside the commands."""
 
 import sys
 from pathlib import Path
@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import CalibrationRequest, Given
-from machine.app.terminal.options import MachineName, Settings, machine_profile
+from machine.app.requests import CalibrationRequest, CouponRequest, Given
+from machine.app.terminal.option_groups import with_option_groups
+from machine.app.terminal.options import Force, HtmlFile, MachineName, ModelProfileOptions, Settings, machine_profile
 
 profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
 
@@ -36,7 +37,7 @@ def calibrate(
 
     Without -o and --measured a terminal asks for the touches one by one.
     """
-    from machine.app.commands.calibrate import ask_for_touches, evaluate_sheet, write_program
+    from machine.app.commands.measuring.calibrate import ask_for_touches, evaluate_sheet, write_program
 
     request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force)
     if out is not None and measured is None:
@@ -46,6 +47,60 @@ def calibrate(
     if out is None and sys.stdin.isatty() and sys.stdout.isatty():
         return ask_for_touches(request)
     raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+
+
+def coupon(
+    *,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="OUT.gcode", help="program to write, with a sheet beside it to fill in")
+    ] = None,
+    measured: Annotated[
+        Path | None, typer.Option("--measured", metavar="FILE", help="filled sheet, .toml: work out what holds, and save it")
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="FILE.md", help="with --measured: only write it as a table; - for standard output"),
+    ] = None,
+    shape: Annotated[
+        str, typer.Option("--shape", metavar="bend|tensile", help="bars for a luggage scale, or ISO 527-2 type 5A")
+    ] = "bend",
+    vary: Annotated[
+        list[str] | None,
+        typer.Option("--vary", metavar="KEY=VALUE", help="what half of the bars have, not the usual four; repeatable, at most 5"),
+    ] = None,
+    html: HtmlFile = None,
+    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the bars in print order")] = None,
+    save: Annotated[
+        str | None, typer.Option("--save", metavar="NAME", help="name of your material and process profiles; else theirs")
+    ] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
+    force: Force = False,
+    given: ModelProfileOptions,
+) -> int:
+    """Measure how joints hold on your machine. Twelve bars with different joints are printed at once, and broken by hand.
+
+    Without -o and --measured a terminal asks for the loads at which the bars broke.
+    """
+    from machine.app.commands.measuring.coupon import ask_for_loads, evaluate_sheet, write_program
+
+    names = (given.machine, given.material, given.process)
+    settings, varied = tuple(given.settings or ()), tuple(vary or ())
+    request = CouponRequest(names, settings, shape, varied, html, png, report, save, replace, force)
+    if report is not None and measured is None:
+        raise typer.BadParameter(f"--report {report} goes with --measured FILE, whose loads it tells")
+    for option, file in (("--html", html), ("--png", png)):
+        if file is not None and out is None:
+            raise typer.BadParameter(f"{option} {file} goes with -o OUT.gcode, whose bars it shows")
+    if out is not None and measured is None:
+        return write_program(request, out)
+    if measured is not None and out is None:
+        return evaluate_sheet(request, measured)
+    if out is None and sys.stdin.isatty() and sys.stdout.isatty():
+        return ask_for_loads(request)
+    raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+
+
+COMMANDS = {command.__name__: with_option_groups(command) for command in (calibrate, coupon)}
 
 
 @profiles_app.command("list")

@@ -1,4 +1,4 @@
-"""Saved: the numbers that a calibration found, as a profile in the user's own folder that inherits the rest."""
+"""Saved: the numbers that a calibration or a coupon found, as a profile in the user's own folder that inherits the rest."""
 
 import tomllib
 from collections.abc import Mapping, MutableMapping
@@ -32,11 +32,12 @@ def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool)
     return {"machine": {"uncalibrated": left, **axes, "sources": dict.fromkeys(keys, source)}}
 
 
-def own_profile(name: str, parent: str, tables: Mapping[str, Any]) -> tuple[Path, str]:
-    """The file in the user's folder and its new text: what it holds already, comments too, the new tables over it."""
-    file = own_folder("machine") / f"{name}.toml"
-    if name not in own("machine"):
-        known = parent in (*shipped("machine"), *own("machine"))
+def own_profile(kind: str, name: str, parent: str, tables: Mapping[str, Any]) -> tuple[Path, str]:
+    """The file in the user's folder for a kind of profile and its new text: what it holds already, comments too, the new tables
+    over it."""
+    file = own_folder(kind) / f"{name}.toml"
+    if name not in own(kind):
+        known = parent in (*shipped(kind), *own(kind))
         return file, tomlkit.dumps({PARENT: parent if known else str(Path(parent).resolve()), **tables})
     whole = merged(parse(file), tables)
     document = tomlkit.parse(file.read_text(encoding="utf-8"))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from machine.app.cli import main
-from machine.app.commands.calibrate import ask_for_touches
+from machine.app.commands.measuring.calibrate import ask_for_touches
 from machine.app.requests import CalibrationRequest
 from machine.calibration.fit import Touch
 from machine.calibration.program import plan_touches

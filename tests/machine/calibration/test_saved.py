@@ -21,13 +21,13 @@ def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_new_profile_inherits_the_machine_and_holds_the_numbers(mine: Path) -> None:
-    assert own_profile("mine", "generic_ac", TABLES)[0] == mine
-    assert tomllib.loads(own_profile("mine", "generic_ac", TABLES)[1]) == {"inherits": "generic_ac", **TABLES}
+    assert own_profile("machine", "mine", "generic_ac", TABLES)[0] == mine
+    assert tomllib.loads(own_profile("machine", "mine", "generic_ac", TABLES)[1]) == {"inherits": "generic_ac", **TABLES}
 
 
 def test_comments_and_other_keys_of_a_profile_stay(mine: Path) -> None:
     mine.write_text('# my printer\ninherits = "generic_ac"\n[machine.tilt]\nsign = -1  # wrong way round?\nzero_deg = 2.0\n')
-    text = own_profile("mine", "generic_ac", TABLES)[1]
+    text = own_profile("machine", "mine", "generic_ac", TABLES)[1]
     assert text.startswith("# my printer\n")
     assert "sign = 1  # wrong way round?\nzero_deg = 2.0\n" in text
     assert tomllib.loads(text)["machine"]["sources"] == {"machine.tilt.sign": "me"}
@@ -35,5 +35,5 @@ def test_comments_and_other_keys_of_a_profile_stay(mine: Path) -> None:
 
 def test_dotted_keys_are_saved_right(mine: Path) -> None:
     mine.write_text('machine.tilt.sign = -1\nmachine.name = "x"\n')
-    machine = tomllib.loads(own_profile("mine", "generic_ac", TABLES)[1])["machine"]
+    machine = tomllib.loads(own_profile("machine", "mine", "generic_ac", TABLES)[1])["machine"]
     assert (machine["name"], machine["tilt"]["sign"], machine["uncalibrated"]) == ("x", 1, [])

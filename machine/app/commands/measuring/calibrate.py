@@ -2,17 +2,16 @@
 
 from pathlib import Path
 
-from machine.app.commands.calibrate_dialogue import ask_touches
-from machine.app.output import check_writable, write_bytes, write_lines
+from machine.app.commands.measuring.calibrate_dialogue import ask_touches
+from machine.app.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
 from machine.app.requests import CalibrationRequest
 from machine.app.terminal.plain import show
 from machine.calibration.fit import Calibration, calibrate
 from machine.calibration.program import calibration_lines, plan_touches
 from machine.calibration.saved import fitted_tables, own_profile
 from machine.calibration.sheet import Sheet, read_sheet, sheet_text
-from profiles.errors import OutputError, ProfileError
+from profiles.errors import ProfileError
 from profiles.machine import Machine
-from profiles.places import own_folder
 from profiles.profile import Profile, load_one
 
 MOST_OFF_MM = 0.5
@@ -24,7 +23,7 @@ def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> i
     sheet = out.with_suffix(".toml")
     for file in (out, sheet):
         check_writable(file)
-        _refuse_to_overwrite(file, request.replace)
+        refuse_to_overwrite(file, request.replace)
     height = _mark_height_mm(request)
     touches = plan_touches(profile.machine, height, request.mark_radius_mm)
     write_lines(out, calibration_lines(profile, touches))
@@ -55,7 +54,7 @@ def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
 def ask_for_touches(request: CalibrationRequest) -> int:
     """Ask a person for the touches one by one, tell what follows from them, save it."""
     machine, name = _tilting(request), request.machine
-    _refuse_to_overwrite(own_profile(request.save or Path(name).stem, name, {})[0], request.replace)
+    refuse_to_overwrite(own_profile("machine", request.save or Path(name).stem, name, {})[0], request.replace)
     accepted: list[Calibration] = []
 
     def judge(sheet: Sheet) -> str | int | None:
@@ -100,12 +99,8 @@ def _calibrated(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> 
 def _save(request: CalibrationRequest, machine: Machine, calibration: Calibration, sheet: Sheet) -> None:
     """The found numbers in the user's own profile, and the file before beside it."""
     tables = fitted_tables(machine, calibration, sheet.mark_angle_deg is not None)
-    file, text = own_profile(request.save or Path(request.machine).stem, request.machine, tables)
-    _refuse_to_overwrite(file, request.replace)
-    own_folder("machine").mkdir(parents=True, exist_ok=True)
-    if file.exists():
-        write_bytes(file.with_suffix(".toml.before"), file.read_bytes())
-    write_bytes(file, text.encode())
+    file, text = own_profile("machine", request.save or Path(request.machine).stem, request.machine, tables)
+    write_own(file, text, request.replace)
     show(f"saved: {file}; use it as --machine {file.stem}\n")
 
 
@@ -125,8 +120,3 @@ def _comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -
     most = f"most at touch {calibration.worst}: {max(calibration.residuals_mm):.4f} mm"
     lines.append(f"touches: {touches}, {mean_mm:.4f} mm off on average, {most}")
     return "\n".join(lines) + "\n"
-
-
-def _refuse_to_overwrite(file: Path, replace: bool) -> None:
-    if file.exists() and not replace:
-        raise OutputError(f"{file} exists: --replace writes over it, another name leaves it")

@@ -73,7 +73,7 @@ def _ask(questions: Sequence[Question], index: int, answers: list[Answer], known
     question, doubted = questions[index], None
     usual = answers[index] if index < known and index < len(answers) else question.usual
     while True:
-        reply = _read(f"{question.text}{'' if usual is None else f' [{usual:g}]'}: ")
+        reply = read_reply(f"{question.text}{'' if usual is None else f' [{usual:g}]'}: ", "all touches were told")
         if reply in ("b", "s"):
             return _aside(reply, index, answers)
         if not reply and (usual is not None or question.optional):
@@ -112,11 +112,12 @@ def _store(answers: list[Answer], index: int, value: Answer) -> None:
     answers[index] = value
 
 
-def _read(prompt: str) -> str:
+def read_reply(prompt: str, before: str) -> str:
+    """What a person types, in small letters. Raises ProfileError at the end of input; before: what is still to come."""
     try:
         return input(prompt).strip().lower()
     except EOFError:
-        raise ProfileError("the input ended before all touches were told: nothing is saved") from None
+        raise ProfileError(f"the input ended before {before}: nothing is saved") from None
 
 
 def _numbers(reply: str) -> list[float] | None:

@@ -1,0 +1,1 @@
+"""Commands that measure the machine: where its axes are, what its joints hold."""
