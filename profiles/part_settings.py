@@ -34,6 +34,7 @@ OF_THE_PRINT = (
 OF_PARTS_ON_PLASTIC = {
     "interface_overlap",
     "interface_flow",
+    "interface_line_width_mm",
     "interface_speed_mm_s",
     "interface_layers",
     "interface_temperature_add_c",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun import clearance, extrusion, heat, layering, motion, own_comments, placement, sequence
+from machine.dryrun.balance import interfaces
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
@@ -103,6 +104,7 @@ def _findings(
         *placement.findings(program, deposited, contacts),
         *layering.findings(program, deposited, contacts),
         *extrusion.findings(program, deposited, profile),
+        *interfaces.findings(program, deposited, profile),
         *sequence.findings(program, profile),
         *own_comments.findings(text, program, profile),
         *placement.off_plate(program, segments, rows, profile),

@@ -98,7 +98,9 @@ def _columns(middle: float, reach: float, axis: int, lattice: Lattice) -> tuple[
 
 @kernel
 def tops(bars: Bars, lattice: Lattice) -> Floats:
-    """Height at which each column leaves the uppermost of some bars, which may lie at any slant; NOTHING where there is none."""
+    """Height at which each column leaves the uppermost of some bars, which may lie at any slant and end round, as beads turn at
+    corners; NOTHING where there is none.
+    """
     top = table(lattice.shape[0], lattice.shape[1])
     for i in range(lattice.shape[0]):
         for j in range(lattice.shape[1]):
@@ -111,15 +113,45 @@ def tops(bars: Bars, lattice: Lattice) -> Floats:
         d = ((b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length)
         s = (up[1] * d[2] - up[2] * d[1], up[2] * d[0] - up[0] * d[2], up[0] * d[1] - up[1] * d[0])
         slabs = ((d[0], d[1], d[2], 0.0, length), (s[0], s[1], s[2], -half, half), (up[0], up[1], up[2], -height, 0.0))
-        reach = [0.5 * (length * abs(d[n]) + height * abs(up[n])) + half * abs(s[n]) for n in range(2)]
+        reach = [0.5 * (length * abs(d[n]) + height * abs(up[n])) + half * np.sqrt(1.0 - up[n] * up[n]) for n in range(2)]
         i0, i1 = _columns(0.5 * (a[0] + b[0] - height * up[0]), reach[0], 0, lattice)
         j0, j1 = _columns(0.5 * (a[1] + b[1] - height * up[1]), reach[1], 1, lattice)
         for i in range(i0, i1 + 1):
             x = lattice.origin[0] + (i + 0.5) * lattice.cell - a[0]
             for j in range(j0, j1 + 1):
                 y = lattice.origin[1] + (j + 0.5) * lattice.cell - a[1]
-                top[i, j] = max(top[i, j], a[2] + _leaves(x, y, slabs))
+                highest = max(
+                    a[2] + _leaves(x, y, slabs),
+                    a[2] + _leaves_end(x, y, up, half, height),
+                    b[2] + _leaves_end(x + a[0] - b[0], y + a[1] - b[1], up, half, height),
+                )
+                if highest > max(top[i, j], 0.5 * NOTHING):
+                    top[i, j] = highest
     return top
+
+
+@part
+def _leaves_end(x: float, y: float, up: Floats, half: float, height: float) -> float:
+    """Height at which an upright line leaves the round end of a bar: a cylinder below the end of its top, seen from there.
+
+    Of the places p = (x, y, z) on it those with |p|^2 - (p . up)^2 <= half^2, a quadratic in z, and -height <= p . up <= 0.
+    """
+    along, free = x * up[0] + y * up[1], 1.0 - up[2] * up[2]
+    rest = x * x + y * y - along * along - half * half
+    low, high = NOTHING, -NOTHING
+    if free > 1e-12:
+        root = along * along * up[2] * up[2] - free * rest
+        if root < 0.0:
+            return NOTHING
+        low, high = (along * up[2] - np.sqrt(root)) / free, (along * up[2] + np.sqrt(root)) / free
+    elif rest > 0.0:
+        return NOTHING
+    if abs(up[2]) > 1e-9:
+        low = max(low, min(-along / up[2], (-height - along) / up[2]))
+        high = min(high, max(-along / up[2], (-height - along) / up[2]))
+    elif along > 0.0 or along < -height:
+        return NOTHING
+    return high if low <= high else NOTHING
 
 
 @part
@@ -137,16 +169,15 @@ def _leaves(x: float, y: float, slabs: tuple[tuple[float, float, float, float, f
 
 
 def inside_loops(sides: Floats, lattice: Lattice) -> Mask:
-    """Columns about whose middle loops wind, counter-clockwise ones forwards; sides: (n, 4) begin and end of each side."""
-    crossings = _crossings(sides, lattice)
-    within: Mask = crossings[:, ::-1].cumsum(axis=1)[:, ::-1] > 0.5
+    """Columns whose middle an odd number of loops enclose; sides: (n, 4) x y of the begin and end of each side."""
+    within: Mask = _crossings(sides, lattice)[:, ::-1].cumsum(axis=1)[:, ::-1] % 2.0 > 0.5
     return within
 
 
 @kernel
 def _crossings(sides: Floats, lattice: Lattice) -> Floats:
-    """What each column adds to the winding about it and all below it: 1 for a side that passes above it to the left."""
-    turns = table(lattice.shape[0], lattice.shape[1])
+    """How many sides pass above each column's middle and not above that of the next one."""
+    crossings = table(lattice.shape[0], lattice.shape[1])
     for k in range(len(sides)):
         x0, y0, x1, y1 = sides[k, 0], sides[k, 1], sides[k, 2], sides[k, 3]
         first, last = _columns(0.5 * (x0 + x1), 0.5 * abs(x1 - x0) + 1e-9, 0, lattice)
@@ -156,8 +187,8 @@ def _crossings(sides: Floats, lattice: Lattice) -> Floats:
                 y = y0 + (x - x0) / (x1 - x0) * (y1 - y0)
                 j = int(np.ceil((y - lattice.origin[1]) / lattice.cell - 0.5)) - 1
                 if j >= 0:
-                    turns[i, min(j, lattice.shape[1] - 1)] += 1.0 if x1 < x0 else -1.0
-    return turns
+                    crossings[i, min(j, lattice.shape[1] - 1)] += 1.0
+    return crossings
 
 
 def window_sums(values: Floats, lattice: Lattice) -> Floats:

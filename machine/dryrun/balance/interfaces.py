@@ -10,7 +10,8 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.balance.columns import Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
+from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
+from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.strokes import Beads
 from machine.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices
@@ -20,11 +21,11 @@ from slicer.paths import Kind
 
 CELL_MM = 0.05
 AT_THE_EDGE = (Kind.OUTER_WALL.value, Kind.OVERHANG.value)
-WALLS = (*AT_THE_EDGE, Kind.INNER_WALL.value)
 NO_PART = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value, Kind.IRONING.value)
 NEAR = 1.5  # heights of a bead: what lies farther below its tip it does not touch
+LEAST_TOLD, MOST_TOLD, LEAST_TOLD_MM2 = 0.75, 1.4, 10.0  # of all of it: steps of slanted layers leave a tenth open or taken
 LEAST, MOST = 0.9, 1.1  # plastic over room of a square millimetre that is as it should be
-RICH = 1.1  # of a layer's usual bead: what has more makes up for what oozed
+LEAN, RICH = 0.1, 1.1  # the leanest tenth of a layer's beads; what has so much more makes up for what oozed
 SAMPLE_MM, FAR_MM, AROUND_MM = 0.1, 1.5, 0.05  # of looks along outer walls, and across them
 REACH_MM = 2.0  # from the plane of the tip, of plastic that can matter
 
@@ -54,8 +55,8 @@ class Interface:
 
     @property
     def contact(self) -> float:
-        """Share of the section, as far as there is anything below it, where a bead lies on it."""
-        return float((self.bead & self.touching & self.section).sum() / max(1, (self.touching & self.section).sum()))
+        """Share of the section where a bead lies on an earlier part."""
+        return float((self.bead & self.touching).sum() / max(1, self.section.sum()))
 
     @property
     def over_room(self) -> float:
@@ -64,9 +65,28 @@ class Interface:
         return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
 
     @property
+    def beads_over_room(self) -> float:
+        """Plastic over room where beads lie on something, whatever they leave open."""
+        there = self.touching & self.bead
+        return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
+
+    @property
     def map(self) -> Floats:
         """(nx, ny) plastic over room in the square millimetre around each column; nan outside."""
         return over_room(self.plastic, np.where(self.touching & self.section, self.room, np.nan), self.lattice)
+
+
+def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
+    """A warning of code room for every part whose first layer has far more or less plastic than its flow puts into its room."""
+    for face in interfaces(program, deposited, profile):
+        flow = profile.of_part(face.part).process.interface_flow * profile.material.flow
+        share, touching = face.beads_over_room / flow, float((face.touching & face.section).sum()) * face.lattice.column_mm2
+        if touching >= LEAST_TOLD_MM2 and not LEAST_TOLD <= share <= MOST_TOLD:
+            message = (
+                f"the first layer of part {face.part} gets {share:.2f} of the plastic that its room on earlier parts is to have, "
+                f"{LEAST_TOLD:g} to {MOST_TOLD:g} are expected"
+            )
+            yield at_row(program, face.row, "warning", "room", message)
 
 
 def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Interface]:
@@ -104,9 +124,8 @@ def _interface(
     below_mm = tops(_bars(deposited, earlier[near], turn, ups, mm3), lattice)
     height = float(np.median(deposited.height_mm[first]))
     wide = layer._replace(half=0.5 * deposited.width_mm[first])
-    bead = laid(wide, np.ones(len(first)), lattice) > 0.0
-    walls = program.rows_of_types(*WALLS)[deposited.rows[first]]
-    section = bead | inside_loops(_loops(wide, walls, deposited.rows[first]), lattice)
+    bead = tops(wide, lattice) > NOTHING
+    section = bead | inside_loops(_outer_loops(wide, program, deposited.rows[first]), lattice)
     room_mm = np.maximum(tip_mm - below_mm, 0.0)
     touching = room_mm < NEAR * max(height, 0.2)
     return Interface(
@@ -123,11 +142,12 @@ def _interface(
 
 
 def _run_in(deposited: Beads, first: Indices, mm3: Floats, spare_mm3: float) -> Floats:
-    """(m,) what the first strokes of a layer have beyond the others, up to what oozed while the table turned: that is missing
-    in the nozzle and fills no room."""
-    usual = deposited.width_mm[first] * deposited.height_mm[first] * deposited.length_mm[first]
-    share = float(np.median(mm3 / np.maximum(usual, 1e-9)))
-    beyond = np.maximum(mm3 - RICH * share * usual, 0.0).cumsum()
+    """(m,) what the first strokes of a layer have beyond its leanest ones, up to what oozed while the table turned: that is
+    missing in the nozzle and fills no room.
+    """
+    told = deposited.width_mm[first] * deposited.height_mm[first] * deposited.length_mm[first]
+    lean = float(np.quantile(mm3 / np.maximum(told, 1e-9), LEAN))
+    beyond = np.maximum(mm3 - RICH * lean * told, 0.0).cumsum()
     return np.diff(np.minimum(beyond, spare_mm3), prepend=0.0)
 
 
@@ -138,15 +158,15 @@ def _bars(deposited: Beads, which: Indices, turn: Floats, ups: Floats, mm3: Floa
     return Bars(begin, end, ups[which] @ turn.T, 0.5 * mm3[which] / length / height, height)
 
 
-def _loops(bars: Bars, walls: Mask, rows: Indices) -> Floats:
-    """(n, 4) sides of the closed ways that walls take."""
-    sides = []
-    at = np.flatnonzero(walls)
-    breaks = np.flatnonzero((np.diff(rows[at]) != 1) | (np.abs(bars.begin[at[1:]] - bars.end[at[:-1]]).max(axis=1) > 1e-6)) + 1
-    for way in np.split(at, breaks):
-        if len(way) < 3:
-            continue
-        gap = bars.begin[way[0], :2] - bars.end[way[-1], :2]
+def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
+    """(n, 4) sides of the closed ways that outer walls take, pieces of them that hang over included."""
+    outer, sides = program.rows_of_types(Kind.OUTER_WALL.value)[rows], []
+    at = np.flatnonzero(program.rows_of_types(*AT_THE_EDGE)[rows])
+    if not len(at):
+        return np.zeros((0, 4))
+    apart = np.abs(bars.begin[at[1:]] - bars.end[at[:-1]]).max(axis=1) > 1e-6
+    for way in np.split(at, np.flatnonzero((np.diff(rows[at]) != 1) | apart) + 1):
+        gap = bars.begin[way[0], :2] - bars.end[way[-1], :2] if len(way) > 2 and outer[way].any() else np.full(2, np.inf)
         if np.hypot(*gap) <= 2.0 * bars.half[way[0]]:
             sides.append(np.hstack([bars.begin[way, :2], bars.end[way, :2]]))
             sides.append(np.hstack([bars.end[way[-1], :2], bars.begin[way[0], :2]])[None])
@@ -154,8 +174,8 @@ def _loops(bars: Bars, walls: Mask, rows: Indices) -> Floats:
 
 
 def wall_edges(face: Interface) -> tuple[Mask, Floats]:
-    """Of places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to their middle, and
-    (n,) how far inside their outer edge it ends, mm; inf where it is farther than FAR_MM.
+    """Of places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to them near their
+    middle, and (n,) how far inside their outer edge it ends, mm; inf where it is farther than FAR_MM.
     """
     walls, side = face.walls, face.walls.end[:, :2] - face.walls.begin[:, :2]
     length = np.hypot(*side.T)
@@ -172,7 +192,8 @@ def wall_edges(face: Interface) -> tuple[Mask, Floats]:
         way = edge[outer, None] + steps[:, None] * outward[outer, None]
         there = _at(face.touching, way, face.lattice)
         last = len(steps) - 1 - there[:, ::-1].argmax(axis=1)
-        held.append(_at(face.touching, middle[outer], face.lattice))
+        beside = middle[outer, None] + np.array([-2.0 * AROUND_MM, 0.0, 2.0 * AROUND_MM])[:, None] * outward[outer, None]
+        held.append(_at(face.touching, beside, face.lattice).any(axis=1))
         ends.append(np.where(there.any(axis=1), np.maximum(-steps[last], 0.0), np.inf))
     return np.concatenate(held), np.concatenate(ends)
 

@@ -60,8 +60,10 @@ def test_a_slanted_bar_is_left_through_its_top_or_its_side(slant_deg: float) -> 
     row = top[:, int((0.02 - lattice.origin[1]) / lattice.cell)]
     over = (x > 0.0) & (x < 4.0 * along[0])
     assert row[over] == pytest.approx(-x[over] * tan(slant), abs=1e-9)
-    beyond = (x > 4.0 * along[0] + 1e-6) | (x < -0.2 * sin(slant))
+    beyond = (x > 4.5 * along[0] + 1e-6) | (x < -0.5 * along[0] - 0.2 * sin(slant))
     assert (row[beyond] == NOTHING).all()
+    ends = (x > 4.0 * along[0]) & (x < 4.49 * along[0] - 0.02)
+    assert row[ends] == pytest.approx(-x[ends] * tan(slant), abs=1e-9)
 
 
 def test_loops_enclose_their_area_less_that_of_holes() -> None:
@@ -88,7 +90,7 @@ def test_the_section_of_an_interface_is_the_face_that_the_parts_share() -> None:
 @pytest.mark.parametrize("factor", [0.7, 1.5])
 def test_a_first_layer_with_another_flow_has_so_much_more_plastic_over_its_room(factor: float) -> None:
     good, bad = faces(list(bent("generic_ac")[2])), faces(richer(2, 1, factor))
-    assert bad[0].over_room / good[0].over_room == pytest.approx(factor, rel=0.03)
+    assert bad[0].over_room / good[0].over_room == pytest.approx(factor, rel=0.06)
     assert bad[1].over_room == pytest.approx(good[1].over_room, rel=0.02)
 
 
@@ -97,10 +99,17 @@ def test_other_axes_and_firmwares_show_the_same_interfaces() -> None:
     assert contact[0] == pytest.approx(contact[1], abs=0.01)
 
 
-def test_outer_walls_of_square_blocks_on_each_other_lie_on_plastic() -> None:
+def test_outer_walls_of_blocks_on_each_other_lie_on_plastic() -> None:
     held, inside_mm = wall_edges(faces(list(bent("generic_ac")[2]))[0])
-    assert held.all()
-    assert np.quantile(inside_mm, 0.95) < 0.05
+    assert held.mean() > 0.99
+    assert np.quantile(inside_mm, 0.9) < 0.05
+
+
+@pytest.mark.parametrize("machine", ["generic_ac", "gen5x", "linuxcnc_xyzac"])
+def test_the_first_layer_of_a_part_fits_its_room_and_touches_nearly_all_of_its_face(machine: str) -> None:
+    for face in faces(list(bent(machine)[2]), machine):
+        assert 0.95 < face.beads_over_room < 1.2
+        assert face.contact > 0.95
 
 
 def test_layers_that_fit_have_what_they_need_and_one_that_does_not_is_named() -> None:
