@@ -38,6 +38,7 @@ OF_PARTS_ON_PLASTIC = {
     "interface_speed_mm_s",
     "interface_layers",
     "interface_temperature_add_c",
+    "interface_first_layer_fan",
     "interface_fan",
     "interface_extra_walls",
 }

@@ -28,18 +28,32 @@ class Interface(Frozen):
         le=4,
         description="width of all beads of a part's first layer on plastic, up to two nozzles; absent: 4/3 of line_width_mm, mm",
     )
-    interface_speed_mm_s: float = Field(25.0, gt=0, le=1000, description="speed of a part's first layer on plastic, mm/s")
+    interface_speed_mm_s: float = Field(
+        25.0,
+        gt=0,
+        le=1000,
+        description="speed of a part's first layer on plastic, mm/s: as on a plate, slow beads are pressed on evenly",
+    )
     interface_layers: int = Field(
         3, ge=1, le=100, description="layers of a part on plastic that get the interface's temperature and fan"
     )
     interface_temperature_add_c: float = Field(
-        5.0,
+        10.0,
         ge=0,
         le=50,
-        description="how much hotter a part's layers on plastic are printed, so that they weld to what has cooled, deg C",
+        description="how much hotter a part's layers on plastic are printed, deg C; asked for before the table turns and waited "
+        "for after it. A bond welds as long as it is hot, seconds (Ai and Vogt, doi s40964-022-00275-w); heat above the glass "
+        "transition added 15 % in PA-CF (PMC7284967)",
+    )
+    interface_first_layer_fan: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="factor on the part fan in a part's first layer on plastic: what is blown on is cold before it has welded "
+        "(Ai and Vogt, doi s40964-022-00275-w)",
     )
     interface_fan: float = Field(
-        0.3, ge=0, le=1, description="factor on the part fan in a part's layers on plastic: air chills the bond"
+        0.3, ge=0, le=1, description="factor on the part fan in the other layers of a part on plastic: air chills the bond"
     )
     interface_extra_walls: int = Field(
         0,
