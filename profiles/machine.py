@@ -19,6 +19,7 @@ else:
 LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright parts
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
 GCODE = "gcode"  # of a text in the schema: lines of G-code
+STEADY_S = 10.0  # a nozzle has to be at its heat so long before a firmware goes on
 Block = Annotated[str, Field(json_schema_extra={"format": GCODE})]
 Pixels = Annotated[int, Field(ge=16, le=1024)]
 
@@ -177,6 +178,12 @@ class Machine(Frozen):
         "the nozzle is full and clean, mm; 0: none, or the start block has one itself",
     )
     nozzle_limit_c: float = Field(300.0, gt=0, le=600, description="greatest nozzle temperature, deg C")
+    nozzle_heating_c_s: float = Field(
+        1.5,
+        gt=0,
+        le=50,
+        description="how fast the nozzle gets hotter when it is near the heat of printing, deg C/s: by it waiting is estimated",
+    )
     bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed")
     thumbnails_px: list[tuple[Pixels, Pixels]] = Field(
         default=[], max_length=4, description="width and height of the pictures in the G-code's head, pixels; web pages show them"
@@ -184,6 +191,12 @@ class Machine(Frozen):
     uncalibrated: list[str] = Field(default=[], description="keys whose values no source gives; the dry run names them")
     sources: dict[str, str] = Field(default={}, description="for a key or a table of keys: where its value comes from")
     gcode: Blocks
+
+    def heating_s(self, rise_c: float, since_s: float = 0.0) -> float:
+        """Seconds of waiting for a nozzle that was to be so much hotter since_s ago: for the rise, and for the time that Marlin's
+        M109 wants it steady (Configuration.h: TEMP_RESIDENCY_TIME); other firmwares wait no longer.
+        """
+        return max(rise_c / self.nozzle_heating_c_s - since_s, 0.0) + STEADY_S if rise_c > 0.0 else 0.0
 
     @property
     def tilts(self) -> bool:

@@ -34,9 +34,11 @@ OF_THE_PRINT = (
 OF_PARTS_ON_PLASTIC = {
     "interface_overlap",
     "interface_flow",
+    "interface_line_width_mm",
     "interface_speed_mm_s",
     "interface_layers",
     "interface_temperature_add_c",
+    "interface_first_layer_fan",
     "interface_fan",
     "interface_extra_walls",
 }

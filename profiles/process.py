@@ -15,6 +15,7 @@ HEIGHTS = ("layer_height_mm", "first_layer_height_mm")
 WIDTHS = (
     "line_width_mm",
     "first_layer_line_width_mm",
+    "interface_line_width_mm",
     "outer_wall_line_width_mm",
     "top_skin_line_width_mm",
     "infill_line_width_mm",

@@ -15,6 +15,7 @@ from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: what two half circles leave of their square, as in PrusaSlicer's Flow
+INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin bead so wide stays under the flat of the tip
 EVEN_MM = 0.03  # widths that differ by less are one
 PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSlicer's resolution of G-code
 
@@ -157,6 +158,13 @@ def first_layer_process(process: Process) -> Process:
     if process.first_layer_line_width_mm is None:
         return process
     return with_line_width(process.model_copy(update=dict.fromkeys(WIDTHS)), process.first_layer_line_width_mm)
+
+
+def interface_process(process: Process) -> Process:
+    """The process of a first layer on plastic, whose beads all have one width."""
+    width_mm = process.interface_line_width_mm or INTERFACE_WIDTH * process.line_width_mm
+    more = process.interface_extra_walls if process.walls else 0
+    return with_line_width(process.model_copy(update=dict.fromkeys(WIDTHS) | {"walls": process.walls + more}), width_mm)
 
 
 def outer_wall_width_mm(process: Process) -> float:

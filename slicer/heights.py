@@ -46,19 +46,17 @@ def layer_heights(mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: 
     roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top and roof_mm >= process.least_layer_height_mm:
         pedestal = equal_heights(roof_mm, process, True, nozzle_mm)
-        return pedestal + _heights_from(
-            mesh, process, nozzle_mm, _Bottom(pedestal_mm, pedestal_mm, process.first_layer_height_mm)
-        )
+        return pedestal + _heights_from(mesh, process, nozzle_mm, _Bottom(pedestal_mm, process.first_layer_height_mm))
     return _heights_from(mesh, process, nozzle_mm, _bottom(process, on_platform))
 
 
 def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm: float) -> Heights:
     """Equal layers of a part that reaches from its base plane up to top_mm.
 
-    A part on plastic begins pressed into it by the interface overlap: the tip of layer i = 1, 2, ... is at
-    i * height - overlap. Each section is taken in the middle of what its layer fills above the base plane. The last
-    layer meets the top: it is lower, or, where that would make it lower than least_layer_height_mm or a quarter layer, the
-    last few share what remains. A part lower than the least layer is one of that height.
+    A part on plastic begins with a layer that is lower by the interface overlap: its bead is as high as the room between its tip
+    and the base plane. Each section is taken in the middle of its layer. The last layer meets the top: it is lower, or, where
+    that would make it lower than least_layer_height_mm or a quarter layer, the last few share what remains. A part lower than
+    the least layer is one of that height.
     Raises SliceError for a part that is too high to be meant.
 
     >>> equal_heights(0.9, Process(name="example", first_layer_height_mm=0.3), True, 0.4).tip_mm.round(6).tolist()
@@ -70,18 +68,24 @@ def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm:
 
 @dataclass(frozen=True)
 class _Bottom:
-    """from_mm: where the first layer begins; base_mm: where the mesh does; first_mm: height of that layer."""
+    """from_mm: where the first layer begins; first_mm: its height."""
 
     from_mm: float
-    base_mm: float
     first_mm: float
 
 
 def _bottom(process: Process, on_platform: bool) -> _Bottom:
-    """On plastic the first layer is pressed in."""
-    if on_platform:
-        return _Bottom(0.0, 0.0, process.first_layer_height_mm)
-    return _Bottom(-process.interface_overlap * process.layer_height_mm, 0.0, process.layer_height_mm)
+    return _Bottom(0.0, process.first_layer_height_mm if on_platform else interface_height_mm(process))
+
+
+def interface_height_mm(process: Process) -> float:
+    """Height of a first layer on plastic: a layer's less the overlap, no lower than the least layer.
+
+    >>> interface_height_mm(Process(name="example", layer_height_mm=0.2, interface_overlap=0.25))
+    0.15
+    """
+    least = min(process.least_layer_height_mm, process.layer_height_mm)
+    return max((1.0 - process.interface_overlap) * process.layer_height_mm, least)
 
 
 def _heights_from(mesh: Mesh, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
@@ -95,11 +99,11 @@ def _heights_from(mesh: Mesh, process: Process, nozzle_mm: float, bottom: _Botto
     rest = top - bottom.from_mm - bottom.first_mm - sum(thick)
     if rest > 1e-6:
         thick = _spread(thick, rest, least, process.most_layer_height_mm)
-    return _stack_layers([bottom.first_mm, *thick], bottom.from_mm, bottom.base_mm, top)
+    return _stack_layers([bottom.first_mm, *thick], bottom.from_mm, top)
 
 
 def _equal_from(top_mm: float, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
-    """The same of equal layers. What is no higher than a layer and a little is one layer, pressed in less deep if need be."""
+    """The same of equal layers. What is no higher than a layer and a little is one layer."""
     from_mm, first_mm = bottom.from_mm, bottom.first_mm
     layer, total, most = process.layer_height_mm, top_mm - from_mm, min(process.highest_layer_mm, nozzle_mm)
     count = max(floor((total - first_mm) / layer + 1e-9), 0)
@@ -112,18 +116,15 @@ def _equal_from(top_mm: float, process: Process, nozzle_mm: float, bottom: _Bott
         thick.append(rest)
     elif count:
         thick = _spread(thick, rest, least, most)
-    elif from_mm < bottom.base_mm:
-        first_mm = min(total, most)
-        from_mm = top_mm - first_mm
     else:
         first_mm, *thick = _spread([first_mm], rest, least, most)
-    return _stack_layers([first_mm, *thick], from_mm, bottom.base_mm, top_mm)
+    return _stack_layers([first_mm, *thick], from_mm, top_mm)
 
 
-def _stack_layers(thick_mm: list[float], from_mm: float, base_mm: float, top_mm: float) -> Heights:
-    """Layers of those heights on each other, cut in the middle of what they fill between base and top."""
+def _stack_layers(thick_mm: list[float], from_mm: float, top_mm: float) -> Heights:
+    """Layers of those heights on each other, cut in the middle of what they fill below the top."""
     thick, tip = np.array(thick_mm), from_mm + np.cumsum(thick_mm)
-    return Heights(tip, thick, 0.5 * (np.maximum(tip - thick, base_mm) + np.minimum(tip, top_mm)))
+    return Heights(tip, thick, 0.5 * (tip - thick + np.minimum(tip, top_mm)))
 
 
 def _check(top_mm: float, process: Process) -> None:

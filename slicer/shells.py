@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from profiles.process import Process
-from slicer.bead import Bead, first_layer_process, with_line_width
+from slicer.bead import Bead, first_layer_process, interface_process, with_line_width
 from slicer.fill.bridge import Bridge
 from slicer.fill.infill import pattern_density
 from slicer.fill.region import Region, regions
@@ -82,7 +82,6 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
 
 
 def layer_processes(process: Process, on_platform: bool, layers: int) -> list[Process]:
-    """The settings of every layer: the first has widths of its own on the platform; on plastic more walls, if it has any."""
-    more = process.interface_extra_walls if process.walls else 0
-    first = first_layer_process(process) if on_platform else process.model_copy(update={"walls": process.walls + more})
+    """The settings of every layer: the first has widths of its own, and on plastic more walls, if it has any."""
+    first = first_layer_process(process) if on_platform else interface_process(process)
     return [first if i == 0 else process for i in range(layers)]

@@ -124,7 +124,8 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None) 
     fixed: Mapping[Kind, float] | None = None
     flow, fan, add_c = material.flow, 1.0, 0.0
     if not on_platform and index < process.interface_layers:
-        fan, add_c = process.interface_fan, process.interface_temperature_add_c
+        fan = process.interface_fan if index else process.interface_first_layer_fan
+        add_c = process.interface_temperature_add_c
     if index == 0:
         fixed = first_layer_speeds(process, on_platform)
         flow *= process.first_layer_flow if on_platform else process.interface_flow

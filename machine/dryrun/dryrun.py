@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun import clearance, extrusion, heat, layering, motion, own_comments, placement, sequence
+from machine.dryrun.balance import interfaces
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
@@ -29,7 +30,8 @@ MOST_MM = 10_000.0  # five times what the largest printers reach
 class DryRun:
     """What a G-code text does on a machine.
 
-    times_s: (n,) seconds of each row of program; dwell_s: waiting told by G4 (heating and homing are not counted).
+    times_s: (n,) seconds of each row of program; waits: line and seconds of what G4 tells and of heating in the midst of the
+    print (what comes before it, and homing, are not counted).
     segments_mm: (m, 2, 3) deposited segments, workpiece frame; segment_row: (m,) their rows in program, which hold line,
     part, layer, type, width and height; segment_mm3: (m,) their volumes. contacts: what lay under each row; None where
     it was known before what there is to find.
@@ -37,13 +39,18 @@ class DryRun:
 
     program: ParsedProgram
     times_s: Floats
-    dwell_s: float
+    waits: tuple[tuple[int, float], ...]
     segments_mm: Floats
     segment_row: NDArray[np.int64]
     segment_mm3: Floats
     contacts: Contacts | None
     findings: tuple[Finding, ...]
     letters: tuple[str, ...]
+
+    @property
+    def dwell_s(self) -> float:
+        """Seconds of all waits."""
+        return sum(seconds for _, seconds in self.waits)
 
     @property
     def time_s(self) -> float:
@@ -79,10 +86,12 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
         deposited = beads_of(program, segments, rows, profile)
         contacts = replay(program, deposited, profile)
         known = _findings(text, program, deposited, contacts, profile)
+    times_s = move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration)
+    dwells = [(event.line, event.value) for event in program.events if event.code == "G4"]
     return DryRun(
         program=program,
-        times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration),
-        dwell_s=sum(event.value for event in program.events if event.code == "G4"),
+        times_s=times_s,
+        waits=(*dwells, *heat.waits(program, times_s, machine)),
         segments_mm=segments,
         segment_row=rows,
         segment_mm3=program.e_mm[rows] * area,
@@ -103,6 +112,7 @@ def _findings(
         *placement.findings(program, deposited, contacts),
         *layering.findings(program, deposited, contacts),
         *extrusion.findings(program, deposited, profile),
+        *interfaces.findings(program, deposited, profile),
         *sequence.findings(program, profile),
         *own_comments.findings(text, program, profile),
         *placement.off_plate(program, segments, rows, profile),

@@ -8,6 +8,8 @@ import numpy as np
 from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
 from machine.reader.levels import fan_shares, temperatures
 from machine.reader.parsed import MoveKind, ParsedProgram
+from mdp.mesh import Floats
+from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -31,6 +33,23 @@ def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Findin
         *_profile(program, profile),
         *_unknown_commands(program),
     ]
+
+
+def waits(program: ParsedProgram, times_s: Floats, machine: Machine) -> list[tuple[int, float]]:
+    """(line, seconds) of every wait for a hotter nozzle in the midst of the print; times_s: (n,) of the rows.
+
+    How long the first one takes is not known: nobody tells how cold the machine was.
+    """
+    first = int(np.argmax(program.kind == MoveKind.EXTRUDE)) if len(program.kind) else 0
+    waited, target_c, from_c, asked = [], 0.0, 0.0, 0
+    for event in program.events:
+        if event.code not in ("M104", "M109"):
+            continue
+        if event.value != target_c:
+            from_c, target_c, asked = target_c, event.value, event.row
+        if event.code == "M109" and event.row > first:
+            waited.append((event.line, machine.heating_s(target_c - from_c, float(times_s[asked : event.row].sum()))))
+    return waited
 
 
 def _cold(program: ParsedProgram) -> Iterable[Finding]:
@@ -133,7 +152,9 @@ def _without_fan(part: int, profile: Profile) -> int:
     if part <= 1:
         return profile.material.fan_off_layers
     process = profile.of_part(part).process
-    return process.interface_layers if process.interface_fan == 0.0 else 0
+    if process.interface_fan == 0.0:
+        return process.interface_layers
+    return 1 if process.interface_first_layer_fan == 0.0 else 0
 
 
 def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:

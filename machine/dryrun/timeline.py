@@ -16,7 +16,7 @@ class Timeline:
         self.letters = run.letters
         self._line, self._ends = program.line, program.end
         self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
-        self._waits = [(event.line, event.value) for event in program.events if event.code == "G4"]
+        self._waits = list(run.waits)
         laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
         self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
 
@@ -26,7 +26,7 @@ class Timeline:
         return {} if row < 0 else dict(zip(self.letters, self._ends[row].tolist(), strict=False))
 
     def remaining_s(self, file_line: int) -> float:
-        """How long moves and dwells after a line of the program take; heating and homing are not counted."""
+        """How long moves and waits after a line of the program take; heating before the print and homing are not counted."""
         waits_s = sum(wait_s for line, wait_s in self._waits if line > file_line)
         return float(self._done_s[-1] - self._done_s[self._rows(file_line)]) + waits_s
 

@@ -46,12 +46,21 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
 
 
 def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
-    """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end; filament in mm."""
+    """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end; filament in mm.
+
+    Counted with the waits for hotter layers after turns of the table.
+    """
     machine = profile.machine
     straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
     stop = np.zeros(len(straight.speed), dtype=np.bool_)
     times = move_times(straight.end - straight.start, straight.speed, stop, machine, straight.acceleration)
     seconds = np.bincount(straight.move, weights=times, minlength=len(program.moves))
+    heat_c = profile.material.first_layer_nozzle_c
+    for index, move in enumerate(program.moves):
+        if isinstance(move, Reorient):
+            seconds[index] += machine.heating_s(_coming_c(program, index, profile) - heat_c, float(seconds[index]))
+        elif isinstance(move, BeginLayer):
+            heat_c = _nozzle_c(move, profile)
     elapsed: Floats = np.concatenate([[0.0], np.cumsum(seconds)])
     return elapsed, float(straight.end[:, 5].max(initial=0.0))
 
@@ -78,8 +87,11 @@ def _lines(program: MachineProgram, profile: Profile, elapsed: Floats, filament_
             pen.filament_mm -= move.filament_mm
             yield f"G1{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
-            yield from _heat_ahead(program, index, profile, pen)
+            ahead = list(_heat_ahead(program, index, profile, pen))
+            yield from ahead
             yield from _reorient(move, next_part, pen)
+            if ahead:
+                yield pen.dialect.nozzle_wait.format(number(pen.nozzle_c))
         elif isinstance(move, Pause):
             yield from _pause(move, pen)
         elif isinstance(move, BeginPart):
@@ -200,10 +212,16 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
 
 
 def _heat_ahead(program: MachineProgram, index: int, profile: Profile, pen: Pen) -> Iterator[str]:
-    """Before the turn at `index`, the heat of a layer after it that is to be hotter: it takes as long as a turn to come."""
-    coming = next((move for move in islice(program.moves, index, None) if isinstance(move, BeginLayer)), None)
-    if coming is not None and (wanted := _nozzle_c(coming, profile)) > pen.nozzle_c:
+    """Before the turn at `index`, the heat of the layer after it where that is to be hotter: some of it comes in the meantime."""
+    wanted = _coming_c(program, index, profile)
+    if wanted > pen.nozzle_c:
         yield from _set_nozzle(wanted, pen)
+
+
+def _coming_c(program: MachineProgram, index: int, profile: Profile) -> float:
+    """How hot the next layer after a move is printed; 0 where none is."""
+    coming = next((move for move in islice(program.moves, index, None) if isinstance(move, BeginLayer)), None)
+    return 0.0 if coming is None else _nozzle_c(coming, profile)
 
 
 def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:

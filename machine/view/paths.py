@@ -32,11 +32,10 @@ NONE: dict[str, Column] = {
 
 
 def end_times_s(run: DryRun) -> Floats:
-    """(n,) seconds from the start to the end of each row, the waiting that G4 tells before it included."""
+    """(n,) seconds from the start to the end of each row, the waits before it included."""
     waits = np.zeros(len(run.times_s) + 1)
-    for event in run.program.events:
-        if event.code == "G4":
-            waits[min(event.row, len(run.times_s))] += event.value
+    for line, seconds in run.waits:
+        waits[np.searchsorted(run.program.line, line)] += seconds
     ends: Floats = np.cumsum(run.times_s + waits[:-1])
     return ends
 

@@ -8,6 +8,7 @@ from profiles.process import WIDTHS, Process
 
 NOZZLE_TEMPERATURES = ("nozzle_c", "first_layer_nozzle_c", "homing_nozzle_c", "standby_c")
 LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diameters
+MOST_INTERFACE_WIDTH = 2.0  # thin beads on plastic: beyond the flat around the orifice nothing presses them down
 
 
 def too_hot(material: Material, machine: Machine) -> Iterable[str]:
@@ -24,11 +25,10 @@ def unfit_for_nozzle(process: Process, nozzle_mm: float) -> Iterable[str]:
     """Lines and layers of the process that the nozzle cannot print; nozzle_mm: its diameter."""
     for key in WIDTHS:
         width_mm = getattr(process, key)
-        if width_mm is not None and not LEAST_WIDTH * nozzle_mm <= width_mm <= MOST_WIDTH * nozzle_mm:
-            yield (
-                f"process.{key} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
-                f"{LEAST_WIDTH * nozzle_mm:g} to {MOST_WIDTH * nozzle_mm:g} mm"
-            )
+        least_mm = LEAST_WIDTH * nozzle_mm
+        most_mm = (MOST_INTERFACE_WIDTH if key == "interface_line_width_mm" else MOST_WIDTH) * nozzle_mm
+        if width_mm is not None and not least_mm <= width_mm <= most_mm:
+            yield f"process.{key} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of {least_mm:g} to {most_mm:g} mm"
     for key in process.heights:
         height_mm = getattr(process, key)
         if height_mm > nozzle_mm:

@@ -61,9 +61,12 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
 
 
 def _estimate_part(part: SampledPart, profile: Profile, top_mm: float) -> Estimate:
-    """A part and the turn of the table before it; top_mm: of the whole print."""
+    """A part, the turn of the table before it and the wait for its heat; top_mm: of the whole print."""
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
-    total = Estimate(0.0, 0.0, 0.0) if part.on_platform else Estimate(TURN_S, profile.material.prime_extra_mm, 0.0)
+    total = Estimate(0.0, 0.0, 0.0)
+    if not part.on_platform:
+        heating_s = profile.machine.heating_s(profile.process.interface_temperature_add_c, TURN_S)
+        total = Estimate(TURN_S + heating_s, profile.material.prime_extra_mm, 0.0)
     for layer, stands_for in zip(part.choice.layers.tolist(), part.choice.counts.tolist(), strict=True):
         speeds = _layer_speeds(part, layer, profile)
         own = _part_strokes(part, layer, speeds)

@@ -14,6 +14,7 @@ from mdp.cut import mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
+from slicer.bead import interface_process
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset
 from slicer.interface.interface import BELOW_MM, frame_change
@@ -28,8 +29,8 @@ SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
 def grooves(part: Part, process: Process) -> Polygons:
     """Grooves under a part's base, in its frame: stripes along x that end before the walls, so that none is seen."""
     base = clean(cross_sections(part.in_part_frame(), np.array([BELOW_MM]))[0])
-    walls = process.walls + process.interface_extra_walls
-    inside = offset(base, -(walls + 1) * process.line_width_mm) if not base.is_empty() else base
+    first = interface_process(process)
+    inside = offset(base, -(first.walls + 1) * first.line_width_mm) if not base.is_empty() else base
     if inside.is_empty():
         return inside
     x0, y0, x1, y1 = inside.bounds()

@@ -16,8 +16,8 @@ LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, float]:
     """Plastic, mm3, that a part has more of than the uncut model in its place, by the part whose base plane is nearest.
 
-    Walls and skins on the faces of cuts where there would be sparse infill, and what its first layer on plastic carries beyond
-    the room that it has.
+    Walls and skins on the faces of cuts where there would be sparse infill, and what the flow of its first layer on
+    plastic adds to the room that it has.
     """
     part, process, heights = sections.part, sections.process, sections.heights
     planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
@@ -33,7 +33,7 @@ def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, fl
                 more[index] += (1.0 - process.infill_density) * float(height_mm) * area
     if not sections.on_platform:
         filled = sections.own[0].area() - (1.0 - process.infill_density) * regions[0].sparse.area()
-        more[part.index] += filled * (process.interface_flow * float(heights.height_mm[0]) - float(heights.tip_mm[0]))
+        more[part.index] += filled * (process.interface_flow - 1.0) * float(heights.height_mm[0])
     return more
 
 

@@ -21,11 +21,12 @@ def test_every_kind_of_bead_has_its_width() -> None:
         assert {path.width_mm for path in of_kind(sliced, kind)} == {width}
 
 
-def test_all_beads_of_part_ones_first_layer_have_one_width_and_those_of_later_parts_do_not() -> None:
-    chosen = profile("process.first_layer_line_width_mm=0.6", *BY_KIND)
+def test_all_beads_of_a_parts_first_layer_have_one_width_on_the_platform_and_another_one_on_plastic() -> None:
+    chosen = profile("process.first_layer_line_width_mm=0.6", "process.interface_line_width_mm=0.7", *BY_KIND)
     base, top = (slice_part(part, chosen) for part in cut(box(10, 10, 6), ((0.0, 0.0, 1.0), 3.0)))
     assert {path.width_mm for path in base.layers[0].paths if path.kind is not Kind.GAP} == {0.6}
-    assert {path.width_mm for path in top.layers[0].paths if path.kind is Kind.OUTER_WALL} == {0.35}
+    assert {path.width_mm for path in top.layers[0].paths if path.kind is not Kind.GAP} == {0.7}
+    assert {path.width_mm for path in top.layers[1].paths if path.kind is Kind.OUTER_WALL} == {0.35}
 
 
 @pytest.mark.parametrize("width", [0.3, 0.7])

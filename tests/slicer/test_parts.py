@@ -46,7 +46,8 @@ def test_a_part_is_handed_over_as_soon_as_it_is_sliced(processes: int) -> None:
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_part_that_gives_no_path_and_needs_no_floor_is_told_from_any_process(processes: int) -> None:
-    nothing = profile("process.walls=0", "process.infill_density=0", "process.top_layers=0", "process.bottom_layers=0")
+    layers = ("top_layers", "bottom_layers", "interface_bottom_layers")
+    nothing = profile("process.walls=0", "process.infill_density=0", *(f"process.{key}=0" for key in layers))
     with pytest.raises(SliceError, match="part 3 gives no path at all"):
         slice_parts(cut(box(10, 10, 24), *PLANES), nothing, processes=processes)
 

@@ -9,6 +9,7 @@ from math import hypot
 Lines = list[str]
 Edit = Callable[[Lines], Lines]
 STROKE = re.compile(r"G1 (?=.*[XY]).*[EU]\d")
+STROKES = "G1 .*[XY].*E[0-9]"
 TRAVEL = re.compile(r"G0 (?=.*X)(?!.*[ACUV])")
 HEAT_OFF = re.compile(r"M104 [SP]0$")
 
@@ -266,10 +267,12 @@ FAULTS = (
     Fault("a lift that is not lowered again", "gap", 1, 15, insert(amid(1, 15), "G91", "G0 Z0.4", "G90", "M83")),
     Fault("a layer printed twice", "filled", 1, 11, repeated(layers(1, 10))),
     Fault("two layers in the wrong order", "order", 1, 11, swapped_layers(1, 10)),
-    Fault("a part at 60 % flow", "extrusion", 2, 1, on(part(2), word("E", lambda e: 0.6 * e, "G1 .*[XY].*E[0-9]"))),
-    Fault("a part at 150 % flow", "extrusion", 3, 1, on(part(3), word("E", lambda e: 1.5 * e, "G1 .*[XY].*E[0-9]"))),
-    Fault("a layer at 80 % flow", "extrusion", 1, 18, on(layers(1, 18), word("E", lambda e: 0.8 * e, "G1 .*[XY].*E[0-9]"))),
-    Fault("M221 S60 for a part", "extrusion", 2, 1, insert(nth(";PART:2"), "M221 S60")),
+    Fault("a part at 60 % flow", "extrusion", 2, 2, on(part(2), word("E", lambda e: 0.6 * e, STROKES))),
+    Fault("a first layer at 60 % flow", "room", 2, 1, on(layers(2, 1), word("E", lambda e: 0.6 * e, STROKES)), "warning"),
+    Fault("a first layer twice as full", "room", 3, 1, on(layers(3, 1), word("E", lambda e: 2.0 * e, STROKES)), "warning"),
+    Fault("a part at 150 % flow", "extrusion", 3, 1, on(part(3), word("E", lambda e: 1.5 * e, STROKES))),
+    Fault("a layer at 80 % flow", "extrusion", 1, 18, on(layers(1, 18), word("E", lambda e: 0.8 * e, STROKES))),
+    Fault("M221 S60 for a part", "extrusion", 2, 2, insert(nth(";PART:2"), "M221 S60")),
     Fault("40 travels that ooze", "extrusion", 1, 0, extruding_travels(lambda mm: 0.05)),
     Fault("40 travels that extrude", "extruding-travel", 1, 0, extruding_travels(lambda mm: 0.035 * mm)),
     Fault("no lift before a turn", "low-travel", 1, 48, on(lambda t: [before_turn(t, 1)], lambda _: None)),
@@ -296,7 +299,7 @@ FAULTS = (
     Fault("another turn", "pose", 2, 1, on(turn_to(2), turned_on)),
     Fault("a tilt to the other side", "pose", 2, 1, on(turn_to(2), tilted_back)),
     Fault("filament while the table turns", "turning-stroke", 1, 48, on(turn_to(2), lambda line: line + " E1")),
-    Fault("speeds ten times as high", "flow", 2, 1, on(part(2), word("F", lambda f: 10 * f, "G1 .*[XY].*E[0-9]")), "warning"),
+    Fault("speeds ten times as high", "flow", 2, 1, on(part(2), word("F", lambda f: 10 * f, STROKES)), "warning"),
     Fault("M220 S1000", "axis-speed", 1, 0, insert(IN_1_20, "M220 S1000"), "warning"),
     Fault("relative moves from a layer on", "axis-limit", 1, 0, insert(IN_1_20, "G91")),
     Fault("inches from a layer on", "gap", 1, 20, insert(IN_1_20, "G20")),

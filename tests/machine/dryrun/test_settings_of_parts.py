@@ -14,10 +14,10 @@ def codes(edit: Edit, **of_part_2: float) -> set[str]:
     return {f.code for f in run.errors} - {"contents"}
 
 
-def test_more_flow_on_an_interface_is_asked_for_by_its_part():
-    more = on(layers(2, 1), word("E", lambda e: 1.4 * e, "G1 .*[XY].*E[0-9]"))
-    assert codes(more) == {"extrusion"}
-    assert codes(more, interface_flow=1.4 * 1.05) == set()
+def test_less_flow_on_an_interface_is_asked_for_by_its_part():
+    less = on(layers(2, 1), word("E", lambda e: 0.5 * e, "G1 .*[XY].*E[0-9]"))
+    assert codes(less) == {"extrusion"}
+    assert codes(less, interface_flow=0.5 * 1.1) == set()
 
 
 def test_a_hotter_interface_is_asked_for_by_its_part():

@@ -67,12 +67,12 @@ def test_it_goes_no_faster_than_the_hot_end_melts() -> None:
     assert rate == pytest.approx(2.0)
 
 
-def test_a_part_on_plastic_begins_inside_with_its_infill() -> None:
+def test_a_part_on_plastic_begins_inside_with_its_skin() -> None:
     keys = load(settings=BARE)
     base, top = cut(box(20, 20, 12), ((0, 0, 1), 6.0))
     first, second = slice_part(top, keys, [base]).layers[:2]
-    assert first.paths[0].kind is Kind.INFILL
-    assert second.paths[0].kind is not Kind.INFILL
+    assert first.paths[0].kind is Kind.SKIN
+    assert second.paths[0].kind is not Kind.SKIN
 
 
 @pytest.mark.parametrize("kinds", [(Kind.OUTER_WALL, Kind.INNER_WALL), (Kind.SUPPORT, Kind.INFILL)])

@@ -89,9 +89,11 @@ def test_an_overhang_gets_bottom_layers() -> None:
     assert by_layer[5] == (0, 0, 400)
 
 
-def test_a_part_on_plastic_is_sparse_at_once_and_solid_where_it_is_asked_for() -> None:
+def test_a_part_on_plastic_has_as_many_solid_layers_as_it_is_asked_for() -> None:
     tower = [square(10)] * 6
-    assert areas(tower, beneath=square(10), top=1)[:2] == [(0, 0, 100), (0, 0, 100)]
+    assert areas(tower, beneath=square(10), top=1)[:2] == [(0, 100, 0), (0, 0, 100)]
+    sparse = alone(tower, tower, square(10), process(top=1, interface_bottom_layers=0))
+    assert [region.sparse.area() for region in sparse[:2]] == [100, 100]
     by_layer = alone(tower, tower, square(10), process(top=1, interface_bottom_layers=2))
     assert [region.sparse.area() for region in by_layer] == [0, 0, 100, 100, 100, 0]
 

@@ -130,14 +130,13 @@ def test_with_as_many_walls_on_a_cut_as_outside_all_run_round() -> None:
 
 
 def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
-    """A floor of two layers where the walls leave room, three more walls in a layer pressed half into it."""
+    """A floor of two layers where the walls leave room, and on it a solid layer of 0.1 mm with a tenth more than its room."""
     under, over = (interface_mm3(both.sections, both.regions) for both in shells("cube", STRAIGHT))
     inside = (SIDE - 2 * 1.243) ** 2
     floor = 0.8 * 0.4 * inside
-    ring = inside - (SIDE - 2 * 2.464) ** 2
-    spare = (SIDE**2 - 0.8 * (inside - ring)) * (1.05 * 0.2 - 0.1)
+    within_wide_walls = (SIDE - 2 * 1.746) ** 2
     assert under == {2: pytest.approx(floor, rel=0.03)}
-    assert over == {2: pytest.approx(0.8 * 0.2 * ring + spare, rel=0.03)}
+    assert over == {2: pytest.approx(0.1 * (0.8 * within_wide_walls + 0.1 * SIDE**2), rel=0.03)}
 
 
 def test_a_model_in_one_part_has_no_interface() -> None:

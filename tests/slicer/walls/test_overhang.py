@@ -101,7 +101,9 @@ def test_cones_overhang_from_the_angle_at_which_half_a_bead_is_free(angle: float
 def test_a_part_on_plastic_overhangs_where_its_base_reaches_beyond() -> None:
     post = m3.Manifold.cube((10, 10, 10)) + m3.Manifold.cube((20, 10, 4)).translate((0, 0, 10))
     base, plate = cut(standing(post), ((0, 0, 1), 10.0))
-    first, second = slice_part(plate, profile(*BARE, "process.walls=1", "process.interface_extra_walls=0"), [base]).layers[:2]
+    first, second = slice_part(plate, profile(*BARE, "process.walls=1", "process.interface_line_width_mm=0.45"), [base]).layers[
+        :2
+    ]
     hanging = [p for p in first.paths if p.kind is Kind.OVERHANG]
     assert min(p.points[:, 0].min() for p in hanging) == pytest.approx(0.0, abs=0.1)
     assert sum(p.length_mm for p in hanging) == pytest.approx(2 * (10 - 0.225) + 10 - 0.45, abs=0.3)

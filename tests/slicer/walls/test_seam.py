@@ -172,7 +172,7 @@ def test_first_layers_on_a_section_of_their_own_shape_begin_inside() -> None:
     base, top = cut(mesh, ((0, 0, 1), 20.0))
     layers = slice_part(top, profile(*BARE, "process.interface_seam_mm=0.5"), [base]).layers
     starts = np.array([np.hypot(*next(p for p in lay.paths if p.kind is Kind.OUTER_WALL).points[0]) for lay in layers])
-    assert starts[:3] == pytest.approx(8 - 0.225 - 0.45, abs=0.05)
+    assert starts[:3] == pytest.approx([8 - 0.3 - 0.6, *[8 - 0.225 - 0.45] * 2], abs=0.05)
     assert starts[3:] == pytest.approx(8 - 0.225, abs=0.05)
 
 

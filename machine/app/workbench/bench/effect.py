@@ -31,7 +31,7 @@ UNREAD = frozenset(
         *(f"material.{key}" for key in ("retract_mm", "retract_speed_mm_s", "retract_prime_extra_mm", "wipe_mm", "coast_mm")),
         "material.pressure_advance",
         *(f"process.{key}" for key in ("name", "seam", "combing", "combing_detour_mm", "retract_travel_mm")),
-        *(f"process.{key}" for key in ("lift_mm", "lift_speed_mm_s", "interface_fan", "interface_temperature_add_c")),
+        *(f"process.{key}" for key in ("lift_mm", "lift_speed_mm_s", "interface_fan", "interface_first_layer_fan")),
         *(f"machine.gcode.{key}" for key in ("start", "end", "before_part", "after_part", "resume")),
         *(f"machine.{key}" for key in ("name", "sources", "uncalibrated", "thumbnails_px", "receive_bytes")),
         *(f"machine.{key}" for key in ("arcs", "arc_tolerance_mm", "nozzle_limit_c", "bed_limit_c", "lift_mm", "purge_mm")),
@@ -45,7 +45,7 @@ SEARCHED = frozenset(
     }
 )
 # Of a machine's keys those that only make it quicker or slower.
-PACES = ("speed_mm_s", "acceleration_mm_s2", "speed_deg_s", "acceleration_deg_s2")
+PACES = ("heating_c_s", "speed_mm_s", "acceleration_mm_s2", "speed_deg_s", "acceleration_deg_s2")
 
 
 def effect_of(key: str) -> Effect:

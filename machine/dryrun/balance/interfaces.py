@@ -1,0 +1,205 @@
+"""Interfaces: where a part stands on others: how much of its section is in contact, and the plastic that its room gets.
+
+The room of a column reaches from the tip of that first layer down to what earlier parts have left there, in the part's own
+frame: bars as high as their layers and as wide as their plastic makes them, at whatever slant they were laid.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
+from machine.dryrun.findings import Finding, at_row
+from machine.dryrun.strokes import Beads
+from machine.reader.parsed import ParsedProgram
+from mdp.mesh import Floats, Indices
+from mdp.pose import Pose, rotation
+from profiles.profile import Profile
+from slicer.paths import Kind
+
+CELL_MM = 0.05
+AT_THE_EDGE = (Kind.OUTER_WALL.value, Kind.OVERHANG.value)
+NO_PART = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value, Kind.IRONING.value)
+NEAR = 1.5  # heights of a bead: what lies farther below its tip it does not touch
+LEAST_TOLD, MOST_TOLD, LEAST_TOLD_MM2 = 0.75, 1.4, 10.0  # of all of it: steps of slanted layers leave a tenth open or taken
+LEAST, MOST = 0.9, 1.1  # plastic over room of a square millimetre that is as it should be
+LEAN, RICH = 0.1, 1.1  # the leanest tenth of a layer's beads; what has so much more makes up for what oozed
+SAMPLE_MM, FAR_MM, AROUND_MM = 0.1, 1.5, 0.05  # of looks along outer walls, and across them
+REACH_MM = 2.0  # from the plane of the tip, of plastic that can matter
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """What lies below a part's first layer; row: of its first stroke. Arrays are (nx, ny), one entry a column of the lattice.
+
+    section: what the layer's walls enclose and its beads cover; touching: where earlier parts reach up to its beads; bead:
+    where one of those lies; room, plastic: mm3 under the tip, and laid. walls: the beads that may lie at the section's edge.
+    """
+
+    part: int
+    row: int
+    lattice: Lattice
+    section: Mask
+    touching: Mask
+    bead: Mask
+    room: Floats
+    plastic: Floats
+    walls: Bars
+
+    @property
+    def area_mm2(self) -> float:
+        """Of the section."""
+        return float(self.section.sum()) * self.lattice.column_mm2
+
+    @property
+    def contact(self) -> float:
+        """Share of the section where a bead lies on an earlier part."""
+        return float((self.bead & self.touching).sum() / max(1, self.section.sum()))
+
+    @property
+    def over_room(self) -> float:
+        """Plastic over room of all of the section that has something below it."""
+        there = self.touching & self.section
+        return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
+
+    @property
+    def beads_over_room(self) -> float:
+        """Plastic over room where beads lie on something, whatever they leave open."""
+        there = self.touching & self.bead
+        return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
+
+    @property
+    def map(self) -> Floats:
+        """(nx, ny) plastic over room in the square millimetre around each column; nan outside."""
+        return over_room(self.plastic, np.where(self.touching & self.section, self.room, np.nan), self.lattice)
+
+
+def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
+    """A warning of code room for every part whose first layer has far more or less plastic than its flow puts into its room."""
+    for face in interfaces(program, deposited, profile):
+        flow = profile.of_part(face.part).process.interface_flow * profile.material.flow
+        share, touching = face.beads_over_room / flow, float((face.touching & face.section).sum()) * face.lattice.column_mm2
+        if touching >= LEAST_TOLD_MM2 and not LEAST_TOLD <= share <= MOST_TOLD:
+            message = (
+                f"the first layer of part {face.part} gets {share:.2f} of the plastic that its room on earlier parts is to have, "
+                f"{LEAST_TOLD:g} to {MOST_TOLD:g} are expected"
+            )
+            yield at_row(program, face.row, "warning", "room", message)
+
+
+def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Interface]:
+    """The interface of every part that stands on others, in print order."""
+    part, layer = program.part[deposited.rows], program.layer[deposited.rows]
+    own = ~program.rows_of_types(*NO_PART)[deposited.rows] & (part > 0)
+    filament_mm2 = pi * profile.material.diameter_mm**2 / 4.0
+    mm3, spare_mm3 = program.e_mm[deposited.rows] * filament_mm2, profile.material.prime_extra_mm * filament_mm2
+    ups = _printing_directions(program, deposited, profile)
+    for index in sorted(set(part[own].tolist()))[1:]:
+        mine = np.flatnonzero(own & (part == index))
+        first = mine[layer[mine] == layer[mine].min()]
+        turn = rotation(profile.machine, Pose(*program.end[deposited.rows[first[0]], 3:].tolist()))
+        earlier = np.flatnonzero(own & (part < index) & (deposited.rows < deposited.rows[first[0]]))
+        yield _interface(program, deposited, (first, earlier), (turn, ups, mm3, spare_mm3))
+
+
+def _printing_directions(program: ParsedProgram, deposited: Beads, profile: Profile) -> Floats:
+    """(m, 3) direction in which each bead was laid, workpiece frame."""
+    poses, which = np.unique(program.end[deposited.rows, 3:], axis=0, return_inverse=True)
+    return np.array([rotation(profile.machine, Pose(*pose))[2] for pose in poses.tolist()])[which.ravel()]
+
+
+def _interface(
+    program: ParsedProgram, deposited: Beads, which: tuple[Indices, Indices], given: tuple[Floats, Floats, Floats, float]
+) -> Interface:
+    """which: beads of the first layer, and of earlier parts; given: turn into the part's frame, ups, plastic of each bead, and
+    how much of it may make up for what has oozed.
+    """
+    (first, earlier), (turn, ups, mm3, spare_mm3) = which, given
+    layer = _bars(deposited, first, turn, ups, mm3)
+    tip_mm = float(np.median(layer.end[:, 2]))
+    lattice = lattice_over(np.concatenate([layer.begin, layer.end])[:, :2], CELL_MM)
+    near = np.abs((deposited.segments_mm[earlier] @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
+    below_mm = tops(_bars(deposited, earlier[near], turn, ups, mm3), lattice)
+    height = float(np.median(deposited.height_mm[first]))
+    wide = layer._replace(half=0.5 * deposited.width_mm[first])
+    bead = tops(wide, lattice) > NOTHING
+    section = bead | inside_loops(_outer_loops(wide, program, deposited.rows[first]), lattice)
+    room_mm = np.maximum(tip_mm - below_mm, 0.0)
+    touching = room_mm < NEAR * max(height, 0.2)
+    return Interface(
+        part=int(program.part[deposited.rows[first[0]]]),
+        row=int(deposited.rows[first[0]]),
+        lattice=lattice,
+        section=section,
+        touching=touching,
+        bead=bead,
+        room=np.where(touching, room_mm, 0.0) * lattice.column_mm2,
+        plastic=laid(wide, mm3[first] - _run_in(deposited, first, mm3[first], spare_mm3), lattice),
+        walls=Bars(*(values[program.rows_of_types(*AT_THE_EDGE)[deposited.rows[first]]] for values in wide)),
+    )
+
+
+def _run_in(deposited: Beads, first: Indices, mm3: Floats, spare_mm3: float) -> Floats:
+    """(m,) what the first strokes of a layer have beyond its leanest ones, up to what oozed while the table turned: that is
+    missing in the nozzle and fills no room.
+    """
+    told = deposited.width_mm[first] * deposited.height_mm[first] * deposited.length_mm[first]
+    lean = float(np.quantile(mm3 / np.maximum(told, 1e-9), LEAN))
+    beyond = np.maximum(mm3 - RICH * lean * told, 0.0).cumsum()
+    return np.diff(np.minimum(beyond, spare_mm3), prepend=0.0)
+
+
+def _bars(deposited: Beads, which: Indices, turn: Floats, ups: Floats, mm3: Floats) -> Bars:
+    """Some beads as bars in a turned frame, as wide as their plastic makes them at their height."""
+    begin, end = (deposited.segments_mm[which, side] @ turn.T for side in (0, 1))
+    height, length = deposited.height_mm[which], np.maximum(deposited.length_mm[which], 1e-9)
+    return Bars(begin, end, ups[which] @ turn.T, 0.5 * mm3[which] / length / height, height)
+
+
+def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
+    """(n, 4) sides of the closed ways that outer walls take, pieces of them that hang over included."""
+    outer, sides = program.rows_of_types(Kind.OUTER_WALL.value)[rows], []
+    at = np.flatnonzero(program.rows_of_types(*AT_THE_EDGE)[rows])
+    if not len(at):
+        return np.zeros((0, 4))
+    apart = np.abs(bars.begin[at[1:]] - bars.end[at[:-1]]).max(axis=1) > 1e-6
+    for way in np.split(at, np.flatnonzero((np.diff(rows[at]) != 1) | apart) + 1):
+        gap = bars.begin[way[0], :2] - bars.end[way[-1], :2] if len(way) > 2 and outer[way].any() else np.full(2, np.inf)
+        if np.hypot(*gap) <= 2.0 * bars.half[way[0]]:
+            sides.append(np.hstack([bars.begin[way, :2], bars.end[way, :2]]))
+            sides.append(np.hstack([bars.end[way[-1], :2], bars.begin[way[0], :2]])[None])
+    return np.concatenate(sides) if sides else np.zeros((0, 4))
+
+
+def wall_edges(face: Interface) -> tuple[Mask, Floats]:
+    """Of places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to them near their
+    middle, and (n,) how far inside their outer edge it ends, mm; inf where it is farther than FAR_MM.
+    """
+    walls, side = face.walls, face.walls.end[:, :2] - face.walls.begin[:, :2]
+    length = np.hypot(*side.T)
+    counts = np.ceil(length / SAMPLE_MM).astype(np.int64)
+    which = np.repeat(np.arange(len(length)), counts)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[which]
+    middle = walls.begin[which, :2] + share[:, None] * side[which]
+    across = np.column_stack([-side[:, 1], side[:, 0]])[which] / length[which, None]
+    steps = np.arange(-FAR_MM, AROUND_MM, 0.5 * face.lattice.cell)
+    held, ends = [], []
+    for outward in (across, -across):
+        edge = middle + walls.half[which, None] * outward
+        outer = ~_at(face.section, edge + 2.0 * AROUND_MM * outward, face.lattice)
+        way = edge[outer, None] + steps[:, None] * outward[outer, None]
+        there = _at(face.touching, way, face.lattice)
+        last = len(steps) - 1 - there[:, ::-1].argmax(axis=1)
+        beside = middle[outer, None] + np.array([-2.0 * AROUND_MM, 0.0, 2.0 * AROUND_MM])[:, None] * outward[outer, None]
+        held.append(_at(face.touching, beside, face.lattice).any(axis=1))
+        ends.append(np.where(there.any(axis=1), np.maximum(-steps[last], 0.0), np.inf))
+    return np.concatenate(held), np.concatenate(ends)
+
+
+def _at(mask: Mask, points: Floats, lattice: Lattice) -> Mask:
+    """Of (..., 2) points whether their column is marked."""
+    i, j = np.moveaxis(((points - lattice.origin) / lattice.cell).astype(np.int64), -1, 0)
+    found: Mask = mask[i.clip(0, lattice.shape[0] - 1), j.clip(0, lattice.shape[1] - 1)]
+    return found
