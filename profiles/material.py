@@ -45,6 +45,14 @@ class Material(Frozen):
         description="tensile strength across layers, MPa; PLA printed well reaches 34, 3D Print. Addit. Manuf. 2020; ordinary "
         "prints and other filaments bond less",
     )
+    cold_weld_factor: float = Field(
+        0.6,
+        gt=0,
+        le=1,
+        description="factor on interlayer_strength_mpa where a part stands on plastic that has cooled: an assumption, no such "
+        "joint has been measured; strength across layers is 25 to 50 % below that along them, but 75 to 90 % with fibres or long "
+        "times between layers, Duty and others, Solid Freeform Fabrication 2018",
+    )
     bridge_longest_mm: float = Field(
         10.0,
         ge=1,
@@ -83,3 +91,8 @@ class Material(Frozen):
         "RepRapFirmware's M572; absent: what the firmware has",
     )
     volumetric_limit_mm3_s: float = Field(gt=0, le=200, description="most plastic the hot end melts, mm3/s")
+
+    @property
+    def cold_weld_mpa(self) -> float:
+        """Tensile strength of a part's weld to cold plastic."""
+        return self.interlayer_strength_mpa * self.cold_weld_factor

@@ -6,9 +6,10 @@ from textwrap import wrap
 from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Program
-from machine.quantities import duration, minutes
+from machine.quantities import duration, minutes, newtons
 from machine.view.parts import risky_before_mm2
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.joint import Joint, weakest_of
 from profiles.profile import Profile
 
 WIDEST = 100  # characters of a line
@@ -41,6 +42,21 @@ def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_pla
     if decomposition.candidates_evaluated == 0 and len(decomposition.parts) > 1:
         effort = f"cut by a plan in {decomposition.search_s:.1f} s\n"
     return table(rows) + effort + front + "\n"
+
+
+def joints_table(joints: Sequence[Joint]) -> str:
+    """What the joint under every part bears, and which is the weakest; nothing for a model in one piece."""
+    weakest = weakest_of(joints)
+    if weakest is None:
+        return ""
+    rows = [["joint of part", "area mm2", "arm mm", "breaks at N", "pulled off at N"]]
+    for joint in joints:
+        forces = [newtons(joint.load_n), newtons(joint.tension_n)]
+        rows.append([str(joint.part), f"{joint.area_mm2:.1f}", f"{joint.arm_mm:.1f}", *forces])
+    sentence = (
+        f"weakest: the joint of part {weakest.part}, by estimate it breaks at {newtons(weakest.load_n)} N sideways at the far end"
+    )
+    return table(rows) + sentence + "\n\n"
 
 
 def front_table(front: Sequence[FrontRow]) -> str:
