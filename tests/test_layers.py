@@ -24,6 +24,7 @@ CONFINED = {
         "mdp/formats/polygons",
         "slicer/geometry/",
         "slicer/interface/interlock",
+        "slicer/interface/pins",
         "machine/kinematics/collision",
         "machine/app/pipeline/precompile",
     ),
