@@ -79,7 +79,17 @@ class Interface(Frozen):
         description="how deep a pin reaches into the part below, mm; plastic poured from the mouth falls no deeper",
     )
     pin_spacing_mm: float = Field(
-        4.0, ge=1, le=100, description="distance of the middles of pins, in a square grid about the middle of a face, mm"
+        4.0,
+        ge=1,
+        le=100,
+        description="least distance of the middles of pins, mm: they stand in a square grid about the middle of a face, so wide "
+        "that there are no more than most_pins",
+    )
+    most_pins: int = Field(
+        8,
+        ge=1,
+        le=1000,
+        description="pins of a part at most: each takes 25 s and 60 mm3, mostly for the walls and floor round it",
     )
 
     @model_validator(mode="before")

@@ -36,6 +36,7 @@ MOST_AREA = (
 )
 HALVINGS = 20
 DOT_MM = 1e-3
+WIDENED, MOST_WIDENED = 1.1, 60  # a grid with too many places, by so much and so often
 
 
 Pins = Mapping[int, tuple[Pin, ...]]  # by the index of the part that fills them
@@ -72,7 +73,7 @@ def _pins_of(part: Part, earlier: Sequence[Part], cut: Sequence[tuple[Part, Sequ
             free = clean(solid) - union([Polygons(loops) for loops in holes if loops])
             room = room ^ offset_round(free, -keep_mm - 0.5 * wide_mm)
         heights: Heights | None = None
-        for x, y in _places(room, process.pin_spacing_mm):
+        for x, y in _places(room, process):
             if not len(middles) or np.hypot(*(middles - (x, y)).T).min() >= least_spacing_mm(process, wide_mm):
                 middles = np.vstack([middles, [x, y]])
                 heights = heights or _heights_of(lower, below)
@@ -100,13 +101,25 @@ def _looks(process: Process, keep_mm: float) -> int:
     return ceil((process.pin_depth_mm + keep_mm) / process.layer_height_mm) + 1
 
 
-def _places(room: Polygons, spacing_mm: float) -> Iterator[tuple[float, float]]:
-    """Middles of holes: in every piece of the room a square grid about its middle, or its deepest place where that meets none."""
-    dot = Polygons.square((DOT_MM, DOT_MM), True)
+def _places(room: Polygons, process: Process) -> list[tuple[float, float]]:
+    """Middles of holes: a grid in the room, as wide as leaves no more of them than are wanted."""
+    step_mm, places = process.pin_spacing_mm, _grid(room, process.pin_spacing_mm)
+    for _ in range(MOST_WIDENED):
+        if len(places) <= process.most_pins:
+            break
+        step_mm *= WIDENED
+        places = _grid(room, step_mm)
+    return places[: process.most_pins]
+
+
+def _grid(room: Polygons, step_mm: float) -> list[tuple[float, float]]:
+    """In every piece of the room a square grid about its middle, or its deepest place where that meets none."""
+    dot, places = Polygons.square((DOT_MM, DOT_MM), True), list[tuple[float, float]]()
     for island in sorted(islands(room), key=lambda piece: piece.bounds()):
         x0, y0, x1, y1 = island.bounds()
-        grid = [(x, y) for y in _row(y0, y1, spacing_mm) for x in _row(x0, x1, spacing_mm)]
-        yield from [place for place in grid if not (dot.translate(place) ^ island).is_empty()] or [_deepest(island)]
+        grid = [(x, y) for y in _row(y0, y1, step_mm) for x in _row(x0, x1, step_mm)]
+        places += [place for place in grid if not (dot.translate(place) ^ island).is_empty()] or [_deepest(island)]
+    return places
 
 
 def _row(low: float, high: float, step: float) -> list[float]:

@@ -23,7 +23,7 @@ from slicer.slice import slice_part
 from tests.shapes import box, from_manifold
 from tests.slicer.hand import BARE, cut, profile
 
-PINS = "process.interlock=pins"
+PINS = ("process.interlock=pins", "process.most_pins=100")
 UP = (0.0, 0.0, 1.0)
 WIDE, DEEP, WIDTH, WALLS = 1.0, 3.0, 0.45, 3
 DISC = 0.5 * 24 * np.sin(2 * np.pi / 24) * (0.5 * WIDE) ** 2  # mm2: a hole has 24 sides
@@ -50,7 +50,7 @@ def sections_of(parts: Sequence[Part], own: Profile) -> list[Sections]:
 
 def removed_mm3(parts: Sequence[Part], *keys: str) -> float:
     """What pins take of the outlines of all layers."""
-    with_pins, without = (sections_of(parts, profile(*BARE, *more, *keys)) for more in ((PINS,), ()))
+    with_pins, without = (sections_of(parts, profile(*BARE, *more, *keys)) for more in (PINS, ()))
     return sum(
         float(np.dot([a.area() - b.area() for a, b in zip(bare.own, holed.own, strict=True)], bare.heights.height_mm))
         for bare, holed in zip(without, with_pins, strict=True)
@@ -59,7 +59,7 @@ def removed_mm3(parts: Sequence[Part], *keys: str) -> float:
 
 def poured_mm3(parts: Sequence[Part], *keys: str) -> float:
     """What the beads that fill pins take."""
-    own = profile(*BARE, PINS, *keys)
+    own = profile(*BARE, *PINS, *keys)
     area = bead_area_mm2(own.process.line_width_mm, 0.2) * own.process.interface_flow
     beads = [bead for pins in plan_pins(parts, own).values() for bead in pour(pins, own, 0.2)]
     return sum(bead.length_mm * bead.flow * area for bead in beads)
@@ -72,7 +72,7 @@ def axis(part: Part, pin: Pin) -> Floats:
 
 
 def test_the_face_of_a_block_has_a_grid_of_pins_clear_of_its_walls() -> None:
-    pins = plan_pins(stacked(), profile(PINS))[2]
+    pins = plan_pins(stacked(), profile(*PINS))[2]
     assert sorted({pin.x_mm for pin in pins}) == pytest.approx([-8.0, -4.0, 0.0, 4.0, 8.0])
     assert len(pins) == 25
     assert [pin.volume_mm3 for pin in pins] == pytest.approx([DISC * DEEP] * 25)
@@ -90,7 +90,7 @@ def test_the_strokes_push_what_the_layers_below_leave_out(keys: tuple[str, ...])
 @given(st.floats(1.0, 70.0), st.floats(8.0, 24.0))
 def test_a_leaning_part_fills_its_holes_within_two_percent(tilt_deg: float, x: float) -> None:
     parts = leaning(tilt_deg, x)
-    assume(plan_pins(parts, profile(PINS))[2])
+    assume(plan_pins(parts, profile(*PINS))[2])
     assert poured_mm3(parts) == pytest.approx(removed_mm3(parts), rel=0.02)
 
 
@@ -108,7 +108,7 @@ def test_no_pin_comes_near_the_outside_of_any_star(star: list[tuple[float, float
     solid = m3.Manifold.extrude(m3.CrossSection([outline]), 20.0, 20, 10.0 * twist, (widening, widening))
     assume(solid.status() == m3.Error.NoError and solid.volume() > 100.0)
     parts = cut(from_manifold(solid), (UP, 12.0))
-    pins = plan_pins(parts, profile(PINS))[2]
+    pins = plan_pins(parts, profile(*PINS))[2]
     tubes = [m3.Manifold.cylinder(DEEP, 0.5 * WIDE + CLEAR - 0.1).translate((pin.x_mm, pin.y_mm, 12.0 - DEEP)) for pin in pins]
     for tube in tubes:
         assert (tube - solid_of(parts[0].mesh)).volume() < 0.01 * tube.volume()
@@ -116,12 +116,20 @@ def test_no_pin_comes_near_the_outside_of_any_star(star: list[tuple[float, float
         assert np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm) >= WIDE + 2 * WIDTH - 1e-9
 
 
+def test_in_a_stem_that_narrows_below_the_cut_its_narrowest_place_counts() -> None:
+    """As deep as a hole and the walls below it, 4.8 mm under the cut of 9 mm radius, the stem has 6.6 mm."""
+    cone = m3.Manifold.cylinder(24.0, 3.0, 15.0, 360)
+    pins = plan_pins(cut(from_manifold(cone), (UP, 12.0)), profile(*PINS, "process.pin_spacing_mm=1.9"))[2]
+    farthest = max(np.hypot(pin.x_mm, pin.y_mm) for pin in pins)
+    assert 6.6 - CLEAR - 0.5 * WIDE - 0.7 < farthest <= 6.6 - CLEAR - 0.5 * WIDE + 0.01
+
+
 def test_pins_of_two_parts_in_one_keep_clear_of_each_other() -> None:
     """Two arms lean apart from one ridge, so that what holds them would meet below it."""
     half = m3.Manifold.cube((50.0, 30.0, 60.0), True)
     left, right = (1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)
     parts = cut(from_manifold(half.translate((0.0, 0.0, 30.0))), (left, 26.0), (right, 26.0))
-    pins = plan_pins(parts, profile(PINS))
+    pins = plan_pins(parts, profile(*PINS))
     assert all(len(pins[index]) > 3 for index in (2, 3))
     own = {part.index: [axis(part, pin) for pin in pins[part.index]] for part in parts[1:]}
     apart = min(
@@ -136,7 +144,7 @@ def test_pins_of_two_parts_in_one_keep_clear_of_each_other() -> None:
 
 def test_below_and_round_a_hole_there_is_plastic_and_walls_run_round_it() -> None:
     base, top = stacked()
-    lower = slice_part(base, profile(*BARE, PINS), later=[top])
+    lower = slice_part(base, profile(*BARE, *PINS), later=[top])
     walls = [path for layer in lower.layers for path in layer.paths if path.kind is Kind.OUTER_WALL and path.length_mm < 6.0]
     per_hole = [path for path in walls if np.hypot(*(path.points.mean(axis=0) - (4.0, 4.0))) < 0.2]
     assert len(per_hole) == 15  # 3 mm of 0.2 mm
@@ -150,7 +158,7 @@ def test_below_and_round_a_hole_there_is_plastic_and_walls_run_round_it() -> Non
 @pytest.mark.parametrize("keys", [(), ("process.interface_flow=1.2", "process.layer_height_mm=0.15")])
 def test_the_tip_circles_in_the_mouth_before_anything_else_and_never_below_the_layer(keys: tuple[str, ...]) -> None:
     base, top = stacked()
-    own = profile(*BARE, PINS, *keys)
+    own = profile(*BARE, *PINS, *keys)
     pins, first = plan_pins([base, top], own)[2], slice_part(top, own, [base]).layers[0]
     middles = np.array([[pin.x_mm, pin.y_mm] for pin in pins])
     for path in first.paths[:25]:
@@ -164,9 +172,18 @@ def test_the_tip_circles_in_the_mouth_before_anything_else_and_never_below_the_l
 
 
 def test_a_part_too_slender_or_too_low_below_has_none() -> None:
-    assert plan_pins(cut(box(4.4, 30, 20), (UP, 10.0)), profile(PINS))[2] == ()
-    assert len(plan_pins(cut(box(4.8, 30, 20), (UP, 10.0)), profile(PINS))[2]) > 3
-    assert plan_pins(cut(box(24, 24, 20), (UP, 4.0)), profile(PINS))[2] == ()
+    assert plan_pins(cut(box(4.4, 30, 20), (UP, 10.0)), profile(*PINS))[2] == ()
+    assert len(plan_pins(cut(box(4.8, 30, 20), (UP, 10.0)), profile(*PINS))[2]) > 3
+    assert plan_pins(cut(box(24, 24, 20), (UP, 4.0)), profile(*PINS))[2] == ()
+
+
+@pytest.mark.parametrize("most", [1, 8, 16])
+def test_a_large_face_has_no_more_than_are_wanted_spread_all_over_it(most: int) -> None:
+    parts = cut(box(60, 40, 30), (UP, 15.0))
+    places = np.array([(pin.x_mm, pin.y_mm) for pin in plan_pins(parts, profile(*PINS, f"process.most_pins={most}"))[2]])
+    assert most / 2 <= len(places) <= most
+    assert places.mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert most == 1 or np.ptp(places[:, 0]) > 25.0
 
 
 def test_no_holes_without_the_setting() -> None:
@@ -188,13 +205,13 @@ def test_no_holes_without_the_setting() -> None:
 )
 def test_pins_out_of_the_nozzle_s_reach_are_refused_in_a_sentence(value: str, message: str) -> None:
     with pytest.raises(ProfileError) as refused:
-        profile(PINS, value)
+        profile(*PINS, value)
     assert message in str(refused.value)
 
 
 def test_a_depth_alone_asks_for_grooves_as_it_did_before_there_was_a_choice() -> None:
     given_alone = [profile(f"process.interlock_mm={depth}").process.interlock for depth in (0.2, 0)]
     assert given_alone == ["grooves", "none"]
-    assert profile("process.interlock_mm=0.2", PINS).process.interlock == "pins"
+    assert profile("process.interlock_mm=0.2", *PINS).process.interlock == "pins"
     with pytest.raises(ProfileError, match="interlock_mm is 0 mm: interlock = grooves makes grooves deeper"):
         profile("process.interlock=grooves", "process.interlock_mm=0")
