@@ -99,11 +99,18 @@ def _pieces(parts: Sequence[Part]) -> list[_Piece]:
         earlier = list(pieces)
         for solid in solid_of(part.mesh).decompose():
             base = _in_frame(solid, part).slice(BESIDE_MM)
-            shared = {k: base ^ _in_frame(piece.solid, part).slice(-BESIDE_MM) for k, piece in enumerate(earlier)}
+            near = [k for k, piece in enumerate(earlier) if _meet(piece.solid, solid)]
+            shared = {k: base ^ _in_frame(earlier[k].solid, part).slice(-BESIDE_MM) for k in near}
             shared = {k: area for k, area in shared.items() if area.area() > TOUCHING_MM2}
             contact = sum(shared.values(), CrossSection())
             pieces.append(_Piece(part, solid, _edges(contact), tuple(shared)))
     return pieces
+
+
+def _meet(one: Solid, other: Solid) -> bool:
+    """Whether the boxes of two solids come as near to each other as pieces that touch."""
+    (low, high), (least, most) = (np.reshape(solid.bounding_box(), (2, 3)) for solid in (one, other))
+    return bool(np.all((low <= most + BESIDE_MM) & (least <= high + BESIDE_MM)))
 
 
 def _edges(area: CrossSection) -> Floats:
