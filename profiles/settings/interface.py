@@ -89,7 +89,7 @@ class Interface(Frozen):
         8,
         ge=1,
         le=1000,
-        description="pins of a part at most: each takes 25 s and 60 mm3, mostly for the walls and floor round it",
+        description="pins of a part at most: each takes 10 to 45 s and 40 to 75 mm3, mostly for the walls round it and its floor",
     )
 
     @model_validator(mode="before")

@@ -11,6 +11,7 @@ from machine.view.parts import risky_before_mm2
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.joint import Joint, weakest_of
 from profiles.profile import Profile
+from slicer.paths import SlicedPart
 
 WIDEST = 100  # characters of a line
 NO_BREAK = "\u00a0"  # a space at which no line ends
@@ -92,7 +93,8 @@ def _number(area_mm2: float) -> str:
 
 def print_table(program: Program, profile: Profile) -> str:
     """What there is to say of a print: its dry run, what its cuts take, the settings of single parts."""
-    return run_table(program.run) + interfaces_line(program.interface_mm3) + part_settings_lines(profile)
+    said = run_table(program.run) + interfaces_line(program.interface_mm3) + pins_line(program.sliced)
+    return said + part_settings_lines(profile)
 
 
 def run_table(run: DryRun) -> str:
@@ -136,6 +138,12 @@ def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
     sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm3 that one piece would not: {of_parts}"
     lines = wrap(sentence, WIDEST, subsequent_indent="  ", break_long_words=False)
     return "\n".join(lines).replace(NO_BREAK, " ") + "\n"
+
+
+def pins_line(sliced: Sequence[SlicedPart]) -> str:
+    """How many pins the parts fill; nothing where none does."""
+    of_parts = ", ".join(f"part{NO_BREAK}{part.index} {part.pins}" for part in sliced if part.pins)
+    return "\n".join(wrap(f"pins: {of_parts}", WIDEST)).replace(NO_BREAK, " ") + "\n" if of_parts else ""
 
 
 def agreement_line(agreed: Agreement) -> str:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machine.app.terminal.report import front_table, interfaces_line, joints_table, parts_table, run_table, table
+from machine.app.terminal.report import front_table, interfaces_line, joints_table, parts_table, pins_line, run_table, table
 from machine.dryrun.dryrun import dry_run
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow, Part
@@ -13,6 +13,7 @@ from mdp.mesh import Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, about
 from profiles.profile import load, load_one
+from slicer.paths import SlicedPart
 from tests.shapes import box, hollow, tee
 
 
@@ -71,6 +72,12 @@ def test_the_joints_stand_in_print_order_and_the_weakest_is_named() -> None:
         "",
     ]
     assert joints_table(()) == ""
+
+
+def test_pins_are_counted_part_by_part_and_none_are_not_told() -> None:
+    sliced = [SlicedPart(index, (), pins=pins) for index, pins in ((1, 0), (2, 8), (3, 0), (4, 5))]
+    assert pins_line(sliced) == "pins: part 2 8, part 4 5\n"
+    assert pins_line(sliced[:1]) == ""
 
 
 def test_the_table_fits_a_terminal_of_80_columns() -> None:
