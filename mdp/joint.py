@@ -6,7 +6,7 @@ modulus, so F = s W / a with the strength s of the weld. Pulled straight off it 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from manifold3d import CrossSection
@@ -47,6 +47,8 @@ class _Piece:
 def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
     """The joints of a decomposition's parts 2, 3, ... in print order; what is printed later and held by nothing else counts
     with what holds it. Pieces lower than the search's crumbs count for nothing where there are others."""
+    if len(parts) < 2:
+        return ()
     pieces, crumb_mm = _pieces(parts), float(np.sqrt(profile.search.least_interface_mm2))
     joints = []
     for part in parts[1:]:
@@ -54,17 +56,13 @@ def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
         high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= crumb_mm] or own
         several = [_joint(pieces, k, profile.material.cold_weld_mpa) for k in high]
         weakest = min(several, key=lambda joint: joint.load_n)
-        joints.append(Joint(part.index, sum(joint.area_mm2 for joint in several), *_forces(weakest)))
+        joints.append(replace(weakest, area_mm2=sum(joint.area_mm2 for joint in several)))
     return tuple(joints)
 
 
 def weakest_of(joints: Sequence[Joint]) -> Joint | None:
     """The joint that breaks first; None where there is none."""
     return min(joints, key=lambda joint: joint.load_n, default=None)
-
-
-def _forces(joint: Joint) -> tuple[float, float, float]:
-    return joint.arm_mm, joint.load_n, joint.tension_n
 
 
 def _joint(pieces: Sequence[_Piece], number: int, strength_mpa: float) -> Joint:

@@ -63,7 +63,7 @@ class Interface(Frozen):
         ge=0,
         le=1,
         description="depth of the grooves of interlock = grooves, mm; a multiple of the layer height is met best. Where a "
-        "profile has it and no interlock, as profiles of earlier versions do, grooves are meant, by 0 none",
+        "profile has it and no interlock, as profiles of earlier versions do, it asks for grooves, 0 for none",
     )
     pin_width_nozzles: float = Field(
         2.5,
@@ -86,7 +86,7 @@ class Interface(Frozen):
         "that there are no more than most_pins",
     )
     most_pins: int = Field(
-        8,
+        9,
         ge=1,
         le=1000,
         description="pins of a part at most: each takes 10 to 45 s and 40 to 75 mm3, mostly for the walls round it and its floor",

@@ -31,11 +31,9 @@ SIDES = 24  # of a hole
 MOUTH_MM = 1.0  # holes are cut so far beyond the base plane, where there is nothing, so that no skin is left over them
 RANK = OUTSIDE - 1  # before all else of the layer
 ROUND = 12  # chords of a circle that the tip goes
-MOST_AREA = (
-    3.0  # of the nozzle's diameter squared: Klipper refuses a stroke with a cross-section of 4 (max_extrude_cross_section)
-)
+MOST_AREA = 3.0  # of a stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
 HALVINGS = 20
-DOT_MM = 1e-3
+DOT_MM = 1e-3  # a square so small stands for a point
 WIDENED, MOST_WIDENED = 1.1, 60  # a grid with too many places, by so much and so often
 
 
