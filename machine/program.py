@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from machine.dryrun.dryrun import DryRun
 from mdp.decomposition import Decomposition
+from mdp.joint import Joint
 from slicer.paths import SlicedPart
 
 
@@ -31,8 +32,8 @@ class Program:
 class Alternative:
     """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
     length of the seams between parts; stairs_mm2: what stairs count; interface_mm3: plastic that one piece would not have, by
-    the part that stands there; findings: how many its dry run has; message: why it cannot be printed so, or "". None: it cannot
-    be printed so."""
+    the part that stands there; joints: what they bear; findings: how many its dry run has; message: why it cannot be printed
+    so, or "". None: it cannot be printed so."""
 
     name: str
     orientation: str
@@ -47,4 +48,5 @@ class Alternative:
     seam_mm: float = 0.0
     stairs_mm2: float = 0.0
     interface_mm3: Mapping[int, float] = field(default_factory=dict)
+    joints: tuple[Joint, ...] = ()
     findings: int = 0

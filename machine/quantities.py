@@ -22,6 +22,11 @@ def minutes(seconds: float) -> str:
     return f"{whole // 60}h {whole % 60}m" if whole >= 60 else f"{whole}m"
 
 
+def newtons(force_n: float) -> str:
+    """A force to two digits, as an estimate deserves."""
+    return f"{float(f'{force_n:.2g}'):.12g}"
+
+
 def filament_cm3(filament_mm: float, material: Material) -> float:
     """Volume of a length of filament."""
     return filament_mm * pi * material.diameter_mm**2 / 4.0 / 1000.0

@@ -2,11 +2,14 @@
 
 import io
 import zipfile
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.joint import Joint, weakest_of
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 
@@ -84,7 +87,7 @@ def glb(decomposition: Decomposition) -> bytes:
     return bytes(scene.export(file_type="glb"))
 
 
-def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[str, Any]:
+def json_values(decomposition: Decomposition, joints: Sequence[Joint], read_s: float, total_s: float) -> dict[str, Any]:
     """What `decompose --json` writes."""
     return {
         "model": decomposition.name,
@@ -116,8 +119,14 @@ def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> 
             }
             for part in decomposition.parts
         ],
+        "joints": joint_values(joints),
         "front": [front_values(row) for row in decomposition.front],
     }
+
+
+def joint_values(joints: Sequence[Joint]) -> list[dict[str, Any]]:
+    """Joints as JSON has them, the one that breaks first marked as the weakest."""
+    return [asdict(joint) | {"weakest": joint is weakest_of(joints)} for joint in joints]
 
 
 def front_values(row: FrontRow) -> dict[str, Any]:

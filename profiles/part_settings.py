@@ -29,7 +29,8 @@ OF_THE_PRINT = (
     | (frozenset(Support.model_fields) - SUPPORT_OF_A_PART)
     | frozenset(key for key in Process.model_fields if key.startswith(("first_layer_", "travel_", "lift_")))
     | frozenset(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
-    | {"name", "scale", "rotate_deg", "self_supporting_angle_deg", "interlock_mm", "spiral_vase"}
+    | {"name", "scale", "rotate_deg", "self_supporting_angle_deg", "spiral_vase"}
+    | {"interlock", "interlock_mm", "pin_width_nozzles", "pin_depth_mm", "pin_spacing_mm", "most_pins"}
 )
 OF_PARTS_ON_PLASTIC = {
     "interface_overlap",

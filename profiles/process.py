@@ -47,11 +47,13 @@ class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
                     allowed = f"at most {MOST_SHARE:g} of {wide} ({MOST_SHARE * width:g} mm) is allowed"
                     yield f"{key} is {getattr(self, key):g} mm: {allowed}"
         deepest_mm = max(self.line_width_mm - self.layer_height_mm, 0.0)
-        if self.interlock_mm > deepest_mm + 1e-9:
+        if self.interlock == "grooves" and self.interlock_mm > deepest_mm + 1e-9:
             yield (
                 f"interlock_mm is {self.interlock_mm:g} mm: at most line_width_mm less layer_height_mm "
                 f"({deepest_mm:g} mm) is filled by one bead"
             )
+        if self.interlock == "grooves" and self.interlock_mm == 0.0:
+            yield "interlock_mm is 0 mm: interlock = grooves makes grooves deeper than that"
         if self.adaptive_cusp_mm > 0 and self.least_layer_height_mm > self.most_layer_height_mm:
             yield (
                 f"least_layer_height_mm is {self.least_layer_height_mm:g} mm: at most most_layer_height_mm "

@@ -142,10 +142,11 @@ class Search(Frozen):
         "strength is not looked at",
     )
     strength_safety: float = Field(
-        1.25,
+        1.0,
         ge=1,
         le=100,
-        description="by how many times material.interlayer_strength_mpa must exceed the stress of a base under that push",
+        description="by how many times the strength of a weld to cold plastic, material.interlayer_strength_mpa by "
+        "material.cold_weld_factor, must exceed the stress of a base under that push",
     )
     fragile_mm: float = Field(
         0.3, ge=0, le=100, description="no plane leaves a sliver thinner than this, a layer and a half or so, mm"

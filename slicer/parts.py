@@ -21,6 +21,7 @@ from typing import Any
 from mdp.decomposition import Part
 from profiles.profile import Profile
 from slicer.finish.vase import check_vase
+from slicer.interface.pins import plan_pins
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import SlicedPart
 from slicer.sectioning import section_part
@@ -65,7 +66,8 @@ def slice_parts(
     Raises SliceError as slice_part does, for the first part in print order that has a reason.
     """
     check_vase(parts, profile)
-    sections = [section_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
+    pins = plan_pins(parts, profile)
+    sections = [section_part(part, profile, parts[:k], parts[k + 1 :], pins) for k, part in enumerate(parts)]
     overhangs = [find_overhangs(layers) for layers in sections]
     supports = plan_supports([own_supports(*pair) for pair in zip(sections, overhangs, strict=True)])
     planned = list(zip(supports, overhangs, strict=True))

@@ -105,7 +105,7 @@ class SlicedPart:
     unsupported: the places of it that no support could be given, reported as findings, the largest first, their layers
     counted from 1. interface_mm3: plastic that there would not be if the model were not cut, by the index of the part whose
     base lies there. too_thin: how many layers below its last one hold something, but nothing that a line is narrow enough for;
-    too_thin_mm: where the first of them lies above the base plane.
+    too_thin_mm: where the first of them lies above the base plane. pins: how many it fills.
     """
 
     index: int
@@ -114,6 +114,7 @@ class SlicedPart:
     interface_mm3: Mapping[int, float] = field(default_factory=dict)
     too_thin: int = 0
     too_thin_mm: float = 0.0
+    pins: int = 0
 
     @property
     def unsupported_mm2(self) -> float:

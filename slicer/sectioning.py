@@ -16,14 +16,18 @@ from slicer.geometry.polygons import Polygons, clean, offset, opening
 from slicer.heights import layer_heights
 from slicer.interface.interface import plastic_below
 from slicer.interface.interlock import cut_grooves
+from slicer.interface.pins import NONE, Pins, cut_pins
 from slicer.sections import Sections
 from slicer.support.pedestal import pedestal_layers, without_pedestal
 from slicer.walls.brim import plate_outline
 from slicer.walls.layer_walls import without_hairs
 
 
-def section_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> Sections:
-    """The sections of a part that is printed after `earlier` and before `later` parts; profile: of the whole print.
+def section_part(
+    part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = (), pins: Pins = NONE
+) -> Sections:
+    """The sections of a part that is printed after `earlier` and before `later` parts; profile: of the whole print; pins: of all
+    its parts.
 
     Raises SliceError when the part's mesh is not closed, or too high to be meant.
     """
@@ -42,6 +46,7 @@ def section_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), lat
             outlines, int(np.searchsorted(heights.cut_mm, PLATFORM_TOLERANCE_MM)), base, process.line_width_mm
         )
     outlines = compensate(outlines, part, later, heights.cut_mm, process)
+    outlines = cut_pins(outlines, part, later, pins, heights.cut_mm, profile)
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
     ungrooved = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal) if pedestal else outlines
@@ -61,6 +66,7 @@ def section_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), lat
         plate=plate_outline(profile.machine.table),
         pedestal_layers=pedestal,
         too_thin=too_thin,
+        pins=pins.get(part.index, ()),
     )
 
 

@@ -15,6 +15,15 @@ from slicer.geometry.polygons import Polygons
 from slicer.heights import Heights
 
 
+@dataclass(frozen=True)
+class Pin:
+    """A hole, in the frame of the part that fills it: the middle of its mouth, and what it takes of the layers below."""
+
+    x_mm: float
+    y_mm: float
+    volume_mm3: float
+
+
 @dataclass(frozen=True, eq=False)
 class Sections:
     """A part's layers, one entry each, before anything is laid.
@@ -22,7 +31,7 @@ class Sections:
     The part is printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame. outlines: all of a
     layer; own: without the pedestal; ungrooved: own, before the grooves for later parts. plastic_below: just under the base
     plane, None on the platform; plate: its outline, of use to part 1. pedestal_layers: how many of the lowest ones the pedestal
-    takes; too_thin: layers that hold something, but nothing that gets a line.
+    takes; pins: those that the part fills; too_thin: layers that hold something, but nothing that gets a line.
     """
 
     part: Part
@@ -38,6 +47,7 @@ class Sections:
     plate: Polygons
     pedestal_layers: int = 0
     too_thin: frozenset[int] = frozenset()
+    pins: Sequence[Pin] = ()
 
     @property
     def on_platform(self) -> bool:

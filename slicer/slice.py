@@ -20,6 +20,7 @@ from slicer.cooling import fan_share, hanging_fan, layer_time_s, rising_fan, spe
 from slicer.finish.vase import bottom_layers, vase_layers
 from slicer.interface.interface import begin_inside, interface_edges
 from slicer.interface.interlock import fill_grooves
+from slicer.interface.pins import plan_pins, pour
 from slicer.interface.plastic import interface_mm3
 from slicer.layer_beads import lay_beads
 from slicer.overhangs import Overhang, find_overhangs
@@ -59,7 +60,8 @@ def slice_part(
     >>> [round(layer.z_mm, 3) for layer in slice_part(part, profile).layers]
     [0.2, 0.4, 0.6, 0.8, 1.0]
     """
-    sections = section_part(part, profile, earlier, later)
+    pins = plan_pins((*earlier, part, *later), profile)
+    sections = section_part(part, profile, earlier, later, pins)
     overhangs = find_overhangs(sections)
     return slice_supported(own_supports(sections, overhangs), overhangs, on_layer)
 
@@ -101,6 +103,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         interface_mm3(sections, shells.regions),
         len(too_thin),
         float(sections.heights.tip_mm[too_thin[0]]) if too_thin else 0.0,
+        len(sections.pins),
     )
 
 
@@ -116,10 +119,11 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None) 
     sections, own = shells.sections, shells.layers[index].process
     profile, process, material, on_platform = sections.profile, sections.process, sections.profile.material, sections.on_platform
     outline, height_mm = sections.outlines[index], float(sections.heights.height_mm[index])
-    beads = begin_inside(beads) if index == 0 and not on_platform else beads
+    if index == 0 and not on_platform:
+        beads = [*pour(sections.pins, profile, height_mm), *begin_inside(beads)]
     placed = order_beads(beads, outline, own, tip, shells.supports.areas[index])
     placed = split_overhangs(placed, outline, sections.below(index), own)
-    if index == 0 and not on_platform and process.interlock_mm > 0.0:
+    if index == 0 and not on_platform and process.interlock == "grooves":
         placed = fill_grooves(placed, sections.part, process, height_mm)
     fixed: Mapping[Kind, float] | None = None
     flow, fan, add_c = material.flow, 1.0, 0.0

@@ -18,11 +18,13 @@ CONFINED = {
     "cascadio": ("mdp/formats/cad",),
     "manifold3d": (
         "mdp/cut",
+        "mdp/joint",
         "mdp/pedestal",
         "mdp/repair/",
         "mdp/formats/polygons",
         "slicer/geometry/",
         "slicer/interface/interlock",
+        "slicer/interface/pins",
         "machine/kinematics/collision",
         "machine/app/pipeline/precompile",
         "machine/calibration/coupon/",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Alternative, Program
-from machine.quantities import duration, filament_g
+from machine.quantities import duration, filament_g, newtons
 from machine.reader.parsed import MoveKind
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
@@ -20,6 +20,7 @@ from machine.view.settings import settings_tables
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, standing_still
+from mdp.joint import joints_of, weakest_of
 from mdp.mesh import Floats
 from profiles.profile import Profile
 
@@ -33,6 +34,7 @@ COMPARED = "Compared"
 COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "stairs mm²", "findings", "risky mm²")
 STANDS_ON = "base cm³"
 CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
+BREAKS = "breaks: pushed sideways at the end of its arm, the farthest place of what it holds; an estimate of the cold weld alone"
 RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
 
 
@@ -41,7 +43,13 @@ def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, An
     facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
     rows = [_solid(part, profile) for part in decomposition.parts]
     parts = _table("Parts", SOLID, rows, [RISKY])
-    tables = [parts, *_front(decomposition), _areas(decomposition, profile), *settings_tables(profile)]
+    tables = [
+        parts,
+        *_joints(decomposition, profile),
+        *_front(decomposition),
+        _areas(decomposition, profile),
+        *settings_tables(profile),
+    ]
     return {"facts": facts, "tables": tables}
 
 
@@ -61,7 +69,7 @@ def print_report(
     """
     tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile, "" if known else profile.machine.name)]
     if program.decomposition is not None:
-        tables += _front(program.decomposition)
+        tables += [*_joints(program.decomposition, profile), *_front(program.decomposition)]
         tables.append(_alternatives(alternatives) if alternatives else _areas(program.decomposition, profile))
     names = _names(profile) if ours else _assumptions(profile, known)
     facts = [*_figures(program.run, profile, layers), *names]
@@ -105,6 +113,17 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
         rows.append([*solids.get(index, [str(index) if index else "all"]), *figures, *stands_on])
     head = [*(SOLID if solids else SOLID[:1]), "layers", "time", "g", *([STANDS_ON] if interfaces else [])]
     return _table("Parts", head, rows, [RISKY] * bool(solids) + [CUT] * bool(interfaces))
+
+
+def _joints(decomposition: Decomposition, profile: Profile) -> list[Table]:
+    """What the joint under every part bears; of a model in one piece nothing."""
+    joints = joints_of(decomposition.parts, profile)
+    weakest, rows = weakest_of(joints), []
+    for joint in joints:
+        forces = [newtons(joint.load_n), newtons(joint.tension_n)]
+        name = f"{joint.part}{' (the weakest)' * (joint is weakest)}"
+        rows.append([name, f"{joint.area_mm2:.1f}", f"{joint.arm_mm:.1f}", *forces])
+    return [_table("Joints", ["part", "mm²", "arm mm", "breaks at N", "pulled off at N"], rows, [BREAKS])] if joints else []
 
 
 def _front(decomposition: Decomposition) -> list[Table]:

@@ -65,4 +65,5 @@ def _areas_near(normals: Floats, areas: Floats) -> Floats:
     for axis in range(3):
         around += np.roll(around, 1, axis) + np.roll(around, -1, axis)
     around += around[::-1, ::-1, ::-1]
-    return around[tuple(cells.T)]
+    near: Floats = around[tuple(cells.T)]
+    return near

@@ -85,7 +85,7 @@ class Problem:
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         savable_mm2 = self._savable_mm2()
         self.least_gain_mm2 = settings.least_gain * savable_mm2
-        self.bearable_mpa = profile.material.interlayer_strength_mpa / settings.strength_safety
+        self.bearable_mpa = profile.material.cold_weld_mpa / settings.strength_safety
         self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
         self._evaluated: list[int] = []  # appended to by several threads
         self._stopped = False

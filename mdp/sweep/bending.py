@@ -166,15 +166,22 @@ def _find_holder(section: Section, volumes: Floats, areas: Floats, around: Ints,
 
 
 @kernel
+def section_moments(edges: Floats) -> Floats:
+    """The MOMENTS of a section about its frame's axes, mm2 to mm4. edges: as greatest_stress_per_moment has them."""
+    moments = floats(len(MOMENTS), 0.0)
+    for k in range(len(edges)):
+        add_edge(edges[k], moments)
+    return moments
+
+
+@kernel
 def greatest_stress_per_moment(edges: Floats) -> float:
     """The greatest stress in a section for each unit of a bending moment in the worst direction, 1/mm3: the inverse of its least
     section modulus; infinite where it has no area.
 
     edges: (n, 4) of its outlines, x, y, x, y in mm, the section on the left of each.
     """
-    moments, greatest = floats(len(MOMENTS), 0.0), 0.0
-    for k in range(len(edges)):
-        add_edge(edges[k], moments)
+    moments, greatest = section_moments(edges), 0.0
     for k in range(len(edges)):
         greatest = max(greatest, stress_per_moment(moments, edges[k, 0], edges[k, 1]))
     return greatest if len(edges) > 0 else np.inf

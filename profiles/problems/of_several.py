@@ -29,6 +29,12 @@ def unfit_for_nozzle(process: Process, nozzle_mm: float) -> Iterable[str]:
         most_mm = (MOST_INTERFACE_WIDTH if key == "interface_line_width_mm" else MOST_WIDTH) * nozzle_mm
         if width_mm is not None and not least_mm <= width_mm <= most_mm:
             yield f"process.{key} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of {least_mm:g} to {most_mm:g} mm"
+    apart_mm = process.pin_width_nozzles * nozzle_mm + 2.0 * process.line_width_mm
+    if process.interlock == "pins" and process.pin_spacing_mm < apart_mm - 1e-9:
+        yield (
+            f"process.pin_spacing_mm is {process.pin_spacing_mm:g}: pins of {process.pin_width_nozzles:g} nozzles of "
+            f"{nozzle_mm:g} mm with a wall round each are at least {apart_mm:g} mm apart"
+        )
     for key in process.heights:
         height_mm = getattr(process, key)
         if height_mm > nozzle_mm:

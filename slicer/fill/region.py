@@ -102,8 +102,8 @@ def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process
 
 
 def solid_bottom_layers(process: Process) -> int:
-    """Solid layers of a part on plastic: grooves are filled by skin."""
-    return max(process.interface_bottom_layers, 1 if process.interlock_mm > 0.0 else 0)
+    """Solid layers of a part on plastic: grooves are filled by skin, and pins hang on it."""
+    return max(process.interface_bottom_layers, 0 if process.interlock == "none" else 1)
 
 
 def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:

@@ -45,7 +45,7 @@ def cut_grooves(
 ) -> list[Polygons]:
     """The part's outlines without the grooves of the parts that will stand on it."""
     left = list(outlines)
-    for upper in later if process.interlock_mm > 0.0 else ():
+    for upper in later if process.interlock == "grooves" else ():
         area = grooves(upper, process)
         if area.is_empty():
             continue

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from mdp.decomposition import Decomposition
+from mdp.joint import joints_of
 from mdp.plane import PLATFORM
 from mdp.save import COLOURS, glb, json_values, part_file, stl, threemf
 from mdp.search.search import decompose
@@ -36,17 +37,18 @@ def test_a_3mf_holds_every_part_in_its_place_and_is_the_same_bytes_every_time(cu
 
 
 def test_the_values_tell_the_parts_as_they_are(cut: Decomposition) -> None:
-    values = json_values(cut, 0.25, 1.5)
+    values = json_values(cut, joints_of(cut.parts, load()), 0.25, 1.5)
     assert [part["file"] for part in values["parts"]] == ["part-01.stl", "part-02.stl"] == [part_file(k) for k in (1, 2)]
     assert sum(part["volume_mm3"] for part in values["parts"]) == pytest.approx(cut.mesh.volume_mm3)
     assert values["reduction"] == pytest.approx(1.0 - values["residual_area_mm2"] / values["risky_area_mm2"])
     assert sum(row["chosen"] for row in values["front"]) == 1
+    assert [(joint["part"], joint["load_n"] > 0.0, joint["weakest"]) for joint in values["joints"]] == [(2, True, True)]
     assert np.linalg.norm(values["parts"][1]["direction"]) == pytest.approx(1.0)
 
 
 def test_a_model_in_one_piece_has_nothing_to_reduce() -> None:
     whole = decompose(tee(), "tee", load(), parts=1)
-    values = json_values(whole, 0.0, 0.0)
+    values = json_values(whole, (), 0.0, 0.0)
     assert (values["reduction"], len(values["parts"])) == (0.0, 1)
     assert whole.parts[0].base is PLATFORM
 

@@ -12,9 +12,10 @@ from machine.app.pipeline.pipeline import decompose_model
 from machine.app.requests import STDOUT, ModelRequest, Outputs
 from machine.app.terminal.advice import advice
 from machine.app.terminal.plain import show
-from machine.app.terminal.report import part_settings_lines, parts_table
+from machine.app.terminal.report import joints_table, part_settings_lines, parts_table
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
+from mdp.joint import joints_of
 from mdp.plans.writing import plan_text
 from mdp.save import FOLDER_FILES, HEADING, PART_FILES, glb, json_values, part_file, stl, threemf
 from profiles.profile import Profile
@@ -29,7 +30,9 @@ def decompose(request: ModelRequest) -> int:
     check_model_files(request, ())
     decomposed = decompose_model(request)
     decomposition, profile = decomposed.decomposition, decomposed.profile
-    figures = json_values(decomposition, decomposed.read_s, decomposed.total_s) | {"rotate_deg": profile.process.rotate_deg}
+    joints = joints_of(decomposition.parts, profile)
+    figures = json_values(decomposition, joints, decomposed.read_s, decomposed.total_s)
+    figures |= {"rotate_deg": profile.process.rotate_deg}
     if outputs.folder is not None:
         make_folder(outputs.folder)
         for part in decomposition.parts:
@@ -48,7 +51,7 @@ def decompose(request: ModelRequest) -> int:
         write_json(outputs.json, figures)
     if outputs.json != STDOUT:
         tables = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
-        show(tables + part_settings_lines(profile) + advice(decomposition, profile))
+        show(tables + joints_table(joints) + part_settings_lines(profile) + advice(decomposition, profile))
     return 0
 
 

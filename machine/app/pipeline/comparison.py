@@ -9,14 +9,16 @@ from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
 from machine.program import Alternative, Program
-from machine.quantities import duration, filament_g
+from machine.quantities import duration, filament_g, newtons
 from mdp.cost.cost import weight_of_stairs
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
+from mdp.joint import joints_of, weakest_of
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level, rotation
+from mdp.save import joint_values
 from mdp.stairs import step_shares
 from profiles.errors import UserError
 from profiles.profile import Profile
@@ -56,7 +58,7 @@ def in_parts(program: Program, profile: Profile) -> Alternative:
     assert ours is not None  # programs of other slicers have nothing to compare with
     count = len(ours.parts)
     way = Alternative(f"in {count} part{'s' * (count > 1)}", "", count, risky_mm2=ours.residual_area_mm2)
-    return _figures(way, program, profile)
+    return replace(_figures(way, program, profile), joints=joints_of(ours.parts, profile))
 
 
 def straight_up(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
@@ -139,6 +141,7 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
             "stairs_mm2": alternative.stairs_mm2,
             "findings": alternative.findings,
             "interfaces": [{"part": part, "plastic_mm3": mm3} for part, mm3 in alternative.interface_mm3.items()],
+            "joints": joint_values(alternative.joints),
             "message": alternative.message,
         }
         for name, alternative in zip(NAMES, alternatives, strict=True)
@@ -150,8 +153,14 @@ def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
     rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm2"] for way in alternatives]
     head, *lines = table(rows).splitlines()
-    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
+    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, _weakest(way), way.message) if note]
     return "\n".join(["", head, *lines, *notes]) + "\n"
+
+
+def _weakest(way: Alternative) -> str:
+    """What its weakest joint bears."""
+    joint = weakest_of(way.joints)
+    return "" if joint is None else f"the weakest joint, of part {joint.part}, bears {newtons(joint.load_n)} N at the far end"
 
 
 def _costs(alternative: Alternative) -> list[str]:

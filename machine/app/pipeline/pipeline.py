@@ -39,6 +39,7 @@ from mdp.search.laying import lay_down
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
+from slicer.interface.pins import pin_width_mm, room_around_mm
 from slicer.parts import OnProgress, SlicingProgress, slice_parts
 from slicer.paths import SlicedPart
 
@@ -172,7 +173,7 @@ def build(
         sliced = slice_parts(parts, profile, show)
         tell("planning moves")
         program = plan(decomposition, sliced, profile, stops)
-        for note in (*_too_thin(sliced, profile), *_left_out(program, profile)):
+        for note in (*_too_thin(sliced, profile), *_without_pins(sliced, profile), *_left_out(program, profile)):
             say(f"{decomposition.name}: {note}")
         lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
@@ -200,6 +201,16 @@ def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
             nozzle = f"a line of a {profile.machine.head.nozzle_mm:g} mm nozzle"
             wanted = "a larger process.scale or a finer nozzle prints them"
             yield f"{where}, hold nothing wide enough for {nozzle}, so what is above them hangs: {wanted}"
+
+
+def _without_pins(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
+    """Which parts were to have pins and have no room for any."""
+    bare = [str(part.index) for part in sliced if part.index > 1 and not part.pins]
+    if bare and profile.process.interlock == "pins":
+        room_mm = pin_width_mm(profile) + 2.0 * room_around_mm(profile.process)
+        parts = f"part{'s' * (len(bare) > 1)} {', '.join(bare)}"
+        deep = f"{profile.process.pin_depth_mm:g} mm deep into the part below"
+        yield f"no pins under {parts}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"
 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:

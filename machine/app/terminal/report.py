@@ -6,10 +6,12 @@ from textwrap import wrap
 from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Program
-from machine.quantities import duration, minutes
+from machine.quantities import duration, minutes, newtons
 from machine.view.parts import risky_before_mm2
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.joint import Joint, weakest_of
 from profiles.profile import Profile
+from slicer.paths import SlicedPart
 
 WIDEST = 100  # characters of a line
 NO_BREAK = "\u00a0"  # a space at which no line ends
@@ -41,6 +43,21 @@ def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_pla
     if decomposition.candidates_evaluated == 0 and len(decomposition.parts) > 1:
         effort = f"cut by a plan in {decomposition.search_s:.1f} s\n"
     return table(rows) + effort + front + "\n"
+
+
+def joints_table(joints: Sequence[Joint]) -> str:
+    """What the joint under every part bears, and which is the weakest; nothing for a model in one piece."""
+    weakest = weakest_of(joints)
+    if weakest is None:
+        return ""
+    rows = [["joint of part", "area mm2", "arm mm", "breaks at N", "pulled off at N"]]
+    for joint in joints:
+        forces = [newtons(joint.load_n), newtons(joint.tension_n)]
+        rows.append([str(joint.part), f"{joint.area_mm2:.1f}", f"{joint.arm_mm:.1f}", *forces])
+    sentence = (
+        f"weakest: the joint of part {weakest.part}, by estimate it breaks at {newtons(weakest.load_n)} N sideways at the far end"
+    )
+    return table(rows) + sentence + "\n\n"
 
 
 def front_table(front: Sequence[FrontRow]) -> str:
@@ -76,7 +93,8 @@ def _number(area_mm2: float) -> str:
 
 def print_table(program: Program, profile: Profile) -> str:
     """What there is to say of a print: its dry run, what its cuts take, the settings of single parts."""
-    return run_table(program.run) + interfaces_line(program.interface_mm3) + part_settings_lines(profile)
+    said = run_table(program.run) + interfaces_line(program.interface_mm3) + pins_line(program.sliced)
+    return said + part_settings_lines(profile)
 
 
 def run_table(run: DryRun) -> str:
@@ -120,6 +138,12 @@ def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
     sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm3 that one piece would not: {of_parts}"
     lines = wrap(sentence, WIDEST, subsequent_indent="  ", break_long_words=False)
     return "\n".join(lines).replace(NO_BREAK, " ") + "\n"
+
+
+def pins_line(sliced: Sequence[SlicedPart]) -> str:
+    """How many pins the parts fill; nothing where none does."""
+    of_parts = ", ".join(f"part{NO_BREAK}{part.index} {part.pins}" for part in sliced if part.pins)
+    return "\n".join(wrap(f"pins: {of_parts}", WIDEST)).replace(NO_BREAK, " ") + "\n" if of_parts else ""
 
 
 def agreement_line(agreed: Agreement) -> str:

@@ -171,7 +171,7 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     record = json.loads(Path("out.json").read_text())
     assert set(record) == {
         "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
-        "candidates_evaluated", "rounds", "parts", "cost_mm2", "seam_mm", "stairs_mm2", "rotate_deg", "front",
+        "candidates_evaluated", "rounds", "parts", "cost_mm2", "seam_mm", "stairs_mm2", "rotate_deg", "joints", "front",
     }  # fmt: skip
     assert set(record["parts"][0]) == {
         "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "feather_share", "faces", "file",

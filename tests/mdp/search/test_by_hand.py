@@ -332,11 +332,11 @@ def _post(length_mm: float) -> Mesh:
 
 
 def test_a_post_is_cut_off_as_long_as_its_base_bears_the_push_of_the_nozzle() -> None:
-    most_mm = 20.0 / 1.25 / (5.0 * STRESS_PER_NMM)  # MPa over N
+    most_mm = 20.0 * 0.6 / (5.0 * STRESS_PER_NMM)  # MPa over N, a weld to cold plastic
     assert len(_cut(_post(0.98 * most_mm), (UP, 6.0)).parts) == 2
     refusal = _refusal(_post(1.02 * most_mm), (UP, 6.0))
     assert "the nozzle could break the part or a piece of it off its base" in refusal
-    assert "5 N at its top are 16.3 MPa at its base, 16 are allowed" in refusal
+    assert "5 N at its top are 12.2 MPa at its base, 12 are allowed" in refusal
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ SEARCHED = frozenset(
     {
         *(f"process.{key}" for key in ("scale", "rotate_deg", "self_supporting_angle_deg", "support", "support_least_mm2")),
         *(f"process.{key}_mm" for key in ("layer_height", "line_width", "arch_longest", "bridge_longest")),
-        *(f"material.{key}" for key in ("interlayer_strength_mpa", "bridge_longest_mm")),
+        *(f"material.{key}" for key in ("interlayer_strength_mpa", "cold_weld_factor", "bridge_longest_mm")),
     }
 )
 # Of a machine's keys those that only make it quicker or slower.

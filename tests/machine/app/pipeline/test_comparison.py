@@ -9,6 +9,7 @@ from manifold3d import Manifold
 from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part, in_parts, straight_up
 from machine.app.pipeline.pipeline import build
 from machine.program import Alternative, Program
+from machine.quantities import newtons
 from mdp.cut import mesh_of
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
@@ -67,4 +68,7 @@ def test_table_and_json_hold_the_same_figures() -> None:
     assert [row["time_s"] for row in rows] == [alternative.time_s for alternative in alternatives]
     assert rows[0]["seam_mm"] > 0.0 == rows[1]["seam_mm"] == rows[2]["seam_mm"]
     assert [(alternative["part"], alternative["plastic_mm3"] > 0.0) for alternative in rows[0]["interfaces"]] == [(2, True)]
+    assert [(joint["part"], joint["weakest"]) for joint in rows[0]["joints"]] == [(2, True)]
+    assert rows[0]["joints"][0]["load_n"] > 0.0
+    assert f"the weakest joint, of part 2, bears {newtons(rows[0]['joints'][0]['load_n'])} N at the far end" in lines[5]
     assert rows[1]["interfaces"] == rows[2]["interfaces"] == []

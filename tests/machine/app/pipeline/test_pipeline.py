@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
@@ -11,8 +12,11 @@ from machine.dryrun.conformity.deposit import inside_share
 from machine.link.stream import print_lines
 from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
+from mdp.decomposition import Decomposition
 from profiles.profile import load
 from slicer.parts import slice_parts
+from tests.shapes import from_manifold
+from tests.slicer.hand import cut
 
 SHARED = Path(__file__).parents[4].parent / "shared" / "models"
 RUNS = [("generic_ac", f"demo:{name}") for name in ("bracket", "figure", "lattice", "tree")] + [("fractal5pro", "demo:tree")]
@@ -62,3 +66,18 @@ def test_the_plastic_is_what_the_sliced_paths_say() -> None:
     assert [row.time_s for row in built.decomposition.front if row.chosen] == [run.time_s]
     of_parts = run.program.part[run.segment_row] > 0  # not the purge line
     assert run.segment_mm3[of_parts].sum() == pytest.approx(planned, rel=1e-3)
+
+
+def test_pins_are_filled_without_a_finding_and_the_part_too_slender_for_one_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    """An arm of 12 mm leans out of a block to the right, one of 4 mm to the left."""
+    block = m3.Manifold.cube((30.0, 16.0, 12.0), True).translate((0.0, 0.0, 6.0))
+    arms = [m3.Manifold.cube((wide, wide, 26.0), True).translate((0.0, 0.0, 13.0)) for wide in (12.0, 4.0)]
+    right, left = (arm.rotate((0.0, lean, 0.0)).translate((0.0, 0.0, 9.0)) for arm, lean in zip(arms, (40.0, -40.0), strict=True))
+    x, z = np.sin(np.radians(40.0)), np.cos(np.radians(40.0))
+    parts = cut(from_manifold(block + right + left), ((x, 0.0, z), 19.5), ((-x, 0.0, z), 19.5))
+    profile = load(settings=["process.interlock=pins", "process.skirt_loops=0"])
+    whole = from_manifold(block + right + left)
+    program = build(Decomposition("arms", whole, tuple(parts), 1, "classic", 0.0, 0.0, 0, 1, 0.0), profile)
+    assert {finding.code for finding in program.run.findings} <= {"uncalibrated"}
+    assert [part.pins > 0 for part in program.sliced] == [False, False, True]
+    assert "no pins under part 2: one wants a place 4.6 mm wide" in capsys.readouterr().err

@@ -3,15 +3,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machine.app.terminal.report import front_table, interfaces_line, parts_table, run_table, table
+from machine.app.terminal.report import front_table, interfaces_line, joints_table, parts_table, pins_line, run_table, table
 from machine.dryrun.dryrun import dry_run
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import best_orientation, in_words
+from mdp.joint import Joint
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, about
 from profiles.profile import load, load_one
+from slicer.paths import SlicedPart
 from tests.shapes import box, hollow, tee
 
 
@@ -58,6 +60,24 @@ def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
         "3                      30.0        80           0       78.0      -           -  taken: the least cost",
     ]
     assert front_table(rows) in parts_table(replace(tee_in_parts(), front=rows))
+
+
+def test_the_joints_stand_in_print_order_and_the_weakest_is_named() -> None:
+    joints = (Joint(2, 70.18, 21.16, 36.585, 842.19), Joint(3, 111.33, 29.13, 19.529, 12605.3))
+    assert joints_table(joints).splitlines() == [
+        "joint of part  area mm2  arm mm  breaks at N  pulled off at N",
+        "2                  70.2    21.2           37              840",
+        "3                 111.3    29.1           20            13000",
+        "weakest: the joint of part 3, by estimate it breaks at 20 N sideways at the far end",
+        "",
+    ]
+    assert joints_table(()) == ""
+
+
+def test_pins_are_counted_part_by_part_and_none_are_not_told() -> None:
+    sliced = [SlicedPart(index, (), pins=pins) for index, pins in ((1, 0), (2, 8), (3, 0), (4, 5))]
+    assert pins_line(sliced) == "pins: part 2 8, part 4 5\n"
+    assert pins_line(sliced[:1]) == ""
 
 
 def test_the_table_fits_a_terminal_of_80_columns() -> None:

@@ -89,7 +89,7 @@ export function pieceMet({ places, parts }, shifts, [from, along]) {
   return best;
 }
 
-const PART_HEAD = [["part"], ["cm³"], ["support"], ["printed", "words"]];
+const PART_HEAD = [["part"], ["cm³"], ["support"], ["joint"], ["printed", "words"]];
 const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
 
 /** A printing direction as somebody in front of the machine sees it. */
@@ -124,9 +124,20 @@ export function apartPanel(picture) {
     const key = keyOf(state);
     if (key !== asked && tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) return void fetchPieces(key);
     picture?.pieces(apartNow() ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
+    $("joint-told").textContent = jointInWords(pieces ? pieces.parts.map(({ part: { joint } }) => joint).filter(Boolean) : [], part);
     putTable($("parts-list"), [asked, Boolean(pieces), part], PART_HEAD, () => (pieces ? pieces.parts : []).map(({ part: piece }) => pieceRow(piece, part)));
   });
 }
 
-const pieceRow = ({ index, colour, volume_mm3: volume, risky_after_mm2: risky, direction }, chosen) => choiceRow("piece", index, index === chosen, [swatch(colour), `${index}`],
-  [[(volume / 1000).toFixed(2)], [mm2(risky)], [directionInWords(direction), "words"]], () => choosePart(index));
+const newtons = (force) => `${Number(force.toPrecision(2))} N`;
+
+/** What the joint of the chosen part bears, else the weakest of all. */
+function jointInWords(joints, chosen) {
+  const joint = joints.find(({ part }) => part === chosen) || joints.find(({ weakest }) => weakest);
+  if (!joint) return "";
+  const force = `breaks at about ${newtons(joint.load_n)}, pushed sideways ${joint.arm_mm.toFixed(0)} mm away, or pulled off at ${newtons(joint.tension_n)}`;
+  return `The joint of part ${joint.part}${joint.weakest ? ", the weakest," : ""} has ${mm2(joint.area_mm2)} and ${force}.`;
+}
+
+const pieceRow = ({ index, colour, volume_mm3: volume, risky_after_mm2: risky, joint, direction }, chosen) => choiceRow("piece", index, index === chosen, [swatch(colour), `${index}`],
+  [[(volume / 1000).toFixed(2)], [mm2(risky)], [joint ? newtons(joint.load_n) : "–"], [directionInWords(direction), "words"]], () => choosePart(index));

@@ -1,0 +1,121 @@
+"""Joint: the force that breaks a part off its base: a push where it is easiest, at the far end of what the base holds.
+
+The base is a cold weld. A force F at the distance a from the middle of its section bends it with F a there, whatever way the
+arm points when the force is square to it; in the worst direction that stresses the section by F a / W, W its least section
+modulus, so F = s W / a with the strength s of the weld. Pulled straight off it bears s A, A its area.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from manifold3d import CrossSection
+
+from mdp.cut import Solid, mesh_of, solid_of
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
+from profiles.profile import Profile
+
+BESIDE_MM = 0.02  # of a base plane sections are taken: on it they would be those of a face
+TOUCHING_MM2 = 0.01  # sections that share less only meet in an edge
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What a part's base bears. area_mm2: of all its pieces, each of which is a joint of its own; the others are those of the
+    piece that breaks first: how far its end is, from the middle of its section, and the forces that break it, in newtons,
+    sideways at the end and straight off."""
+
+    part: int
+    area_mm2: float
+    arm_mm: float
+    load_n: float
+    tension_n: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A connected piece of a part, the edges (k, 4) of where it stands on others, and the numbers of those."""
+
+    part: Part
+    solid: Solid
+    edges: Floats
+    stands_on: tuple[int, ...]
+
+
+def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
+    """The joints of a decomposition's parts 2, 3, ... in print order; what is printed later and held by nothing else counts
+    with what holds it. Pieces lower than the search's crumbs count for nothing where there are others."""
+    if len(parts) < 2:
+        return ()
+    pieces, crumb_mm = _pieces(parts), float(np.sqrt(profile.search.least_interface_mm2))
+    joints = []
+    for part in parts[1:]:
+        own = [k for k, piece in enumerate(pieces) if piece.part is part]
+        high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= crumb_mm] or own
+        several = [_joint(pieces, k, profile.material.cold_weld_mpa) for k in high]
+        weakest = min(several, key=lambda joint: joint.load_n)
+        joints.append(replace(weakest, area_mm2=sum(joint.area_mm2 for joint in several)))
+    return tuple(joints)
+
+
+def weakest_of(joints: Sequence[Joint]) -> Joint | None:
+    """The joint that breaks first; None where there is none."""
+    return min(joints, key=lambda joint: joint.load_n, default=None)
+
+
+def _joint(pieces: Sequence[_Piece], number: int, strength_mpa: float) -> Joint:
+    piece = pieces[number]
+    part, moments = piece.part, section_moments(piece.edges)
+    area_mm2 = float(moments[AREA])
+    if area_mm2 <= 0.0:
+        return Joint(part.index, 0.0, 0.0, 0.0, 0.0)
+    middle = np.array([moments[X] / area_mm2, moments[Y] / area_mm2, part.base.offset_mm]) @ part.rotation
+    held = np.concatenate([mesh_of(pieces[k].solid).vertices for k in _held(pieces, number)])
+    arm_mm = float(np.linalg.norm(held - middle, axis=1).max())
+    load_n = strength_mpa / (greatest_stress_per_moment(piece.edges) * arm_mm)
+    return Joint(part.index, area_mm2, arm_mm, float(load_n), strength_mpa * area_mm2)
+
+
+def _held(pieces: Sequence[_Piece], number: int) -> set[int]:
+    """The pieces that come off with a piece; where others hold it, too, itself alone."""
+    off, waiting = {number}, [number]
+    while waiting:
+        at = waiting.pop()
+        beside = [k for k, piece in enumerate(pieces) if at in piece.stands_on]
+        beside += [k for k in pieces[at].stands_on if at != number]
+        waiting += [k for k in dict.fromkeys(beside) if k not in off]
+        off.update(beside)
+    return off if all(pieces[k].stands_on for k in off) else {number}
+
+
+def _pieces(parts: Sequence[Part]) -> list[_Piece]:
+    """The pieces of all parts in print order; those of the first part, and they alone, stand on none."""
+    pieces: list[_Piece] = []
+    for part in parts:
+        earlier = list(pieces)
+        for solid in solid_of(part.mesh).decompose():
+            base = _in_frame(solid, part).slice(BESIDE_MM)
+            near = [k for k, piece in enumerate(earlier) if _meet(piece.solid, solid)]
+            shared = {k: base ^ _in_frame(earlier[k].solid, part).slice(-BESIDE_MM) for k in near}
+            shared = {k: area for k, area in shared.items() if area.area() > TOUCHING_MM2}
+            contact = sum(shared.values(), CrossSection())
+            pieces.append(_Piece(part, solid, _edges(contact), tuple(shared)))
+    return pieces
+
+
+def _meet(one: Solid, other: Solid) -> bool:
+    """Whether the boxes of two solids come as near to each other as pieces that touch."""
+    (low, high), (least, most) = (np.reshape(solid.bounding_box(), (2, 3)) for solid in (one, other))
+    return bool(np.all((low <= most + BESIDE_MM) & (least <= high + BESIDE_MM)))
+
+
+def _edges(area: CrossSection) -> Floats:
+    """(n, 4) x, y, x, y, the area on the left of each."""
+    loops = [np.asarray(loop) for loop in area.to_polygons()]
+    return np.concatenate([np.zeros((0, 4)), *(np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops)])
+
+
+def _in_frame(solid: Solid, part: Part) -> Solid:
+    return solid.transform(np.column_stack([part.rotation, [0.0, 0.0, -part.base.offset_mm]]))

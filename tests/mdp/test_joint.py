@@ -1,0 +1,107 @@
+"""Joints: newtons at the end of what stands on them, against beams from a textbook and sums over small squares."""
+
+from collections.abc import Sequence
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.cut import Solid, mesh_of
+from mdp.decomposition import Part
+from mdp.joint import Joint, joints_of, weakest_of
+from mdp.mesh import Floats
+from tests.slicer.hand import cut, profile
+
+UP = (0.0, 0.0, 1.0)
+STRENGTH_MPA = 12.0  # 20 MPa across layers, 0.6 of it where the plastic below is cold
+PROFILE = profile("material.interlayer_strength_mpa=20", "material.cold_weld_factor=0.6")
+
+
+def joints(solid: Solid, *planes: tuple[Sequence[float], float]) -> tuple[Joint, ...]:
+    return joints_of(cut(mesh_of(solid), *planes), PROFILE)
+
+
+def upright(outline: Floats, height_mm: float) -> Solid:
+    return m3.CrossSection([outline]).extrude(height_mm)
+
+
+def test_a_post_breaks_at_the_force_of_the_beam_formula() -> None:
+    (joint,) = joints(m3.Manifold.cube((4.0, 6.0, 40.0), True), (UP, -10.0))
+    arm = np.hypot(30.0, np.hypot(2.0, 3.0))  # to a corner of the top
+    modulus = 1.0 / np.hypot(6.0 / (6.0 * 4.0**2), 6.0 / (4.0 * 6.0**2))
+    assert (joint.part, joint.area_mm2, joint.arm_mm) == (2, pytest.approx(24.0), pytest.approx(arm))
+    assert joint.load_n == pytest.approx(STRENGTH_MPA * modulus / arm)
+    assert joint.tension_n == pytest.approx(12.0 * 24.0)
+
+
+def test_a_round_post() -> None:
+    (joint,) = joints(m3.Manifold.cylinder(50.0, 5.0, 5.0, 720), (UP, 10.0))
+    assert joint.load_n == pytest.approx(STRENGTH_MPA * np.pi * 5.0**3 / 4.0 / np.hypot(40.0, 5.0), rel=1e-3)
+
+
+L_PROFILE = np.array([(0.0, 0.0), (12.0, 0.0), (12.0, 2.0), (3.0, 2.0), (3.0, 20.0), (0.0, 20.0)])
+
+
+def test_an_l_against_small_squares_pushed_in_all_directions() -> None:
+    (joint,) = joints(upright(L_PROFILE, 30.0), (UP, 5.0))
+    x, y = np.meshgrid(np.arange(0.05, 12.0, 0.1), np.arange(0.05, 20.0, 0.1))
+    places = np.stack([x, y], axis=-1)[(x < 3.0) | (y < 2.0)]
+    middle = places.mean(axis=0)
+    moments = 0.01 * ((places - middle).T @ (places - middle) + len(places) * 0.01 / 12.0 * np.eye(2))
+    turns = np.pi * np.arange(3600) / 3600
+    most = np.abs((L_PROFILE - middle) @ np.linalg.solve(moments, np.stack([np.cos(turns), np.sin(turns)]))).max()
+    arm = np.hypot(25.0, np.linalg.norm(L_PROFILE - middle, axis=1).max())
+    assert joint.arm_mm == pytest.approx(arm)
+    assert joint.load_n == pytest.approx(STRENGTH_MPA / most / arm, rel=1e-5)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(st.tuples(st.floats(3.0, 20.0), st.floats(0.02, 0.3)), min_size=5, max_size=12), st.floats(0.0, 60.0))
+def test_area_and_arm_of_any_star_are_those_of_shapely_however_it_leans(star: list[tuple[float, float]], lean_deg: float) -> None:
+    turns = np.cumsum([step for _, step in star]) / sum(step for _, step in star) * 2.0 * np.pi
+    outline = np.array([r for r, _ in star])[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
+    area = shapely.Polygon(outline)
+    if not area.is_valid or area.area < 5.0:
+        return
+    solid, lean = upright(outline, 30.0).translate((0.0, 0.0, -5.0)), np.radians(lean_deg)
+    leaning = solid.rotate((0.0, lean_deg, 0.0)) ^ m3.Manifold.cube((500.0, 500.0, 500.0), True)
+    (joint,) = joints(leaning, ((np.sin(lean), 0.0, np.cos(lean)), 3.0))
+    arm = np.hypot(22.0, np.linalg.norm(outline - np.array(area.centroid.coords[0]), axis=1).max())
+    assert (joint.area_mm2, joint.arm_mm) == (pytest.approx(area.area, rel=1e-6), pytest.approx(arm, rel=1e-6))
+
+
+def test_a_tower_in_three_parts_hangs_on_its_lowest_joint() -> None:
+    tower = m3.Manifold.cube((10.0, 10.0, 60.0))
+    low, high = joints(tower, (UP, 40.0), (UP, 10.0))
+    assert (low.part, high.part) == (2, 3)
+    assert (low.arm_mm, high.arm_mm) == (
+        pytest.approx(np.hypot(50.0, np.hypot(5, 5))),
+        pytest.approx(np.hypot(20.0, np.hypot(5, 5))),
+    )
+    assert weakest_of((low, high)) is low
+
+
+def test_what_stands_on_two_legs_hangs_on_neither_and_only_where_it_stands_counts() -> None:
+    """The roof stands on both legs: each alone holds only itself."""
+    legs = m3.Manifold.cube((4.0, 4.0, 24.0)) + m3.Manifold.cube((4.0, 4.0, 24.0)).translate((30.0, 0.0, 0.0))
+    table = legs + m3.Manifold.cube((34.0, 4.0, 10.0)).translate((0.0, 0.0, 24.0)) + m3.Manifold.cube((34.0, 4.0, 2.0))
+    leg, roof = joints(table, (UP, 24.0), (UP, 10.0))
+    assert leg.arm_mm == pytest.approx(np.hypot(14.0, np.hypot(2, 2)))
+    assert (leg.area_mm2, roof.area_mm2) == (pytest.approx(32.0), pytest.approx(32.0))
+
+
+def test_of_two_pieces_the_weaker_counts_and_both_areas() -> None:
+    posts = m3.Manifold.cube((40.0, 8.0, 5.0)) + m3.Manifold.cube((8.0, 8.0, 30.0))
+    (joint,) = joints(posts + m3.Manifold.cube((3.0, 3.0, 30.0)).translate((30.0, 0.0, 0.0)), (UP, 10.0))
+    assert joint.area_mm2 == pytest.approx(64.0 + 9.0)
+    assert joint.tension_n == pytest.approx(STRENGTH_MPA * 9.0)
+    assert joint.load_n == pytest.approx(STRENGTH_MPA * (27.0 / 6.0 / np.sqrt(2.0)) / np.hypot(20.0, np.hypot(1.5, 1.5)))
+
+
+def test_one_piece_has_no_joint() -> None:
+    parts: list[Part] = cut(mesh_of(m3.Manifold.cube((5.0, 5.0, 5.0))))
+    assert joints_of(parts, PROFILE) == ()
+    assert weakest_of(()) is None
