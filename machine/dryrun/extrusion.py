@@ -35,7 +35,8 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     if not len(deposited.rows):
         return
     sized = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
-    counted = ~program.rows_of_types(*UNEVEN)[deposited.rows] & ~_climbs(program, deposited)
+    uneven = program.rows_of_types(*UNEVEN)[deposited.rows] | _fills_grooves(program, deposited.rows, profile)
+    counted = ~uneven & ~_climbs(program, deposited)
     length = deposited.length_mm
     yield from _fast(program, deposited.rows, length)
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
@@ -61,6 +62,15 @@ def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
     np.maximum.at(high, group, program.end[rows, 2])
     climbs: NDArray[np.bool_] = (high - low)[group] > CLIMBING * deposited.height_mm
     return climbs
+
+
+def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> NDArray[np.bool_]:
+    """(m,) which beads are of a first layer on grooves, fuller by what these hold: the balance holds it against its room."""
+    fills = np.zeros(len(rows), np.bool_)
+    for part in np.unique(program.part[rows[program.part[rows] > 1]]):
+        if profile.of_part(int(part)).process.interlock == "grooves":
+            fills |= (program.part[rows] == part) & (program.layer[rows] == 1)
+    return fills
 
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:

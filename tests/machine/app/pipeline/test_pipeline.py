@@ -68,16 +68,25 @@ def test_the_plastic_is_what_the_sliced_paths_say() -> None:
     assert run.segment_mm3[of_parts].sum() == pytest.approx(planned, rel=1e-3)
 
 
-def test_pins_are_filled_without_a_finding_and_the_part_too_slender_for_one_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def _arms(*settings: str) -> Program:
     """An arm of 12 mm leans out of a block to the right, one of 4 mm to the left."""
     block = m3.Manifold.cube((30.0, 16.0, 12.0), True).translate((0.0, 0.0, 6.0))
     arms = [m3.Manifold.cube((wide, wide, 26.0), True).translate((0.0, 0.0, 13.0)) for wide in (12.0, 4.0)]
     right, left = (arm.rotate((0.0, lean, 0.0)).translate((0.0, 0.0, 9.0)) for arm, lean in zip(arms, (40.0, -40.0), strict=True))
     x, z = np.sin(np.radians(40.0)), np.cos(np.radians(40.0))
     parts = cut(from_manifold(block + right + left), ((x, 0.0, z), 19.5), ((-x, 0.0, z), 19.5))
-    profile = load(settings=["process.interlock=pins", "process.skirt_loops=0"])
+    profile = load(settings=[*settings, "process.skirt_loops=0"])
     whole = from_manifold(block + right + left)
-    program = build(Decomposition("arms", whole, tuple(parts), 1, "classic", 0.0, 0.0, 0, 1, 0.0), profile)
+    return build(Decomposition("arms", whole, tuple(parts), 1, "classic", 0.0, 0.0, 0, 1, 0.0), profile)
+
+
+def test_pins_are_filled_without_a_finding_and_the_part_too_slender_for_one_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    program = _arms("process.interlock=pins")
     assert {finding.code for finding in program.run.findings} <= {"uncalibrated"}
     assert [part.pins > 0 for part in program.sliced] == [False, False, True]
     assert "no pins under part 2: one wants a place 4.6 mm wide" in capsys.readouterr().err
+
+
+def test_grooves_are_filled_without_a_finding() -> None:
+    program = _arms("process.interlock=grooves", "process.interlock_mm=0.2")
+    assert {finding.code for finding in program.run.findings} <= {"uncalibrated"}
