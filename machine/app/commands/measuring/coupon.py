@@ -24,7 +24,7 @@ from machine.calibration.coupon.saved import material_tables, process_tables
 from machine.calibration.coupon.sheet import Sheet, empty_sheet, read_sheet, sheet_text
 from machine.calibration.saved import own_profile
 from machine.view.page import print_page
-from profiles.errors import ProfileError
+from profiles.errors import OutputError, ProfileError
 from profiles.part_settings import PartSettings
 from profiles.places import KINDS
 from profiles.profile import Profile, load, with_part_settings
@@ -35,6 +35,8 @@ UNSUPPORTED = ("process.support=none",)  # the bars carry themselves; support wo
 def write_program(request: CouponRequest, out: Path) -> int:
     """Write the G-code and, beside it, the sheet to fill in; a page that shows the bars where asked."""
     sheet_file = out.with_suffix(".toml")
+    if sheet_file == out:
+        raise OutputError(f"-o {out}: the sheet is written there, beside the program: another ending is expected, as .gcode")
     for file in (out, sheet_file):
         check_writable(file)
         refuse_to_overwrite(file, request.replace)

@@ -8,9 +8,9 @@ from machine.calibration.coupon.sheet import Sheet
 
 FACTORS = (
     Factor("interface_overlap", 0.5, 0.75),
-    Factor("interface_flow", 1.05, 1.15),
-    Factor("interface_temperature_add_c", 5.0, 20.0),
-    Factor("interface_bottom_layers", 0, 2),
+    Factor("interface_flow", 1.1, 1.15),
+    Factor("interface_temperature_add_c", 10.0, 20.0),
+    Factor("interface_bottom_layers", 1, 2),
 )
 WHOLE_MPA = {"z": 24.0, "x": 40.0}
 

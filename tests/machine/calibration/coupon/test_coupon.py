@@ -68,9 +68,9 @@ def test_from_the_program_by_a_simulated_print_to_own_profiles(capsys: pytest.Ca
     assert "0 loads are too few" in capsys.readouterr().err
     filled = written(replace(empty, loads_n=broken(TRUTH, 3, 0.1, 5).loads_n))
     assert main(["coupon", "--measured", filled]) == 0
-    assert "interface_temperature_add_c = 20.0 instead of 5.0" in capsys.readouterr().out
+    assert "interface_temperature_add_c = 20.0 instead of 10.0" in capsys.readouterr().out
     process = load(*NAMES).process
-    assert (process.interface_overlap, process.interface_temperature_add_c, process.interface_flow) == (0.75, 20.0, 1.05)
+    assert (process.interface_overlap, process.interface_temperature_add_c, process.interface_flow) == (0.75, 20.0, 1.1)
 
 
 def test_strengths_and_winners_are_saved_with_date_and_source(capsys: pytest.CaptureFixture[str]) -> None:
@@ -133,7 +133,8 @@ def test_the_report_is_a_table_and_saves_nothing(capsys: pytest.CaptureFixture[s
         ),
         (["--measured", "coupon.toml", "--material", "petg"], "a sheet of pla: --material pla is expected, not petg"),
         (["--measured", "nowhere.toml"], "sheet nowhere.toml cannot be read"),
-        (["-o", "coupon.toml"], "coupon.toml exists: --replace writes over it"),
+        (["-o", "coupon.gcode"], "coupon.toml exists: --replace writes over it"),
+        (["-o", "x.toml"], "-o x.toml: the sheet is written there, beside the program: another ending is expected, as .gcode"),
         (["-o", "x.gcode", "--shape", "round"], "--shape round: bend or tensile is expected"),
         (["-o", "x.gcode", "--machine", "three_axis"], "three axes has three axes"),
         (["-o", "x.gcode", "--vary", "interface_flow=7"], "process.interface_flow is 7: it must be a number from 0.5 to 1.5"),

@@ -41,7 +41,7 @@ def test_the_usual_factors_differ_from_the_process_whatever_it_has() -> None:
         (["interface_flow=9"], "--vary: process.interface_flow is 9: it must be a number from 0.5 to 1.5"),
         (["line_width_mm=3"], "--vary: process.line_width_mm is 3: a 0.4 mm nozzle prints lines of 0.24 to 1 mm"),
         (["brim_mm=3"], "--vary brim_mm=3: brim_mm cannot differ from bar to bar"),
-        (["interface_flow=1.05"], "the process has that value itself, so the bars would be alike"),
+        (["interface_flow=1.1"], "the process has that value itself, so the bars would be alike"),
         (["interface_flow=1.1", "process.interface_flow=1.2"], "interface_flow is given twice"),
         ([f"walls={k}" for k in range(6)], "--vary is given 6 times: 8 bars can tell 5 settings apart at most"),
     ],
