@@ -1,6 +1,7 @@
 """Flats: directions along the large flat faces of a model. A part printed along their normal, or along a line in two of them,
 shows no stairs on them; a direction half a degree beside shows them as high as any."""
 
+from dataclasses import dataclass
 from itertools import combinations
 from math import cos, radians
 
@@ -12,48 +13,70 @@ LEAST_SHARE = 0.02  # of the surface that looks one way: on a ball of 5,000 face
 MOST_FLATS, MOST_DIRECTIONS = 12, 40  # 12 flats have 66 lines in two of them; few of those lie in more than two
 SAME = cos(radians(0.5))
 COARSE = 0.05  # of the parts of a unit vector, in which areas are added up beforehand: several times what SAME allows
+OFF_DEG = 15.0  # a direction that is less beside one along large flats is meant to be it
 DIGITS = 4  # of the parts of a unit vector: what differs less looks the same way
 
 
-def flat_directions(mesh: Mesh, least_z: float) -> Floats:
-    """(k, 3) unit directions with at least that z along which large flat faces are level or walls, those first along which the
-    largest area is."""
-    flats, areas = _flats(mesh)
-    crossed = [np.cross(first, second) for first, second in combinations(flats, 2)]
-    found = np.array([*flats, *crossed]).reshape(-1, 3)
-    lengths = np.linalg.norm(found, axis=1)
-    found = found[lengths > 1e-2] / lengths[lengths > 1e-2, None]
-    found = np.concatenate([found, -found])
-    found = found[found[:, 2] >= least_z]
-    cosines = np.abs(found @ flats.T) if len(flats) else np.zeros((len(found), 0))
-    along = (((cosines >= SAME) | (cosines <= np.sqrt(1.0 - SAME * SAME))) * areas).sum(axis=1)
-    directions = np.zeros((0, 3))
-    for direction in found[np.lexsort((*np.round(found.T, DIGITS), -np.round(along, DIGITS)))]:
-        if len(directions) < MOST_DIRECTIONS and not np.any(directions @ direction >= SAME):
-            directions = np.concatenate([directions, direction[None]])
-    return directions
+@dataclass(frozen=True, eq=False)
+class Flats:
+    """The large flats of a model: (k, 3) normals, both sides of a wall taken as one, and (k,) their shares of the surface."""
 
+    normals: Floats
+    shares: Floats
 
-def _flats(mesh: Mesh) -> tuple[Floats, Floats]:
-    """(k, 3) normals of the largest flats, both sides of a wall taken as one, and (k,) their shares of the surface."""
-    normals = np.round(mesh.normals, DIGITS)
-    order = np.lexsort(normals.T)
-    changed = np.any(np.diff(normals[order], axis=0) != 0.0, axis=1)
-    starts = np.concatenate([[0], np.flatnonzero(changed) + 1])
-    areas = np.add.reduceat(mesh.areas_mm2[order], starts)
-    alike, least_mm2 = mesh.normals[order[starts]], LEAST_SHARE * mesh.areas_mm2.sum()
-    flats, shares = np.zeros((0, 3)), np.zeros(0)
-    large = np.flatnonzero(_areas_near(alike, areas) >= least_mm2)
-    for row in large[np.argsort(-np.round(areas[large], 6), kind="stable")]:
-        near = np.abs(flats @ alike[row]) >= SAME
-        if near.any():
-            shares[np.argmax(near)] += areas[row]
-        else:
-            flats, shares = np.concatenate([flats, alike[row][None]]), np.append(shares, areas[row])
-    shares /= mesh.areas_mm2.sum()
-    largest = np.argsort(-shares, kind="stable")[:MOST_FLATS]
-    largest = largest[shares[largest] >= LEAST_SHARE]
-    return flats[largest], shares[largest]
+    @classmethod
+    def of(cls, mesh: Mesh) -> "Flats":
+        """Those of a mesh, the largest first."""
+        normals = np.round(mesh.normals, DIGITS)
+        order = np.lexsort(normals.T)
+        changed = np.any(np.diff(normals[order], axis=0) != 0.0, axis=1)
+        starts = np.concatenate([[0], np.flatnonzero(changed) + 1])
+        areas = np.add.reduceat(mesh.areas_mm2[order], starts)
+        alike, least_mm2 = mesh.normals[order[starts]], LEAST_SHARE * mesh.areas_mm2.sum()
+        flats, shares = np.zeros((0, 3)), np.zeros(0)
+        large = np.flatnonzero(_areas_near(alike, areas) >= least_mm2)
+        for row in large[np.argsort(-np.round(areas[large], 6), kind="stable")]:
+            near = np.abs(flats @ alike[row]) >= SAME
+            if near.any():
+                shares[np.argmax(near)] += areas[row]
+            else:
+                flats, shares = np.concatenate([flats, alike[row][None]]), np.append(shares, areas[row])
+        shares /= mesh.areas_mm2.sum()
+        largest = np.argsort(-shares, kind="stable")[:MOST_FLATS]
+        largest = largest[shares[largest] >= LEAST_SHARE]
+        return cls(flats[largest], shares[largest])
+
+    def directions(self, least_z: float) -> Floats:
+        """(k, 3) unit directions with at least that z along which flats are level or walls, those first along which the largest
+        area is."""
+        crossed = [np.cross(first, second) for first, second in combinations(self.normals, 2)]
+        found = np.array([*self.normals, *crossed]).reshape(-1, 3)
+        lengths = np.linalg.norm(found, axis=1)
+        found = found[lengths > 1e-2] / lengths[lengths > 1e-2, None]
+        found = np.concatenate([found, -found])
+        found = found[found[:, 2] >= least_z]
+        directions = np.zeros((0, 3))
+        for direction in found[np.lexsort((*np.round(found.T, DIGITS), -np.round(self.share_along(found), DIGITS)))]:
+            if len(directions) < MOST_DIRECTIONS and not np.any(directions @ direction >= SAME):
+                directions = np.concatenate([directions, direction[None]])
+        return directions
+
+    def share_along(self, directions: Floats) -> Floats:
+        """(n,) share of the surface that is level or a wall along each of (n, 3) directions."""
+        cosines = np.abs(directions @ self.normals.T)
+        along: Floats = ((cosines >= SAME) | (cosines <= np.sqrt(1.0 - SAME * SAME))) @ self.shares
+        return along
+
+    def beside(self, direction: Floats, least_z: float) -> Floats:
+        """(k, 3) directions less than OFF_DEG beside a given one along which more of the surface is level or a wall, those first
+        along which most is."""
+        walls = direction - (self.normals @ direction)[:, None] * self.normals
+        lengths = np.linalg.norm(walls, axis=1)
+        found = np.concatenate([self.directions(least_z), walls[lengths > 1e-2] / lengths[lengths > 1e-2, None]])
+        share = self.share_along(found)
+        better = (found @ direction > cos(radians(OFF_DEG))) & (found[:, 2] >= least_z)
+        better &= share > self.share_along(direction[None]) + 10.0**-DIGITS
+        return found[better][np.argsort(-np.round(share[better], DIGITS), kind="stable")]
 
 
 def _areas_near(normals: Floats, areas: Floats) -> Floats:

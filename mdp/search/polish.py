@@ -6,6 +6,7 @@ plane may still be cut, and where that made room further cuts are added. What co
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from math import cos, radians, sin
 
@@ -63,19 +64,30 @@ def polish(problem: Problem, node: Node) -> Node:
     return min((node, best.nodes[-1], longer.nodes[-1]), key=lambda last: (last.cost_mm2, len(last.cuts)))
 
 
-def make_symmetric(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Node:
-    """The node with its planes more symmetric about a model's mirror planes, as far as it stays alike in cost: planes that lean a
-    little across a mirror stand upright on it, and of two that are nearly each other's image one becomes it."""
+def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Node:
+    """The node with its planes as a person would lay them, as far as it stays alike in cost: along the model's large flats, and
+    more symmetric about its mirror planes; planes that lean a little across a mirror stand upright on it, and of two that are
+    nearly each other's image one becomes it."""
     most_mm2 = node.cost_mm2 * (1.0 + EQUAL)
     best = Chain.to(node)
-    for change, mirror in product((_stand_upright, _pair), mirrors):
+    of_mirrors = [partial(change, mirror=mirror) for change, mirror in product((_stand_upright, _pair), mirrors)]
+    along = [partial(_align, problem)] if problem.terms.stair_weight > 0.0 else []
+    for change in (*along, *of_mirrors):
         for position in range(len(problem.start.cuts), len(best.planes)):
-            for planes in change(best, position, mirror):
+            for planes in change(best, position):
                 changed = None if problem.late() else _recut(problem, best, position, planes)
                 if changed is not None and changed.cost_mm2 <= most_mm2:
                     best = changed
                     break
     return best.nodes[-1]
+
+
+def _align(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane]]:
+    """The planes from a position on, the first of them turned to where its part shows fewer stairs on large flats."""
+    here, *later = chain.planes[position:]
+    middle = _middle(chain.nodes[position + 1])
+    for normal in problem.flats.beside(here.normal, problem.least_z):
+        yield [Plane(normal, float(normal @ middle)), *later]
 
 
 def _stand_upright(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:

@@ -11,7 +11,7 @@ from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
 from mdp.cost.model_need import ModelNeed, ModelSurface
 from mdp.cut import below, solid_of
-from mdp.directions.flats import flat_directions
+from mdp.directions.flats import Flats
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
@@ -97,9 +97,18 @@ class Problem:
         but those of its own."""
         sampled = directions(self.settings)
         if self.terms.stair_weight > 0.0:
-            least_z = sin(radians(self.settings.least_elevation_deg))
-            sampled = np.concatenate([sampled, flat_directions(self.mesh, least_z)])
+            sampled = np.concatenate([sampled, self.flats.directions(self.least_z)])
         return self.bounds_along(sampled)
+
+    @cached_property
+    def flats(self) -> Flats:
+        """The large flats of the model."""
+        return Flats.of(self.mesh)
+
+    @property
+    def least_z(self) -> float:
+        """Of the printing direction of a part, the table tilting no further."""
+        return sin(radians(self.settings.least_elevation_deg))
 
     def begin(self) -> None:
         """Have the time limit count from now on."""

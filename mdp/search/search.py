@@ -25,7 +25,7 @@ from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
-from mdp.search.polish import make_symmetric, polish
+from mdp.search.polish import make_regular, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
 from profiles.errors import PlanError
@@ -217,7 +217,7 @@ def _search_beam(
             _report(problem, report, stage, held, beam.best)
         best = _polish_finalists(problem, beam, stage, report)
         if problem.settings.polish and problem.terms.seam_mm > 0.0:
-            _prefer_symmetry(problem, beam.front)
+            _prefer_regular(problem, beam.front)
         return best, beam.front, stage
     except KeyboardInterrupt:
         problem.stop()
@@ -238,13 +238,13 @@ def _polish_finalists(problem: Problem, beam: Beam, stage: int, report: Callable
     return best
 
 
-def _prefer_symmetry(problem: Problem, front: Front) -> None:
-    """Make the rows of a front that may be taken as symmetric as they can be at the same cost, where the model is symmetric."""
+def _prefer_regular(problem: Problem, front: Front) -> None:
+    """Lay the planes of the rows of a front that may be taken along flats and symmetric where the model is, at the same cost."""
     nodes = [node for node in front.nodes if all(node.cost_mm2 < fewer.cost_mm2 for fewer in front.nodes[: len(node.cuts)])]
     cut = [node for node in nodes if len(node.cuts) > len(problem.start.cuts)]
     mirrors = find_mirrors(problem.mesh) if cut else []
-    for node in cut if mirrors else []:
-        front.replace(node, make_symmetric(problem, node, mirrors))
+    for node in cut if mirrors or len(problem.flats.shares) else []:
+        front.replace(node, make_regular(problem, node, mirrors))
 
 
 def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.cut import mesh_of
-from mdp.directions.flats import flat_directions
+from mdp.directions.flats import Flats
 from mdp.mesh import Floats, Mesh
 from mdp.pose import about
 from tests import shapes
@@ -25,12 +25,12 @@ def same(directions: Floats, expected: Floats) -> bool:
 
 
 def test_a_box_has_its_three_axes_both_ways() -> None:
-    assert same(flat_directions(shapes.box(10, 20, 30), -1.0), np.concatenate([np.eye(3), -np.eye(3)]))
-    assert same(flat_directions(shapes.box(10, 20, 30), 0.1), np.array([[0.0, 0.0, 1.0]]))
+    assert same(Flats.of(shapes.box(10, 20, 30)).directions(-1.0), np.concatenate([np.eye(3), -np.eye(3)]))
+    assert same(Flats.of(shapes.box(10, 20, 30)).directions(0.1), np.array([[0.0, 0.0, 1.0]]))
 
 
 def test_the_axis_of_a_prism_comes_first_for_all_of_its_faces_are_level_or_walls_along_it() -> None:
-    first = flat_directions(prism(6), 0.0)[0]
+    first = Flats.of(prism(6)).directions(0.0)[0]
     assert first == pytest.approx([0.0, 0.0, 1.0])
 
 
@@ -39,14 +39,24 @@ def test_the_axis_of_a_prism_comes_first_for_all_of_its_faces_are_level_or_walls
 def test_a_model_that_is_turned_has_its_directions_turned(x: float, y: float, z: float) -> None:
     turn = np.linalg.multi_dot([about(axis, angle) for axis, angle in zip(np.eye(3), (x, y, z), strict=True)])
     mesh = prism(5)
-    assert same(flat_directions(mesh.transform(turn), -1.0), flat_directions(mesh, -1.0) @ turn.T)
+    assert same(Flats.of(mesh.transform(turn)).directions(-1.0), Flats.of(mesh).directions(-1.0) @ turn.T)
 
 
 def test_a_ball_has_none() -> None:
-    assert len(flat_directions(mesh_of(m3.Manifold.sphere(10.0, 64)), -1.0)) == 0
+    assert len(Flats.of(mesh_of(m3.Manifold.sphere(10.0, 64))).shares) == 0
 
 
 def test_no_direction_is_within_half_a_degree_of_another() -> None:
-    directions = flat_directions(mesh_of(m3.Manifold.cylinder(20.0, 10.0, 6.0, 24)), -1.0)
+    directions = Flats.of(mesh_of(m3.Manifold.cylinder(20.0, 10.0, 6.0, 24))).directions(-1.0)
     between = np.degrees(np.arccos(np.clip(directions @ directions.T - 2.0 * np.eye(len(directions)), -1.0, 1.0)))
     assert between.min() >= 0.5
+
+
+def test_beside_a_direction_are_those_along_more_flats_the_one_along_most_of_all_first() -> None:
+    flats = Flats.of(shapes.box(10, 20, 30))
+    askew = about(np.array([0.0, 1.0, 0.0]), 0.1) @ about(np.array([0.0, 0.0, 1.0]), 0.1) @ np.array([1.0, 0.0, 0.0])
+    first, *others = flats.beside(askew, -1.0)
+    assert first == pytest.approx([1.0, 0.0, 0.0])
+    assert len(others) == 2  # leaning about y or about z only
+    assert len(flats.beside(np.array([1.0, 0.0, 0.0]), -1.0)) == 0
+    assert len(flats.beside(np.array([1.0, 1.0, 1.0]) / np.sqrt(3.0), -1.0)) == 0

@@ -9,7 +9,7 @@ from mdp.mesh import Floats
 from mdp.overhang import risky_above, risky_upright
 from mdp.plane import Plane
 from mdp.search.node import Node
-from mdp.search.polish import make_symmetric, polish
+from mdp.search.polish import make_regular, polish
 from mdp.search.problem import Problem
 from profiles.profile import load
 from tests import shapes
@@ -106,9 +106,18 @@ def test_cuts_that_are_nearly_symmetric_become_so_where_the_model_is() -> None:
     problem = _problem("search.objective=scar")
     askew = [_through(30.0, 5.5, _leaning(0.96, 0.05)), _through(30.0, -5.7, _leaning(-0.95, 0.02))]
     node = _after(problem, *askew)
-    even = make_symmetric(problem, node, find_mirrors(problem.mesh))
+    even = make_regular(problem, node, find_mirrors(problem.mesh))
     first, second = (cut.base for cut in even.cuts)
     assert second.normal == pytest.approx(first.normal * [-1.0, 1.0, 1.0])  # each other's image across x
     assert second.offset_mm == pytest.approx(first.offset_mm)
     assert first.normal[1] == pytest.approx(0.0)  # and each its own across y
     assert even.cost_mm2 <= 1.01 * node.cost_mm2
+
+
+def test_a_cut_that_is_a_little_askew_to_the_model_lies_along_its_flats_where_that_costs_no_more() -> None:
+    problem = _problem("search.objective=scar")
+    askew = np.array([0.98, 0.04, 0.3])
+    node = _after(problem, _through(30.0, 9.0, askew / np.linalg.norm(askew)))
+    along = make_regular(problem, node, [])
+    assert along.cost_mm2 <= 1.01 * node.cost_mm2
+    assert problem.flats.share_along(along.cuts[0].base.normal[None]) > problem.flats.share_along(node.cuts[0].base.normal[None])
