@@ -81,8 +81,8 @@ def _bottom(process: Process, on_platform: bool) -> _Bottom:
 def interface_height_mm(process: Process) -> float:
     """Height of a first layer on plastic: a layer's less the overlap, no lower than the least layer.
 
-    >>> interface_height_mm(Process(name="example", layer_height_mm=0.2, interface_overlap=0.25))
-    0.15
+    >>> interface_height_mm(Process(name="example", layer_height_mm=0.2, interface_overlap=0.5))
+    0.1
     """
     least = min(process.least_layer_height_mm, process.layer_height_mm)
     return max((1.0 - process.interface_overlap) * process.layer_height_mm, least)

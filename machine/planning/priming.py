@@ -15,12 +15,12 @@ from profiles.profile import Profile
 from slicer.paths import Kind, Layer, bead_area_mm2
 
 RUN_MM = 20.0  # the filament of a turn is spread over so much of a stroke
-MOST = 1.9  # of what the width and the height of a bead need: from 2 on the dry run takes it for a slip
+MOST = 1.5  # of what the width and the height of a bead need: what did not ooze shall not fill the room twice
 SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN)
 
 
 def run_in(stroke: Stroke, layer: Layer, tip: Tip, profile: Profile) -> Stroke:
-    """The stroke with what is still to be pushed after a turn; nearly double what its width and height need, the rest waits.
+    """The stroke with what is still to be pushed after a turn; half more than its width and height need, the rest waits.
 
     A stroke that is seen takes it only in a layer that has no other.
     """

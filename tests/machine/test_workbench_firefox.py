@@ -134,7 +134,7 @@ def test_firefox_changes_settings_of_all_parts_and_of_one(firefox: Firefox) -> N
     assert firefox.value("$('settings-part').selectedOptions[0].text") == "part 2 (1 of its own)"
     put(firefox, "$('settings-part')", 0)
     assert "--set process.walls=1" in firefox.value("$('command-line').textContent")
-    put_setting(firefox, "machine.gcode.after_part", "M104 S120")
+    put_setting(firefox, "machine.gcode.before_part", "M104 S120")
 
 
 def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: Firefox) -> None:
@@ -152,7 +152,7 @@ def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: F
     put(firefox, f"{VIEW}.getElementById('layer-high-mm')", 0.8)
     assert firefox.value(f"{VIEW}.getElementById('layer-high-number').value") == "2"
     firefox.click("#leave-print")
-    firefox.click("#undo")  # part 2 is printed hot again
+    firefox.click("#undo")  # the first part is printed hot again
     firefox.wait("document.body.classList.contains('stale')")
     firefox.click("#slice")
     firefox.wait(SLICED)
