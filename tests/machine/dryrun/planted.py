@@ -299,7 +299,7 @@ FAULTS = (
     Fault("another turn", "pose", 2, 1, on(turn_to(2), turned_on)),
     Fault("a tilt to the other side", "pose", 2, 1, on(turn_to(2), tilted_back)),
     Fault("filament while the table turns", "turning-stroke", 1, 48, on(turn_to(2), lambda line: line + " E1")),
-    Fault("speeds ten times as high", "flow", 2, 1, on(part(2), word("F", lambda f: 10 * f, STROKES)), "warning"),
+    Fault("speeds ten times as high", "flow", 2, 2, on(part(2), word("F", lambda f: 10 * f, STROKES)), "warning"),
     Fault("M220 S1000", "axis-speed", 1, 0, insert(IN_1_20, "M220 S1000"), "warning"),
     Fault("relative moves from a layer on", "axis-limit", 1, 0, insert(IN_1_20, "G91")),
     Fault("inches from a layer on", "gap", 1, 20, insert(IN_1_20, "G20")),
