@@ -1,7 +1,5 @@
 """Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
 
-import os
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -10,40 +8,18 @@ from mdp.directions.turns import turned_by
 from mdp.formats.readers import READERS
 from mdp.formats.surface import Surface
 from mdp.mesh import Mesh
+from mdp.model_file import check_file
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
 from mdp.topology.components import vertex_components
 from profiles.errors import MeshError
 
-DEMO = "demo:"
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
 TYPICAL_MM = 100.0  # of several units that would fit the one is proposed by which a model is nearest to this
 MANY_FACES = 500_000  # more make no better print: at 0.2 mm an edge they are an area of 90 cm2
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
-
-
-def locate(model: str) -> Path:
-    """The file of a MODEL argument: `demo:NAME` is a model that ships with the program, anything else a path.
-
-    Raises MeshError for no name at all, and for an unknown demo, naming those there are.
-    """
-    if not model.strip():
-        raise MeshError(f"the model's name is empty: a {', '.join(READERS)} file or {DEMO}NAME is expected")
-    if not model.startswith(DEMO):
-        return Path(model)
-    name = model.removeprefix(DEMO)
-    folder = resources.files("mdp").joinpath("demos")
-    demos = (
-        {entry.name.removesuffix(".ply"): entry for entry in folder.iterdir() if entry.name.endswith(".ply")}
-        if folder.is_dir()
-        else {}
-    )
-    if name not in demos:
-        known = ", ".join(f"{DEMO}{demo}" for demo in sorted(demos))
-        raise MeshError(f"there is no demo model {name!r}; allowed are {known or 'none: none is installed'}")
-    return Path(str(demos[name]))
 
 
 def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0)) -> tuple[Mesh, tuple[str, ...]]:
@@ -89,16 +65,6 @@ def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
         return ()
     pieces = "1 piece floats" if len(heights) == 1 else f"{len(heights)} pieces float at least"
     return (f"{pieces} {heights.min():.3g} mm above the platform on nothing: no cut changes that, only support can hold such",)
-
-
-def check_file(path: Path) -> None:
-    """Refuse what is no model file at all before any work is done. Raises MeshError."""
-    if os.path.isdir(path):  # unlike pathlib's, false for a name that is too long to exist
-        raise MeshError(f"{path}: is a folder, not a model file")
-    if not os.path.exists(path):
-        raise MeshError(f"{path}: there is no such file")
-    if path.suffix.lower() not in READERS:
-        raise MeshError(f"{path}: the kind of file {path.suffix!r} is not read; allowed are {', '.join(READERS)}")
 
 
 def _read_surfaces(path: Path) -> list[Surface]:

@@ -15,7 +15,8 @@ from typing import TypeVar
 from machine.app.pipeline.pricing import pricing
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words
-from mdp.read import locate, read_mesh
+from mdp.model_file import locate
+from mdp.read import read_mesh
 from mdp.search.laying import lay_down
 from mdp.search.search import decompose
 from profiles.profile import Profile, load

@@ -16,9 +16,10 @@ import numpy as np
 import mdp.kernels.threads
 from mdp.cut import mesh_of, solid_of
 from mdp.mesh import Mesh
+from mdp.model_file import locate
 from mdp.overhang import risky_upright, threshold
 from mdp.ranking.candidates import Bounds, bounds_of, directions, platform_disc
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.search.search import decompose
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load

@@ -11,8 +11,9 @@ import numpy as np
 
 from mdp.kernels.arrays import dot
 from mdp.mesh import Floats, Mesh
+from mdp.model_file import locate
 from mdp.overhang import risky_upright, threshold
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.search.problem import Problem
 from mdp.sweep.components import View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas

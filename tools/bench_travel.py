@@ -20,9 +20,10 @@ from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
+from mdp.model_file import locate
 from mdp.plane import PLATFORM
 from mdp.pose import level
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.save import stl
 from profiles.profile import Profile, load
 from slicer.slice import slice_part

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from mdp.cut import mesh_of, solid_of
 from mdp.mesh import Floats
-from mdp.read import locate, read_mesh
+from mdp.model_file import locate
+from mdp.read import read_mesh
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.workbench import Page, Running, workbench

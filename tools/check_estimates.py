@@ -13,7 +13,8 @@ from time import process_time
 from machine.app.pipeline.pipeline import build
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
-from mdp.read import locate, read_mesh
+from mdp.model_file import locate
+from mdp.read import read_mesh
 from mdp.search.parts import one_piece
 from mdp.search.search import decompose
 from profiles.errors import UserError

@@ -30,8 +30,9 @@ from machine.planning.timing import move_times
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats, Mesh
+from mdp.model_file import locate
 from mdp.pose import level
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.save import stl
 from profiles.profile import Profile, load
 from slicer.geometry.cross_section import cross_sections

@@ -32,9 +32,10 @@ from mdp.learning.collection.models import coarser, read_model
 from mdp.learning.collection.task import PAPER_TERMS
 from mdp.learning.sources import Side, read_sources, side
 from mdp.mesh import Floats, Mesh
+from mdp.model_file import locate
 from mdp.overhang import risky_upright, standing
 from mdp.ranking.ranker import CLASSIC
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.search.search import decompose
 from profiles.errors import MeshError
 from profiles.profile import Profile, load

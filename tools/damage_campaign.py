@@ -35,7 +35,8 @@ from machine.app.pipeline.programs import read_gcode_lines
 from machine.app.terminal.plain import plain_lines
 from machine.dryrun import dry_run
 from mdp.formats.readers import READERS
-from mdp.read import locate, read_mesh
+from mdp.model_file import locate
+from mdp.read import read_mesh
 from profiles.errors import UserError
 from profiles.profile import load
 

@@ -6,8 +6,8 @@ from os.path import isfile
 from pathlib import Path
 
 from machine.app.requests import STDOUT, ModelRequest, Outputs, PrintRequest
+from mdp.model_file import DEMO
 from mdp.ranking.ranker import SUFFIX
-from mdp.read import DEMO
 from mdp.save import FOLDER_FILES, PART_FILES
 from profiles.errors import OutputError
 from profiles.places import is_file_name

@@ -38,6 +38,7 @@ def decompose(
     given: options.ModelProfileOptions,
 ) -> int:
     """Cut a model into parts, each with its own printing direction."""
+    options.check_model(model)
     from machine.app.commands.decompose import decompose
 
     known = plan is not None and exists(plan)
@@ -64,6 +65,7 @@ def export(
     given: options.ModelProfileOptions,
 ) -> int:
     """Write the G-code of a model, dry-run first."""
+    options.check_model(model)
     from machine.app.commands.export import export
 
     outputs = Outputs(gcode=out, json=json, html=html, svg=svg, layer=layer)

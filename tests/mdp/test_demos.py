@@ -8,8 +8,9 @@ import pytest
 
 from mdp.cut import solid_of
 from mdp.mesh import Mesh
+from mdp.model_file import locate
 from mdp.overhang import risky_upright
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.search.search import decompose
 from profiles.profile import load
 from tests.checks import assert_closed

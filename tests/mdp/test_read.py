@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from mdp.mesh import Mesh
-from mdp.read import MANY_FACES, locate, read_mesh, too_fine
+from mdp.model_file import locate
+from mdp.read import MANY_FACES, read_mesh, too_fine
 from profiles.errors import MeshError
 from tests.mdp import files
 from tests.mdp.files import refusal, save

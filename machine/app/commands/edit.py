@@ -13,9 +13,9 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.redirect import redirecting
 from machine.app.workbench.web.serve import serve_workbench
 from machine.app.workbench.work.worker_pool import WorkerPools
+from mdp.model_file import DEMO, check_file, locate
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
-from mdp.read import DEMO, check_file, locate
 from profiles.errors import MeshError, PlanError
 
 PLAN_SUFFIX = ".toml"

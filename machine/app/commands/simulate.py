@@ -14,7 +14,8 @@ from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import find_starvation
 from machine.firmware.line import check_baud
 from machine.view.page import print_page
-from mdp.read import check_file, locate, read_mesh
+from mdp.model_file import check_file, locate
+from mdp.read import read_mesh
 from profiles.errors import ProfileError
 
 

@@ -30,9 +30,10 @@ from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
+from mdp.model_file import locate
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.search.by_plan import cut_by_plan
 from mdp.search.front import Worth
 from mdp.search.laying import lay_down

@@ -146,6 +146,13 @@ class ModelProfileOptions(ProfileOptions):
     process: Annotated[str, _profile_option("process")] = Given.process
 
 
+def check_model(model: str) -> None:
+    """Refuse what is no model file before the command is loaded, which takes a second. Raises MeshError."""
+    from mdp.model_file import check_file, locate
+
+    check_file(locate(model))
+
+
 def model_request(model: str, search: SearchOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
     """What is asked for of a model; further: other fields of the request. Raises ProfileError."""
     profile = given.profile(search)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mdp.formats import readers
 from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
-from mdp.read import locate
+from mdp.model_file import locate
 from mdp.repair.repair import repair
 from mdp.repair.shells import solid_of, surface_of, volume_of
 from profiles.errors import MeshError

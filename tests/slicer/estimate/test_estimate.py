@@ -8,7 +8,8 @@ import pytest
 
 from machine.app.pipeline.pipeline import build
 from mdp.mesh import Mesh
-from mdp.read import locate, read_mesh
+from mdp.model_file import locate
+from mdp.read import read_mesh
 from mdp.search.search import decompose
 from profiles.process import Process
 from slicer.estimate.estimate import Estimate, estimate

@@ -33,9 +33,10 @@ from machine.app.workbench.session.trials import PlaneTrials
 from machine.app.workbench.work.models import Resting
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.directions.turns import turned_by
+from mdp.model_file import locate
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
-from mdp.read import MANY_FACES, locate
+from mdp.read import MANY_FACES
 from profiles.errors import PlanError
 from profiles.profile import Profile
 

@@ -14,9 +14,10 @@ from machine.app.workbench.work import worker_pool
 from machine.app.workbench.work.cutting import SearchWay
 from machine.app.workbench.work.processes import Process, hear_the_ends, start_process
 from machine.app.workbench.work.worker_pool import TaskQueue, WorkerPool, WorkerPools
+from mdp.model_file import locate
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
-from mdp.read import locate, read_mesh
+from mdp.read import read_mesh
 from mdp.search.trial import Trials
 from profiles.errors import UserError
 from profiles.profile import load
