@@ -44,10 +44,10 @@ class Bead:
     """points: (n, 2) mm, a closed bead repeats its first point.
 
     rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
-    each outer wall. over_infill: a bridge over the sparse infill of the layer below, which has a speed and a fan of its own.
-    follows: printed right after the bead before it in the list. overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its
-    width or nothing of it lies on plastic. line: a wall that does not run round. course: where the width varies, of which
-    width_mm is then the mean; the points lie on it.
+    each outer wall, what is below all ranks of walls comes before them. over_infill: a bridge over the sparse infill of the
+    layer below, which has a speed and a fan of its own. follows: printed right after the bead before it in the list. overhang:
+    of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or nothing of it lies on plastic. line: a wall that does not run
+    round. course: where the width varies, of which width_mm is then the mean; the points lie on it.
     """
 
     kind: Kind

@@ -13,6 +13,7 @@ from slicer.geometry.polygons import Polygons, clean, contours, union
 from slicer.paths import Kind
 from slicer.sections import Sections
 from slicer.travel.islands import OUTSIDE
+from slicer.travel.order import BEFORE_WALLS, FILL, LAST
 
 BELOW_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
 
@@ -57,18 +58,18 @@ def plane_in_frame_of(part: Part, normal: Floats, offset_mm: float) -> Floats:
 
 
 def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
-    """The beads of a first layer on plastic, the longest of its infill or skin first where it has no support: what oozed while
-    the table turned is made up for there, not where a wall has its seam.
+    """The beads of a first layer on plastic, what fills its walls before them: outer walls are laid last, against beads that are
+    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up
+    for there, not where a wall has its seam.
     """
-    if any(bead.rank <= OUTSIDE for bead in beads):
-        return list(beads)
+    inside = [replace(bead, rank=BEFORE_WALLS) if FILL <= bead.rank <= LAST else bead for bead in beads]
+    if any(bead.rank <= OUTSIDE for bead in inside):
+        return inside
     for kind in (Kind.INFILL, Kind.SKIN):
-        inner = [k for k, bead in enumerate(beads) if bead.kind is kind]
-        if inner:
-            longest = max(inner, key=lambda k: (beads[k].length_mm, -k))
-            first = replace(beads[longest], rank=OUTSIDE)
-            return [first, *beads[:longest], *beads[longest + 1 :]]
-    return list(beads)
+        longest = max((bead for bead in inside if bead.kind is kind), key=lambda bead: bead.length_mm, default=None)
+        if longest is not None:
+            return [replace(longest, rank=OUTSIDE), *(bead for bead in inside if bead is not longest)]
+    return inside
 
 
 def interface_edges(sections: Sections) -> Floats:

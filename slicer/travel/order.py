@@ -21,13 +21,14 @@ from slicer.bead import WALLS, Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.travel.combing import NOWHERE
-from slicer.travel.islands import FIRST, OUTSIDE, SUPPORTS, islands_of
+from slicer.travel.islands import FIRST, SUPPORTS, islands_of
 from slicer.travel.path_order import order_paths
 from slicer.travel.retracting import travels
 from slicer.travel.rings import AS_IT_IS, CLOSED, OPEN, order_lines
 
 SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
 FILL, LAST = 1, 99  # beads of these ranks fill what the walls enclose, in any order; what smooths a top comes after
+BEFORE_WALLS = -500  # beads of this rank come before the walls of their island; those of walls are above
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 
 
@@ -142,11 +143,11 @@ def _freedom(chain: Sequence[Bead]) -> int:
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
     """What of an island is printed before what: by rank, but all walls at once, in families that stay together."""
-    leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and OUTSIDE < bead.rank <= 0]
-    walls = [bead for bead in beads if leaders and OUTSIDE < bead.rank <= 0]
+    leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
+    walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
     phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
     for bead in beads:
-        if leaders and OUTSIDE < bead.rank <= 0:
+        if leaders and BEFORE_WALLS < bead.rank <= 0:
             continue
         phase = FILL if FILL <= bead.rank <= LAST else bead.rank
         if bead.follows and phases[phase]:

@@ -78,5 +78,15 @@ def test_a_part_on_plastic_begins_inside_with_its_skin() -> None:
 @pytest.mark.parametrize("kinds", [(Kind.OUTER_WALL, Kind.INNER_WALL), (Kind.SUPPORT, Kind.INFILL)])
 def test_a_layer_that_begins_with_support_or_has_nothing_inside_keeps_its_order(kinds: tuple[Kind, ...]) -> None:
     line = np.array([[0.0, 0.0], [9.0, 0.0]])
-    beads = [Bead(kind, line, 0.45, -1000 if kind is Kind.SUPPORT else 3) for kind in kinds]
-    assert begin_inside(beads) == beads
+    ranks = {Kind.SUPPORT: -1000, Kind.INFILL: 3}
+    beads = [Bead(kind, line, 0.45, ranks.get(kind, 0)) for kind in kinds]
+    assert [bead.kind for bead in begin_inside(beads)] == list(kinds)
+
+
+def test_outer_walls_on_plastic_come_last_in_their_layer_and_above_it_walls_come_first() -> None:
+    keys = load(settings=BARE)
+    base, top = cut(box(20, 20, 12), ((0, 0, 1), 6.0))
+    first, second = ([path.kind for path in layer.paths] for layer in slice_part(top, keys, [base]).layers[:2])
+    assert first[-1] is Kind.OUTER_WALL
+    assert Kind.SKIN not in first[first.index(Kind.OUTER_WALL) :]
+    assert second.index(Kind.OUTER_WALL) < len(second) - 1
