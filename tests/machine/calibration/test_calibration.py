@@ -15,6 +15,7 @@ from machine.kinematics.table import machine_points
 from profiles.machine import Machine
 from profiles.places import own_folder
 from profiles.profile import load
+from tests.machine.calibration.person import Person
 from tests.machine.calibration.touches import machine_of, really, touched
 
 
@@ -61,19 +62,6 @@ def test_replacing_keeps_what_else_the_own_profile_says_and_the_file_before(tmp_
     assert machine.tilt.zero_deg == pytest.approx(0.0, abs=1e-4)
     assert "zero_deg = 9.0" in own.with_suffix(".toml.before").read_text()
     assert tomllib.loads(own.read_text())["inherits"] == "generic_ac"
-
-
-class Person:
-    """Someone who types these lines, then Ctrl-C."""
-
-    def __init__(self, *lines: str) -> None:
-        self.lines, self.asked = list(lines), []
-
-    def __call__(self, prompt: str) -> str:
-        self.asked.append(prompt)
-        if not self.lines:
-            raise KeyboardInterrupt
-        return self.lines.pop(0)
 
 
 def talked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:

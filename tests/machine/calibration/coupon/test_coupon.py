@@ -16,6 +16,7 @@ from profiles.errors import OutputError
 from profiles.places import own_folder
 from profiles.profile import load
 from tests.machine.calibration.coupon.sheets import FACTORS, WHOLE_MPA, broken
+from tests.machine.calibration.person import Person
 
 NAMES = ("generic_ac", "pla", "standard")
 TRUTH = (1.3, 0.75, 1.3, 1.0)
@@ -153,19 +154,6 @@ def test_a_wrong_word_is_told_in_one_sentence_and_nothing_is_written(
     assert said in error
     assert error.count("\n") == 1
     assert [file.name for file in folder.iterdir() if file.name != "state"] == ["coupon.toml"]
-
-
-class Person:
-    """Someone who types these lines, then Ctrl-C."""
-
-    def __init__(self, *lines: str) -> None:
-        self.lines, self.asked = list(lines), []
-
-    def __call__(self, prompt: str) -> str:
-        self.asked.append(prompt)
-        if not self.lines:
-            raise KeyboardInterrupt
-        return self.lines.pop(0)
 
 
 def asked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
