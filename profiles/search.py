@@ -157,6 +157,12 @@ class Search(Frozen):
         le=1000,
         description="height of a pedestal under the model, so that low, strongly tilted cuts become printable, mm",
     )
+    simplify_faces: int = Field(
+        20000,
+        ge=0,
+        description="a model of more faces is searched on a copy that has fewer and lies within half a layer of it, and "
+        "cut by the planes that were found; 0: never",
+    )
     most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
     time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
     least_gain: float = Field(

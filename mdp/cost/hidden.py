@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdp.cut import simplify
 from mdp.directions.spread import spread_like_light
 from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import kernel, part
@@ -26,6 +27,10 @@ OPEN = 0.1  # share of the rays that may be blocked where a place still counts a
 MOST_NEIGHBOURS = 512  # faces of a neighbourhood; a finer mesh is looked at within a smaller radius
 LIFT = 1e-6  # of a ray's start above its face, as a share of the model's diagonal
 ANY_FACE = -2.0  # no cosine is less
+FINE = 20_000  # faces; a finer mesh is looked at on a coarser copy
+COARSER = 1e-3  # how far from its surface that copy may lie, as a share of the model's diagonal
+WORTH = 0.7  # share of the faces above which a copy saves too little
+ALIKE = 0.5  # least cosine between the normals of a face and of what stands for it on the copy
 
 
 class Neighbourhood(NamedTuple):
@@ -43,6 +48,33 @@ class Neighbourhood(NamedTuple):
 def hidden_shares(mesh: Mesh) -> Floats:
     """(m,) how hidden each face of a closed mesh in spatial order is: 0 in plain sight, 1 deep in a crease or out of sight."""
     diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
+    copy = simplify(mesh, COARSER * diagonal_mm) if len(mesh.faces) > FINE else mesh
+    if len(copy.faces) < WORTH * len(mesh.faces):
+        return _looked_up(mesh, copy, COARSER * diagonal_mm)
+    return _shares(mesh, diagonal_mm)
+
+
+def _looked_up(mesh: Mesh, copy: Mesh, off_mm: float) -> Floats:
+    """(m,) the shares of the copy's faces that lie within so much above or below each face of a mesh; 0 where none does."""
+    on_copy, found = hidden_shares(copy), np.empty(len(mesh.faces), np.int32)
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    in_threads(_stand_for, len(mesh.faces), triangle_tree(copy), middles, mesh.normals, 2.0 * off_mm, found)
+    return np.where(found >= 0, on_copy[found], 0.0)
+
+
+@kernel
+def _stand_for(begin: int, end: int, tree: TriangleTree, middles: Floats, normals: Floats, reach: float, out: Ints) -> None:
+    """The face of a copy that is met along the normal of each face from below it."""
+    origin, ray = floats(3, 0.0), floats(3, 0.0)
+    for f in range(begin, end):
+        for axis in range(3):
+            ray[axis] = normals[f, axis]
+            origin[axis] = middles[f, axis] - reach * ray[axis]
+        out[f] = first_hit(tree, origin, ray, 2.0 * reach, -1, ALIKE)
+
+
+def _shares(mesh: Mesh, diagonal_mm: float) -> Floats:
+    """(m,) the same, every face looked at."""
     surface = _look_around(mesh)
     occluded, hidden = np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
     in_threads(_occlude, len(mesh.faces), triangle_tree(mesh), surface.middles, spread_like_light(RAYS), diagonal_mm, occluded)

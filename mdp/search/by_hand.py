@@ -5,12 +5,15 @@ the machine's reach, lets the head meet the table, leaves a sliver or a base tha
 that stays whole. That a cut gains little, makes a small part or a long seam is the person's to judge.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import cos, radians, sin
 
 import numpy as np
 
 from mdp.clearance import find_obstacle, lowest_body
-from mdp.cut import corners_above
+from mdp.cut import corners_above, passing_places
+from mdp.directions.frame import frame_across
 from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text
 from mdp.overhang import threshold
 from mdp.plane import Plane
@@ -24,6 +27,8 @@ from mdp.zone import FARTHEST_MM, Grown, Painted
 from profiles.errors import PlanError
 
 EQUAL_MM2 = 1e-6
+SHIFT_MM, MOST_SHIFTS = 0.1, 10  # how the planes beside one that cannot be cut are shifted, of each lean
+LEANS_DEG = (0.0, 1.0, 3.0)
 OUT_OF_REACH = "what it stands on is out of reach"
 MOST_SHOWN = 8  # colours in a message
 
@@ -87,6 +92,44 @@ def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     why = refusal(problem, node, plane)
     child = problem.cut(node, plane) if why is None else None
     return child if child is not None else why or Refusal(OUT_OF_REACH, Reason.REACH)
+
+
+def cut_near(problem: Problem, node: Node, plane: Plane) -> Node | None:
+    """The node after a cut by the nearest plane to one that can be cut: the plane itself, one beside it, or one that leans by a
+    few degrees; None where there is none."""
+    child = cut_or_refuse(problem, node, plane)
+    for near in _beside(problem, node, plane) if isinstance(child, Refusal) else ():
+        child = cut_or_refuse(problem, node, near)
+        if isinstance(child, Node):
+            break
+    return child if isinstance(child, Node) else None
+
+
+def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
+    """The planes around one that the sweep finds nothing against: shifted ones, the nearest first, then leaning ones."""
+    vertices, passed = node.remainder.mesh.vertices, passing_places(node.remainder.mesh, plane)
+    if len(passed) == 0:
+        return
+    middle = passed.mean(axis=0)
+    own = problem.settings.model_copy(update={"offset_step_mm": SHIFT_MM})
+    shifts = np.arange(-MOST_SHIFTS, MOST_SHIFTS + 1)
+    for lean_deg in LEANS_DEG:
+        normals = _leaning(plane.normal, lean_deg)
+        offsets = (np.rint(normals @ middle / SHIFT_MM)[:, None] + shifts) * SHIFT_MM
+        heights = vertices @ normals.T
+        row, column = np.nonzero((heights.min(axis=0) < offsets.T).T & (heights.max(axis=0) > offsets.T).T)
+        checked = check(node.remainder, _limits(problem, normals), own, row.astype(np.int32), offsets[row, column])
+        for place in np.argsort(np.abs(shifts[column]), kind="stable"):
+            if checked.reason[place] == Reason.FEASIBLE:
+                yield Plane(normals[row[place]], float(offsets[row[place], column[place]]))
+
+
+def _leaning(normal: Floats, lean_deg: float) -> Floats:
+    """(k, 3) normals that lean four ways from one; itself for 0."""
+    if lean_deg == 0.0:
+        return normal[None]
+    aside, across = frame_across(normal)
+    return cos(radians(lean_deg)) * normal + sin(radians(lean_deg)) * np.stack([aside, -aside, across, -across])
 
 
 def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:

@@ -11,9 +11,9 @@ from mdp.pedestal import on_pedestal
 from mdp.plans.plan_file import PlanFile, PlannedRow, planned_row
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.front import BY_PLAN, Pricing, front_row, pays, price_row
-from mdp.search.parts import make_parts
+from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.problem import Problem
-from mdp.search.search import Outcome, Taken, check_part_count, fewer_parts, made_of
+from mdp.search.search import check_part_count, fewer_parts
 from profiles.errors import PlanError
 from profiles.profile import Profile
 
@@ -55,7 +55,7 @@ def cut_by_plan(
     if price is not None:
         front = _priced(problem, plan, front, cut_parts, price)
     notes = fewer_parts(parts, len(plan.parts) + 1, f"the plan {plan.name} holds")
-    outcome = Outcome(name, ranker, 0, perf_counter() - began, notes)
+    outcome = Outcome(name, ranker, 0, problem.evaluated, perf_counter() - began, notes)
     return made_of(problem, Taken(cut_parts, tuple(front)), outcome)
 
 

@@ -1,8 +1,11 @@
-"""Parts of a node: its solids in print order, each at a pose, so that the table turns little."""
+"""Parts of a node: its solids in print order, each at a pose, so that the table turns little, and the decomposition they are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms
-from mdp.decomposition import Part
+from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.mesh import Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
 from mdp.plane import PLATFORM, Plane
@@ -12,6 +15,9 @@ from mdp.search.problem import Problem
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
 from profiles.machine import Machine
+
+MOST_FEATHERED = 0.1  # share of a seam; a person is told of more
+MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 
 def one_piece(mesh: Mesh, machine: Machine) -> Part:
@@ -75,3 +81,75 @@ def _needing_upright(mesh: Mesh, needs: ModelPieces, terms: CostTerms) -> Mask:
     risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
     needing: Mask = risky & needs.upright & (needs.sources >= 0)
     return needing
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """The parts that are taken, and the front with their row marked; note: what is given up for their time."""
+
+    parts: tuple[Part, ...]
+    front: tuple[FrontRow, ...]
+    note: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a search, or a plan in its place, went. rounds: stages of a beam; evaluated: candidates that were looked at."""
+
+    name: str
+    ranker: str
+    rounds: int
+    evaluated: int
+    search_s: float
+    notes: tuple[str, ...]
+
+
+def made_of(problem: Problem, taken: Taken, outcome: Outcome) -> Decomposition:
+    """The decomposition that was taken."""
+    mesh, parts = problem.mesh, taken.parts
+    folded = folded_mm3(mesh, parts)
+    return Decomposition(
+        name=outcome.name,
+        mesh=mesh,
+        parts=parts,
+        beam_width=problem.settings.beam_width,
+        ranker=outcome.ranker,
+        risky_area_mm2=float(problem.root.remainder.mesh.areas_mm2[problem.root.remainder.risky].sum()),
+        residual_area_mm2=sum(part.risky_area_mm2 for part in parts),
+        candidates_evaluated=outcome.evaluated,
+        rounds=outcome.rounds,
+        search_s=outcome.search_s,
+        notes=(*_folded_note(folded), *_feather_notes(parts), *outcome.notes, *taken.note),
+        folded_mm3=folded,
+        front=taken.front,
+    )
+
+
+def notes_of_search(decomposition: Decomposition) -> tuple[str, ...]:
+    """The notes of a decomposition that do not tell of its own parts."""
+    own = (*_folded_note(decomposition.folded_mm3), *_feather_notes(decomposition.parts))
+    return tuple(note for note in decomposition.notes if note not in own)
+
+
+def folded_mm3(mesh: Mesh, parts: Sequence[Part]) -> float:
+    """Volume by which the parts differ from a mesh whose surface passes through itself a little, 0 for others.
+
+    A mesh's volume counts a place as often as the surface winds around it, inside out places less than once; a cut counts it
+    once or not at all.
+    """
+    difference = abs(mesh.volume_mm3 - sum(part.volume_mm3 for part in parts))
+    return difference if VOLUME_TOLERANCE * mesh.volume_mm3 < difference <= MOST_FOLDED * mesh.volume_mm3 else 0.0
+
+
+def _folded_note(folded: float) -> tuple[str, ...]:
+    text = f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
+    return (text,) if folded > 0 else ()
+
+
+def _feather_notes(parts: Sequence[Part]) -> tuple[str, ...]:
+    """Parts that end in thin edges along much of their seam."""
+    return tuple(
+        f"part {part.index}: {part.feather_share:.0%} of its seam is a feather edge, base and surface meet at less than 20 deg"
+        for part in parts
+        if part.feather_share > MOST_FEATHERED
+    )

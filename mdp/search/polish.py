@@ -64,6 +64,11 @@ def polish(problem: Problem, node: Node) -> Node:
     return min((node, best.nodes[-1], longer.nodes[-1]), key=lambda last: (last.cost_mm2, len(last.cuts)))
 
 
+def settle(problem: Problem, node: Node) -> Node:
+    """The node with every plane moved to where less stays risky, nothing else changed."""
+    return _move_planes(problem, Chain.to(node)).nodes[-1]
+
+
 def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Node:
     """The node with its planes as a person would lay them, as far as it stays alike in cost: along the model's large flats, and
     more symmetric about its mirror planes; planes that lean a little across a mirror stand upright on it, and of two that are

@@ -6,13 +6,15 @@ bounds all descendants), two orders of the same cuts take one slot, the slots of
 (beam), and the best results are polished off the grid of candidates (polish).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from time import perf_counter
+from typing import Any
 
 from mdp.cost.symmetry import find_mirrors
-from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
+from mdp.decomposition import Decomposition, FrontRow
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
@@ -22,18 +24,16 @@ from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
+from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
 from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row
 from mdp.search.node import Node
-from mdp.search.parts import make_parts
+from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.polish import make_regular, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
-
-MOST_FEATHERED = 0.1  # share of a seam; a person is told of more
-MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def decompose(
         check_part_count(parts)
         most = max(parts, profile.search.most_parts)
         profile = profile.model_copy(update={"search": profile.search.model_copy(update={"most_parts": most})})
-    mesh = on_pedestal(mesh, profile.search.pedestal_mm)
+    given, mesh = mesh, on_pedestal(mesh, profile.search.pedestal_mm)
     planned = PlanFile("") if by_hand is None else by_hand
     check_model(planned, mesh, name)
     check_zones(planned, mesh, name)
@@ -78,6 +78,14 @@ def decompose(
     problem.start = cut_by_hand(problem, planned)
     if parts is not None and parts <= len(problem.start.cuts):
         raise PlanError(f"--parts {parts}: the planes by hand of {planned.name} alone make {len(problem.start.cuts) + 1} parts")
+    copy = None if on_record is not None else coarse_copy(given, profile, planned.zones)
+    if copy is not None:
+        asked: dict[str, Any] = {"ranker": ranker, "on_stage": on_stage, "parts": parts, "price": price}
+        with suppress(PlanError):  # of a plane by hand that cuts the mesh and not its copy
+            found = decompose(copy, name, as_it_is(profile), by_hand=replace(planned, sha256=""), **asked)
+            fine = cut_as_copy(problem, found, price)
+            if fine is not None:
+                return fine
     trace = None if on_record is None else Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
     report = on_stage or (lambda progress: None)
     if parts == 1 and price is None and trace is None:  # nobody looks at the front
@@ -94,16 +102,7 @@ def decompose(
         on_record(trace.to_bytes())
     taken = _take(problem, front, best, parts, price)
     notes = (*_notes(problem, taken, parts), *_zone_notes(problem), *_front_note(planned))
-    return made_of(problem, taken, Outcome(name, ranker, rounds, perf_counter() - began, notes))
-
-
-@dataclass(frozen=True, eq=False)
-class Taken:
-    """The parts that are taken, and the front with their row marked; note: what is given up for their time."""
-
-    parts: tuple[Part, ...]
-    front: tuple[FrontRow, ...]
-    note: tuple[str, ...] = ()
+    return made_of(problem, taken, Outcome(name, ranker, rounds, problem.evaluated, perf_counter() - began, notes))
 
 
 def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None) -> Taken:
@@ -127,66 +126,10 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
     return Taken(parts_of(node), tuple(rows), (*_feature_notes(node), *choice.note))
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How a search, or a plan in its place, went."""
-
-    name: str
-    ranker: str
-    rounds: int
-    search_s: float
-    notes: tuple[str, ...]
-
-
-def made_of(problem: Problem, taken: Taken, outcome: Outcome) -> Decomposition:
-    """The decomposition that was taken."""
-    mesh, parts = problem.mesh, taken.parts
-    folded = folded_mm3(mesh, parts)
-    return Decomposition(
-        name=outcome.name,
-        mesh=mesh,
-        parts=parts,
-        beam_width=problem.settings.beam_width,
-        ranker=outcome.ranker,
-        risky_area_mm2=float(problem.root.remainder.mesh.areas_mm2[problem.root.remainder.risky].sum()),
-        residual_area_mm2=sum(part.risky_area_mm2 for part in parts),
-        candidates_evaluated=problem.evaluated,
-        rounds=outcome.rounds,
-        search_s=outcome.search_s,
-        notes=(*_folded_note(folded), *_feather_notes(parts), *outcome.notes, *taken.note),
-        folded_mm3=folded,
-        front=taken.front,
-    )
-
-
 def check_part_count(parts: int) -> None:
     """Raise PlanError for a number of parts that cannot be."""
     if not 1 <= parts <= MOST_PARTS:
         raise PlanError(f"--parts is {parts}: 1 to {MOST_PARTS} is allowed")
-
-
-def folded_mm3(mesh: Mesh, parts: Sequence[Part]) -> float:
-    """Volume by which the parts differ from a mesh whose surface passes through itself a little, 0 for others.
-
-    A mesh's volume counts a place as often as the surface winds around it, inside out places less than once; a cut counts it
-    once or not at all.
-    """
-    difference = abs(mesh.volume_mm3 - sum(part.volume_mm3 for part in parts))
-    return difference if VOLUME_TOLERANCE * mesh.volume_mm3 < difference <= MOST_FOLDED * mesh.volume_mm3 else 0.0
-
-
-def _folded_note(folded: float) -> tuple[str, ...]:
-    text = f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
-    return (text,) if folded > 0 else ()
-
-
-def _feather_notes(parts: Sequence[Part]) -> tuple[str, ...]:
-    """Parts that end in thin edges along much of their seam."""
-    return tuple(
-        f"part {part.index}: {part.feather_share:.0%} of its seam is a feather edge, base and surface meet at less than 20 deg"
-        for part in parts
-        if part.feather_share > MOST_FEATHERED
-    )
 
 
 def _feature_notes(node: Node) -> tuple[str, ...]:

@@ -17,8 +17,9 @@ from mdp.pose import Pose, rotation
 from mdp.ranking.candidates import directions
 from mdp.ranking.features import COLUMNS
 from mdp.search.front import Front
+from mdp.search.parts import folded_mm3
 from mdp.search.problem import Problem
-from mdp.search.search import Progress, _take, decompose, folded_mm3
+from mdp.search.search import Progress, _take, decompose
 from profiles.errors import DecompositionError
 from profiles.profile import load
 from tests import shapes

@@ -1,0 +1,78 @@
+"""Coarse copy: a finely meshed model is searched on a copy with fewer faces, and only the planes that are chosen cut it itself.
+
+Whatever the search weighs is many layers wide, and the copy's surface lies within half a layer of the model's. What the
+parts need, weigh and take is worked out on the model itself; the rows of the front that are not taken stay those of the copy.
+"""
+
+from dataclasses import replace
+from time import perf_counter
+
+from mdp.cut import simplify
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.mesh import Mesh
+from mdp.search.by_hand import cut_near
+from mdp.search.front import Pricing, front_row, price_row
+from mdp.search.node import Node
+from mdp.search.parts import Outcome, Taken, made_of, make_parts, notes_of_search
+from mdp.search.polish import settle
+from mdp.search.problem import Problem
+from mdp.sweep.deviation import distances_mm
+from mdp.zone import Zone, Zones
+from profiles.profile import Profile
+
+OFF_LAYERS = 0.5  # how far the copy's surface may lie from the model's, in layers
+WORTH = 0.7  # share of the faces above which a copy saves too little
+TOLERANCES = 0.5, 0.25, 0.125  # of simplifying, as shares of that: one face after another moves the surface by more than one
+
+
+def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
+    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than half a layer; None where the
+    mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
+    search = profile.search.effective
+    fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
+    marked = any(not isinstance(zone, Zone) for zone in (*zones.keep, *zones.no_seam, *zones.no_support))
+    if not fine or marked:
+        return None
+    most_mm = OFF_LAYERS * profile.process.layer_height_mm
+    for share in TOLERANCES:
+        copy = simplify(mesh, share * most_mm)
+        if len(copy.faces) >= WORTH * len(mesh.faces):
+            break
+        if distances_mm(copy, mesh.vertices, most_mm).max() < most_mm:
+            return copy
+    return None
+
+
+def as_it_is(profile: Profile) -> Profile:
+    """The profile by which a mesh is searched itself, however fine it is."""
+    return profile.model_copy(update={"search": profile.search.model_copy(update={"simplify_faces": 0})})
+
+
+def cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) -> Decomposition | None:
+    """A problem's mesh, from where its search goes on, cut by the planes that were chosen for its coarse copy, or by planes next
+    to those where bumps that the copy has not forbid them, then moved a little as the mesh itself wants them; None where there
+    are none. The mesh as the search found it is measured anew as well."""
+    began, rows, start = perf_counter(), list(copy.front), problem.start
+    place = next(place for place, row in enumerate(rows) if row.chosen)
+    node = start
+    for plane in rows[place].planes[len(start.cuts) :]:
+        child = cut_near(problem, node, plane)
+        if child is None:
+            return None
+        node = child
+    node = settle(problem, node)
+    parts, timed = make_parts(problem, node), rows[place].time_s is not None
+    rows[place] = _measured(rows[place], node)
+    if price is not None and timed:
+        rows[place] = price_row(rows[place], parts, price)
+    if place > 0 and len(rows[0].planes) == len(start.cuts):
+        rows[0] = _measured(rows[0], start)
+    searched_s = copy.search_s + perf_counter() - began
+    outcome = Outcome(copy.name, copy.ranker, copy.rounds, copy.candidates_evaluated, searched_s, notes_of_search(copy))
+    return made_of(problem, Taken(parts, tuple(rows)), outcome)
+
+
+def _measured(row: FrontRow, node: Node) -> FrontRow:
+    """A row with the planes and costs of a node, its time as it was."""
+    costs = front_row(node)
+    return replace(costs, chosen=row.chosen, reason=row.reason, time_s=row.time_s, filament_mm=row.filament_mm)

@@ -1,0 +1,123 @@
+"""Coarse copy: a finely meshed model is searched on a copy near to it, cut itself, and costs about what its own search finds."""
+
+from functools import partial
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import trimesh
+
+from mdp.mesh import Floats, Mesh
+from mdp.plane import Plane
+from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.search.by_hand import Refusal, cut_near, cut_or_refuse
+from mdp.search.coarse import coarse_copy
+from mdp.search.laying import lay_down
+from mdp.search.problem import Problem
+from mdp.search.search import decompose
+from mdp.zone import NO_ZONES, Painted, Zone, Zones
+from profiles.profile import Profile, load
+from tests import shapes
+
+HALF_LAYER_MM = 0.1
+
+
+def _profile(faces: int, *settings: str) -> Profile:
+    return load(settings=("search.directions=100", f"search.simplify_faces={faces}", *settings))
+
+
+def _fine(bumps_mm: float = 0.02) -> Mesh:
+    """A post with a leaning arm, its surface wavy, of some 30,000 faces."""
+
+    def wavy(points: Floats) -> Floats:
+        waves: Floats = bumps_mm * np.sin(2.0 * points[:, [1, 2, 0]])
+        return points + waves
+
+    arm = m3.Manifold.cylinder(35, 5, 5, 48).rotate((0, 60, 0)).translate((0, 0, 25))
+    solid = m3.Manifold.cylinder(40, 8, 8, 48) + arm
+    return shapes.standing(solid.refine_to_length(0.7).warp_batch(wavy).trim_by_plane((0.0, 0.0, 1.0), 0.1))
+
+
+@pytest.fixture(scope="module")
+def fine() -> Mesh:
+    return _fine()
+
+
+def test_the_copy_has_fewer_faces_and_lies_within_half_a_layer(fine: Mesh) -> None:
+    copy = coarse_copy(fine, _profile(2000), NO_ZONES)
+    assert copy is not None
+    assert len(copy.faces) < 0.5 * len(fine.faces)
+    assert max(_farthest_mm(fine, copy), _farthest_mm(copy, fine)) < HALF_LAYER_MM
+
+
+def _farthest_mm(one: Mesh, other: Mesh) -> float:
+    """How far a hundred vertices of a mesh lie from another mesh, at most."""
+    triangles, places = other.vertices[other.faces], one.vertices[:: len(one.vertices) // 100]
+    nearest = (trimesh.triangles.closest_point(triangles, np.tile(place, (len(triangles), 1))) - place for place in places)
+    return max(float(np.linalg.norm(off, axis=1).min()) for off in nearest)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [(40000,), (0,), (2000, "search.objective=risky"), (2000, "search.method=published")],
+    ids=["few faces", "never", "the paper's terms", "the paper's search"],
+)
+def test_no_copy_is_made_of(fine: Mesh, settings: tuple[int, str]) -> None:
+    assert coarse_copy(fine, _profile(*settings), NO_ZONES) is None
+
+
+def test_a_model_is_not_copied_where_single_faces_are_marked_but_where_boxes_are(fine: Mesh) -> None:
+    box = Zone((0.0, 0.0, 0.0), (5.0, 5.0, 5.0))
+    assert coarse_copy(fine, _profile(2000), Zones(keep=(box,))) is not None
+    assert coarse_copy(fine, _profile(2000), Zones(keep=(Painted(0xFF0000),))) is None
+
+
+def test_a_copy_that_spares_few_faces_is_not_used() -> None:
+    assert coarse_copy(_fine(bumps_mm=1.0), _profile(2000), NO_ZONES) is None
+
+
+def test_the_model_itself_is_cut_for_about_the_cost_that_its_own_search_finds(fine: Mesh) -> None:
+    copied, itself = (decompose(fine, "shape", _profile(faces)) for faces in (2000, 0))
+    assert len(copied.parts) == len(itself.parts) == 2
+    assert copied.mesh is fine
+    assert sum(part.volume_mm3 for part in copied.parts) == pytest.approx(fine.volume_mm3, rel=1e-9)
+    assert copied.cost_mm2 == pytest.approx(itself.cost_mm2, rel=0.02)
+    assert copied.risky_area_mm2 == itself.risky_area_mm2
+    assert [row.parts for row in copied.front if row.chosen] == [2]
+    assert copied.chosen is not None
+    assert copied.chosen.planes[0].normal.tolist() == copied.parts[1].base.normal.tolist()
+
+
+def test_a_plane_by_hand_stays_where_it_was_laid(fine: Mesh) -> None:
+    by_hand = PlanFile("mine", parts=(PlannedPart((0.6, 0.0, 0.8), 32.0),))
+    parts = decompose(fine, "shape", _profile(2000), by_hand=by_hand).parts
+    assert ((0.6, 0.0, 0.8), 32.0) in [(tuple(part.base.normal), part.base.offset_mm) for part in parts[1:]]
+
+
+def test_a_model_on_a_pedestal_is_cut_above_it(fine: Mesh) -> None:
+    found = decompose(fine, "shape", _profile(2000, "search.pedestal_mm=5"))
+    assert found.mesh.bounds_mm[1, 2] == pytest.approx(fine.bounds_mm[1, 2] + 5.0)
+    assert len(found.parts) == 2
+
+
+def test_the_model_itself_is_laid_down_as_its_copy(fine: Mesh) -> None:
+    profile = _profile(2000)
+    lying = lay_down(fine, profile, lambda profile: lambda parts: None, partial(decompose, name="shape", profile=profile))
+    assert len(lying.decomposition.mesh.faces) == len(fine.faces)
+    assert lying.decomposition.mesh.volume_mm3 == pytest.approx(fine.volume_mm3, rel=1e-9)
+
+
+def test_a_plane_that_leaves_a_sliver_is_moved_to_the_nearest_that_cuts() -> None:
+    problem = Problem(shapes.tee(), _profile(0))
+    flush = Plane(np.array([1.0, 0.0, 0.0]), 19.8)
+    assert isinstance(cut_or_refuse(problem, problem.root, flush), Refusal)
+    moved = cut_near(problem, problem.root, flush)
+    assert moved is not None
+    plane = moved.cuts[-1].base
+    assert 0.0 < abs(plane.offset_mm - flush.offset_mm) <= 1.0
+    assert plane.normal @ flush.normal > np.cos(np.radians(3.1))
+
+
+def test_a_plane_that_misses_has_no_other_beside_it() -> None:
+    problem = Problem(shapes.tee(), _profile(0))
+    assert cut_near(problem, problem.root, Plane(np.array([1.0, 0.0, 0.0]), 30.0)) is None
