@@ -30,7 +30,6 @@ OF_THE_PRINT = (
     | frozenset(key for key in Process.model_fields if key.startswith(("first_layer_", "travel_", "lift_")))
     | frozenset(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
     | {"name", "scale", "rotate_deg", "self_supporting_angle_deg", "spiral_vase"}
-    | {"interlock", "interlock_mm", "pin_width_nozzles", "pin_depth_mm", "pin_spacing_mm", "most_pins"}
 )
 OF_PARTS_ON_PLASTIC = {
     "interface_overlap",
@@ -42,6 +41,12 @@ OF_PARTS_ON_PLASTIC = {
     "interface_first_layer_fan",
     "interface_fan",
     "interface_extra_walls",
+    "interlock",
+    "interlock_mm",
+    "pin_width_nozzles",
+    "pin_depth_mm",
+    "pin_spacing_mm",
+    "most_pins",
 }
 
 

@@ -31,7 +31,7 @@ def section_part(
 
     Raises SliceError when the part's mesh is not closed, or too high to be meant.
     """
-    profile = vase_profile(profile.of_part(part.index))
+    of_print, profile = profile, vase_profile(profile.of_part(part.index))
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     heights = layer_heights(mesh, profile, on_platform, pedestal_mm)
@@ -46,12 +46,12 @@ def section_part(
             outlines, int(np.searchsorted(heights.cut_mm, PLATFORM_TOLERANCE_MM)), base, process.line_width_mm
         )
     outlines = compensate(outlines, part, later, heights.cut_mm, process)
-    outlines = cut_pins(outlines, part, later, pins, heights.cut_mm, profile)
+    outlines = cut_pins(outlines, part, later, pins, heights.cut_mm, of_print)
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
     ungrooved = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal) if pedestal else outlines
-    own = cut_grooves(ungrooved, part, later, heights.cut_mm, process)
-    outlines = cut_grooves(outlines, part, later, heights.cut_mm, process) if pedestal else own
+    own = cut_grooves(ungrooved, part, later, heights.cut_mm, of_print)
+    outlines = cut_grooves(outlines, part, later, heights.cut_mm, of_print) if pedestal else own
     return Sections(
         part=part,
         earlier=earlier,

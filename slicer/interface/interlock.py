@@ -14,6 +14,7 @@ from mdp.cut import mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
+from profiles.profile import Profile
 from slicer.bead import interface_process
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset
@@ -41,11 +42,14 @@ def grooves(part: Part, process: Process) -> Polygons:
 
 
 def cut_grooves(
-    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cuts_mm: Floats, process: Process
+    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cuts_mm: Floats, profile: Profile
 ) -> list[Polygons]:
-    """The part's outlines without the grooves of the parts that will stand on it."""
+    """The part's outlines without the grooves of the parts that will stand on it; profile: of the whole print."""
     left = list(outlines)
-    for upper in later if process.interlock == "grooves" else ():
+    for upper in later:
+        process = profile.of_part(upper.index).process
+        if process.interlock != "grooves":
+            continue
         area = grooves(upper, process)
         if area.is_empty():
             continue

@@ -42,20 +42,23 @@ NONE: Pins = {}
 
 
 def plan_pins(parts: Sequence[Part], profile: Profile) -> Pins:
-    """The pins of all parts of a print, or of those that are known, in print order; {} where the process wants none."""
-    if profile.process.interlock != "pins":
+    """The pins of all parts of a print, or of those that are known, in print order; {} where no part wants any.
+
+    profile: of the whole print; the part that fills pins says how they are made.
+    """
+    wanted = [part.index for part in parts[1:] if profile.of_part(part.index).process.interlock == "pins"]
+    if not wanted:
         return NONE
     planned: dict[int, tuple[Pin, ...]] = {}
     for k, part in enumerate(parts):
         cut = [(upper, planned[upper.index]) for upper in parts[:k] if planned.get(upper.index)]
-        planned[part.index] = tuple(_pins_of(part, parts[:k], cut, profile)) if part.index > 1 else ()
+        planned[part.index] = tuple(_pins_of(part, parts[:k], cut, profile)) if part.index in wanted else ()
     return planned
 
 
 def _pins_of(part: Part, earlier: Sequence[Part], cut: Sequence[tuple[Part, Sequence[Pin]]], profile: Profile) -> Iterator[Pin]:
     """The pins of a part. cut: the pins that are there already, and the parts that fill them."""
-    process = profile.process
-    wide_mm = pin_width_mm(profile)
+    process, wide_mm = profile.of_part(part.index).process, pin_width_mm(profile.of_part(part.index))
     base = clean(cross_sections(part.in_part_frame(), np.array([BELOW_MM]))[0])
     middles = np.zeros((0, 2))
     for lower in touching(part, earlier, BELOW_MM):
@@ -63,7 +66,7 @@ def _pins_of(part: Part, earlier: Sequence[Part], cut: Sequence[tuple[Part, Sequ
         keep_mm = room_around_mm(below.process)
         depths_mm = -np.linspace(process.pin_depth_mm + keep_mm, BELOW_MM, _looks(process, keep_mm))
         meshes = [lower.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))]
-        meshes += [mesh_of(_holes(pins, process, wide_mm)).transform(*frame_change(upper, part)) for upper, pins in cut]
+        meshes += [_holes(pins, profile.of_part(upper.index)).transform(*frame_change(upper, part)) for upper, pins in cut]
         room, within = offset_round(base, -keep_mm - 0.5 * wide_mm), [cross_sections(mesh, depths_mm) for mesh in meshes]
         for solid, *holes in zip(*within, strict=True):
             if room.is_empty():
@@ -144,9 +147,10 @@ def _hole(x: float, y: float, wide_mm: float, bottom_mm: float, top_mm: float) -
     return m3.Manifold.extrude(Polygons.circle(0.5 * wide_mm, SIDES), top_mm - bottom_mm).translate((x, y, bottom_mm))
 
 
-def _holes(pins: Sequence[Pin], process: Process, wide_mm: float) -> Solid:
-    """The holes of a part in its frame, as they are cut out of those below."""
-    return m3.Manifold.compose([_hole(pin.x_mm, pin.y_mm, wide_mm, -process.pin_depth_mm, MOUTH_MM) for pin in pins])
+def _holes(pins: Sequence[Pin], profile: Profile) -> Mesh:
+    """The holes of a part in its frame, by its own profile, as they are cut out of those below."""
+    wide_mm, depth_mm = pin_width_mm(profile), profile.process.pin_depth_mm
+    return mesh_of(m3.Manifold.compose([_hole(pin.x_mm, pin.y_mm, wide_mm, -depth_mm, MOUTH_MM) for pin in pins]))
 
 
 def _heights_of(part: Part, profile: Profile) -> Heights:
@@ -165,12 +169,12 @@ def _taken_mm3(hole: Mesh, heights: Heights) -> float:
 def cut_pins(
     outlines: Sequence[Polygons], part: Part, later: Sequence[Part], pins: Pins, cuts_mm: Floats, profile: Profile
 ) -> list[Polygons]:
-    """The part's outlines without the holes of the parts that will stand on it."""
+    """The part's outlines without the holes of the parts that will stand on it; profile: of the whole print."""
     left = list(outlines)
     for upper in later:
         if pins.get(upper.index):
-            holes = _holes(pins[upper.index], profile.process, pin_width_mm(profile))
-            loops = cross_sections(mesh_of(holes).transform(*frame_change(upper, part)), cuts_mm)
+            holes = _holes(pins[upper.index], profile.of_part(upper.index))
+            loops = cross_sections(holes.transform(*frame_change(upper, part)), cuts_mm)
             left = [area - Polygons(cut) if cut else area for area, cut in zip(left, loops, strict=True)]
     return left
 

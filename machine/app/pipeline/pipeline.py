@@ -206,12 +206,12 @@ def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
 
 def _without_pins(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
     """Which parts were to have pins and have no room for any."""
-    bare = [str(part.index) for part in sliced if part.index > 1 and not part.pins]
-    if bare and profile.process.interlock == "pins":
-        room_mm = pin_width_mm(profile) + 2.0 * room_around_mm(profile.process)
-        parts = f"part{'s' * (len(bare) > 1)} {', '.join(bare)}"
-        deep = f"{profile.process.pin_depth_mm:g} mm deep into the part below"
-        yield f"no pins under {parts}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"
+    for part in sliced:
+        own = profile.of_part(part.index)
+        if part.index > 1 and own.process.interlock == "pins" and not part.pins:
+            room_mm = pin_width_mm(own) + 2.0 * room_around_mm(own.process)
+            deep = f"{own.process.pin_depth_mm:g} mm deep into the part below"
+            yield f"no pins under part {part.index}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"
 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:

@@ -18,7 +18,7 @@ from mdp.mesh import Floats
 NARROW_MM, END_MM, NARROW_LENGTH_MM, LENGTH_MM, INNER_MM, OUTER_MM = 4.0, 12.5, 25.0, 75.0, 12.5, 8.0
 ARC_STEPS = 12
 NOTCH_MM = 1.5
-FOOT_MM, FOOT_HEIGHT_MM, SCREW_MM, SCREW_HEIGHT_MM = 10.0, 7.0, 4.3, 3.7
+FOOT_MM, FOOT_HEIGHT_MM, SCREW_MM, SCREW_HEIGHT_MM = 10.0, 7.0, 4.3, 3.3
 SHALLOWER = 0.85  # the lower outline falls steeper than the bar leans, by this share of its tangent
 BASE_MM, BASE_HEIGHT_MM, BASE_AROUND_MM = 12.5, 3.0, 3.0
 STROKE_MM, DIGIT_MM, ENGRAVED_MM = 0.8, (2.4, 4.0), 0.5

@@ -52,7 +52,7 @@ def factors(profile: Profile, given: Sequence[str] = ()) -> tuple[Factor, ...]:
         if not equals or not value.strip():
             raise ProfileError(f"--vary {text}: KEY=VALUE is expected, as interface_flow=1.15")
         if key not in part_keys():
-            raise ProfileError(f"--vary {text}: {key} cannot differ from bar to bar; `interface_` keys of the process can")
+            raise ProfileError(f"--vary {text}: {key} cannot differ from bar to bar; interlock and `interface_` keys can")
         if key in asked:
             raise ProfileError(f"--vary {text}: {key} is given twice")
         asked[key] = read_value(value.strip())

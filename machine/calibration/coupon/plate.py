@@ -5,9 +5,10 @@ level. Then the table tilts by a bar's lean and turns it upright; the bar is pri
 ones first. Nothing may stand above the base plane of a part, which decides how much higher the high ones are.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import cos, pi, radians, sin, sqrt
+from functools import cache, partial
+from math import cos, degrees, pi, radians, sin, sqrt
 
 import manifold3d as m3
 import numpy as np
@@ -17,6 +18,7 @@ from machine.calibration.coupon.design import JOINTS, KINDS
 from mdp.clearance import allowed_poses, find_obstacle
 from mdp.cut import Solid, cut, mesh_of
 from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, Part
+from mdp.mesh import Floats
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import least_rotation, level, poses, rotation, shift
 from profiles.errors import MoveError
@@ -113,10 +115,10 @@ def _ring(shape: Shape, profile: Profile) -> Ring:
             f"{machine.name} cannot tilt its table by {LEANS_DEG[-1]:g} deg towards all sides: the joints of a coupon are made so"
         )
     nearest: tuple[int, str] = (0, "")
-    whole = _in_one_piece(shape)
+    whole, halves = _in_one_piece(shape), cache(partial(_halves, shape))
     for lean_deg in reached:
         for ring in _rings(shape, radians(lean_deg), machine):
-            problem = _problem(shape, ring, whole, machine)
+            problem = _problem(shape, ring, whole, halves, machine)
             if problem is None:
                 return ring
             nearest = max(problem, nearest, key=lambda told: told[0])  # of the last ones, which lean least
@@ -131,6 +133,7 @@ def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
     reach = min(abs(limit - middle[k]) for k, axis in enumerate((machine.x, machine.y)) for limit in axis.limits_mm)
     farthest = float(reach) - 0.5 * shape.depth_mm * cos(lean_rad)
 
+    @cache
     def radius(height: float) -> float:
         _, _, z0, x1, _, z1 = bar(shape, lean_rad, height).trim_by_plane((0.0, -1.0, 0.0), -LOW_MM).bounding_box()
         return min(farthest, sqrt(max(0.0, edge**2 - (0.5 * (z1 - z0)) ** 2)) - float(x1))
@@ -140,20 +143,43 @@ def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
             yield Ring(lean_rad, (low, low + rise), (radius(low), radius(low + rise)))
 
 
-def _problem(shape: Shape, ring: Ring, whole: Sequence[Solid], machine: Machine) -> tuple[int, str] | None:
+@dataclass(frozen=True, eq=False)
+class _Halves:
+    """A bar whose joint stands over the plate's middle and that leans along x: the corners (n, 3) of what lies above its joint
+    and below, and the outline of the latter, a gap around it."""
+
+    top: Floats
+    stub: Floats
+    around: m3.CrossSection
+
+
+def _halves(shape: Shape, lean_rad: float, height_mm: float) -> _Halves:
+    base = Plane(np.array([sin(lean_rad), 0.0, cos(lean_rad)]), height_mm * cos(lean_rad))
+    top, stub = cut(stand(bar(shape, lean_rad, height_mm), shape, 0.0, 0.0), base)
+    return _Halves(mesh_of(top).vertices, mesh_of(stub).vertices, _around(stub))
+
+
+def _around(solid: Solid) -> m3.CrossSection:
+    return solid.project().offset(0.5 * GAP_MM - 1e-3, m3.JoinType.Miter)
+
+
+def _problem(
+    shape: Shape, ring: Ring, whole: Sequence[Solid], halves: Callable[[float, float], _Halves], machine: Machine
+) -> tuple[int, str] | None:
     """What stands in the way of a ring, and how near it comes to being printed; None: nothing."""
-    bars = (_jointed(shape, ring, joint) for joint in range(JOINTS))
-    tops, stubs = zip(*(cut(jointed, ring.base(joint)) for joint, jointed in enumerate(bars)), strict=True)
-    ground = [*stubs, *whole]
-    around = [solid.project().offset(0.5 * GAP_MM - 1e-3, m3.JoinType.Miter) for solid in ground]
+    places = [ring.place(joint) for joint in range(JOINTS)]
+    bars = [halves(ring.lean_rad, height) for _, _, height in places]
+    around = [each.around.translate((r, 0.0)).rotate(degrees(turn)) for each, (turn, r, _) in zip(bars, places, strict=True)]
+    around += [_around(solid) for solid in whole]
     if sum(area.area() for area in around) > m3.CrossSection.batch_boolean(around, m3.OpType.Add).area() + 0.01:
         return 1, f"its plate, {machine.table.radius_mm:g} mm in radius, has no room for {len(KINDS)} bars side by side"
-    below = np.vstack([mesh_of(solid).vertices for solid in ground])
+    stubs = [_turned(each.stub, turn, r) for each, (turn, r, _) in zip(bars, places, strict=True)]
+    below = np.vstack([*stubs, *(mesh_of(solid).vertices for solid in whole)])
     obstacle = find_obstacle(machine, level(machine), below)
     if obstacle is not None:
         return 1, obstacle
-    for joint, top in enumerate(tops):
-        base, vertices = ring.base(joint), mesh_of(top).vertices
+    for joint, (each, (turn, r, _)) in enumerate(zip(bars, places, strict=True)):
+        base, vertices = ring.base(joint), _turned(each.top, turn, r)
         if float(base.heights_mm(below).max()) > ORDER_TOLERANCE_MM:
             return 2, f"bars {shape.above_mm:g} mm long above their joints would stand in the head's way on so small a plate"
         if not allowed_poses(machine, base.normal, vertices):
@@ -161,3 +187,9 @@ def _problem(shape: Shape, ring: Ring, whole: Sequence[Solid], machine: Machine)
             return 3, find_obstacle(machine, pose, vertices) or ""
         below = np.vstack([below, vertices])
     return None
+
+
+def _turned(corners: Floats, turn_rad: float, radius_mm: float) -> Floats:
+    """Corners (n, 3) moved out along x, then turned about z."""
+    x, y = corners[:, 0] + radius_mm, corners[:, 1]
+    return np.column_stack([x * cos(turn_rad) - y * sin(turn_rad), x * sin(turn_rad) + y * cos(turn_rad), corners[:, 2]])

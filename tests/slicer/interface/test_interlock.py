@@ -50,12 +50,12 @@ def test_grooves_of_a_leaning_part_lie_just_below_its_base_plane() -> None:
     base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
     cuts = np.arange(0.1, 40, 0.2)
     whole = [Polygons.square((80, 80), True)] * len(cuts)
-    process = profile(DEEP).process
-    for z, left in zip(cuts, cut_grooves(whole, base, [arm], cuts, process), strict=True):
+    own = profile(DEEP)
+    for z, left in zip(cuts, cut_grooves(whole, base, [arm], cuts, own), strict=True):
         gone = whole[0] - left
         for x, _ in np.concatenate([*gone.to_polygons(), np.zeros((0, 2))]):
             assert abs(x * np.sin(np.pi / 3) + 0.5 * z - 14.0) < 0.2 + 1e-6
-    assert sum((whole[0] - left).area() for left in cut_grooves(whole, base, [arm], cuts, process)) > 1.0
+    assert sum((whole[0] - left).area() for left in cut_grooves(whole, base, [arm], cuts, own)) > 1.0
 
 
 def test_a_bead_of_no_more_than_its_width_fills_a_groove() -> None:

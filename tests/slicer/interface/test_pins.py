@@ -14,7 +14,8 @@ from mdp.cut import solid_of
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.errors import ProfileError
-from profiles.profile import Profile
+from profiles.part_settings import PartSettings
+from profiles.profile import Profile, with_part_settings
 from slicer.interface.pins import plan_pins, pour
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import section_part
@@ -215,3 +216,21 @@ def test_a_depth_alone_asks_for_grooves_as_it_did_before_there_was_a_choice() ->
     assert profile("process.interlock_mm=0.2", *PINS).process.interlock == "pins"
     with pytest.raises(ProfileError, match="interlock_mm is 0 mm: interlock = grooves makes grooves deeper"):
         profile("process.interlock=grooves", "process.interlock_mm=0")
+
+
+@pytest.mark.parametrize("kind", ["pins", "grooves"])
+def test_one_part_alone_may_be_held_by_pins_or_grooves(kind: str) -> None:
+    base, top = stacked()
+    of_print = profile(*BARE)
+    alone = with_part_settings(of_print, [PartSettings(part=2, process={"interlock": kind})])
+    for_all = profile(*BARE, f"process.interlock={kind}")
+    carved = [[sections.own[-1].area() for sections in sections_of([base, top], own)] for own in (alone, for_all, of_print)]
+    assert carved[0] == carved[1]
+    assert carved[0][0] < carved[2][0] - 1.0
+
+
+def test_only_the_part_that_asks_for_pins_has_them() -> None:
+    storeys = cut(box(24, 24, 30), (UP, 20.0), (UP, 10.0))
+    only_third = with_part_settings(profile(*BARE), [PartSettings(part=3, process={"interlock": "pins"})])
+    planned = plan_pins(storeys, only_third)
+    assert (len(planned[2]), len(planned[3]) > 0) == (0, True)
