@@ -1,11 +1,12 @@
 """Program: the G-code of a print with its dry run, and the parts it was made of; what ways to print a model come to."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from machine.dryrun.dryrun import DryRun
 from mdp.decomposition import Decomposition
-from mdp.joint import Joint
+from mdp.joint import Joint, joints_of
+from profiles.profile import Profile
 from slicer.paths import SlicedPart
 
 
@@ -26,6 +27,19 @@ class Program:
             for index, mm3 in piece.interface_mm3.items():
                 more[index] = more.get(index, 0.0) + mm3
         return dict(sorted(more.items()))
+
+
+def joints_of_print(program: Program, profile: Profile) -> tuple[Joint, ...]:
+    """The joints of a print, with what its dry run tells of the first layers on them; none where its model is not known."""
+    if program.decomposition is None:
+        return ()
+    laid = {face.part: face for face in program.run.interfaces}
+    return tuple(
+        replace(joint, contact_share=laid[joint.part].contact, plastic_over_room=laid[joint.part].over_room)
+        if joint.part in laid
+        else joint
+        for joint in joints_of(program.decomposition.parts, profile)
+    )
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,11 @@ def newtons(force_n: float) -> str:
     return f"{float(f'{force_n:.2g}'):.12g}"
 
 
+def percent(share: float | None, digits: int = 0) -> str:
+    """A share in percent without the sign; a dash where it is not known."""
+    return "-" if share is None else f"{100.0 * share:.{digits}f}"
+
+
 def filament_cm3(filament_mm: float, material: Material) -> float:
     """Volume of a length of filament."""
     return filament_mm * pi * material.diameter_mm**2 / 4.0 / 1000.0

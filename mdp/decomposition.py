@@ -21,7 +21,8 @@ class Part:
 
     mesh lies in the workpiece frame. rotation (3, 3) turns the workpiece frame into the part frame's orientation at
     the pose, so rotation @ direction = +z and a point w has part coordinates rotation @ w - (0, 0, base.offset_mm).
-    feather_share is the share of its base's rim, where that is seen, at which base and surface meet at less than 20 degrees.
+    seam_mm is how long its base's rim is where that is seen, feather_share the share of it at which base and surface meet at less
+    than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
     up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up.
     """
@@ -33,6 +34,7 @@ class Part:
     rotation: Floats
     volume_mm3: float
     risky_area_mm2: float
+    seam_mm: float = 0.0
     feather_share: float = 0.0
     needing: Mask | None = None
     needing_upright: Mask | None = None

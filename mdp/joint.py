@@ -23,15 +23,20 @@ TOUCHING_MM2 = 0.01  # sections that share less only meet in an edge
 
 @dataclass(frozen=True)
 class Joint:
-    """What a part's base bears. area_mm2: of all its pieces, each of which is a joint of its own; the others are those of the
-    piece that breaks first: how far its end is, from the middle of its section, and the forces that break it, in newtons,
-    sideways at the end and straight off."""
+    """What a part's base bears. area_mm2: of all its pieces, each of which is a joint of its own; arm_mm, load_n, tension_n are
+    those of the piece that breaks first: how far its end is, from the middle of its section, and the forces that break it, in
+    newtons, sideways at the end and straight off. seam_mm: how long its rim is where that is seen. contact_share: of its section,
+    what the first layer's beads cover and earlier parts reach up to; plastic_over_room: what that layer gets of the plastic that
+    fits there; None: it is not sliced."""
 
     part: int
     area_mm2: float
     arm_mm: float
     load_n: float
     tension_n: float
+    seam_mm: float = 0.0
+    contact_share: float | None = None
+    plastic_over_room: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +61,7 @@ def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
         high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= crumb_mm] or own
         several = [_joint(pieces, k, profile.material.cold_weld_mpa) for k in high]
         weakest = min(several, key=lambda joint: joint.load_n)
-        joints.append(replace(weakest, area_mm2=sum(joint.area_mm2 for joint in several)))
+        joints.append(replace(weakest, area_mm2=sum(joint.area_mm2 for joint in several), seam_mm=part.seam_mm))
     return tuple(joints)
 
 

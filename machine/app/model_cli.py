@@ -35,6 +35,9 @@ def decompose(
     record: Annotated[
         Path | None, typer.Option("--record", metavar="FILE", help="what the search saw, as .npz for training")
     ] = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="slice the parts: tell how their joints lie, and time and material in one part")
+    ] = False,
     given: options.ModelProfileOptions,
 ) -> int:
     """Cut a model into parts, each with its own printing direction."""
@@ -46,7 +49,7 @@ def decompose(
         folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=None if known else plan
     )
     cuts = Cuts(plan if known else None, search.parts, planes)
-    return decompose(options.model_request(model, search, given, outputs=outputs, cuts=cuts))
+    return decompose(options.model_request(model, search, given, outputs=outputs, cuts=cuts, compare=compare))
 
 
 def export(

@@ -3,13 +3,14 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun import clearance, extrusion, heat, layering, motion, own_comments, placement, sequence
 from machine.dryrun.balance import interfaces
+from machine.dryrun.balance.interfaces import InterfaceBalance
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
@@ -34,7 +35,7 @@ class DryRun:
     print (what comes before it, and homing, are not counted).
     segments_mm: (m, 2, 3) deposited segments, workpiece frame; segment_row: (m,) their rows in program, which hold line,
     part, layer, type, width and height; segment_mm3: (m,) their volumes. contacts: what lay under each row; None where
-    it was known before what there is to find.
+    it was known before what there is to find. interfaces: where parts stand on others; none where contacts are not known.
     """
 
     program: ParsedProgram
@@ -46,6 +47,7 @@ class DryRun:
     contacts: Contacts | None
     findings: tuple[Finding, ...]
     letters: tuple[str, ...]
+    interfaces: tuple[InterfaceBalance, ...] = ()
 
     @property
     def dwell_s(self) -> float:
@@ -82,10 +84,12 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     area = pi * profile.material.diameter_mm**2 / 4.0
     stop = motion.standstills(program)
     contacts = None
+    balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
         deposited = beads_of(program, segments, rows, profile)
         contacts = replay(program, deposited, profile)
-        known = _findings(text, program, deposited, contacts, profile)
+        balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
+        known = _findings(text, program, Laid(deposited, contacts, balances), profile)
     times_s = move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration)
     dwells = [(event.line, event.value) for event in program.events if event.code == "G4"]
     return DryRun(
@@ -98,13 +102,21 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
         contacts=contacts,
         findings=tuple(known),
         letters=tuple(axis_limits(machine)),
+        interfaces=balances,
     )
 
 
-def _findings(
-    text: Sequence[str], program: ParsedProgram, deposited: Beads, contacts: Contacts, profile: Profile
-) -> list[Finding]:
+class Laid(NamedTuple):
+    """What is deposited, what lies under it, and how its interfaces are filled."""
+
+    deposited: Beads
+    contacts: Contacts
+    interfaces: tuple[InterfaceBalance, ...]
+
+
+def _findings(text: Sequence[str], program: ParsedProgram, laid: Laid, profile: Profile) -> list[Finding]:
     """What speaks against a program, the worst first."""
+    deposited, contacts, balances = laid
     segments, rows = deposited.segments_mm, deposited.rows
     findings = [
         *motion.findings(program, profile.machine),
@@ -112,7 +124,7 @@ def _findings(
         *placement.findings(program, deposited, contacts),
         *layering.findings(program, deposited, contacts),
         *extrusion.findings(program, deposited, profile),
-        *interfaces.findings(program, deposited, profile),
+        *interfaces.findings(program, balances, profile),
         *sequence.findings(program, profile),
         *own_comments.findings(text, program, profile),
         *placement.off_plate(program, segments, rows, profile),
@@ -157,5 +169,14 @@ def summary(run: DryRun) -> dict[str, Any]:
             letter: [float(program.end[:, k].min()), float(program.end[:, k].max())] if len(program.end) else []
             for k, letter in enumerate(run.letters)
         },
+        "interfaces": [
+            {
+                "part": face.part,
+                "area_mm2": face.area_mm2,
+                "contact_share": face.contact,
+                "plastic_over_room": face.over_room,
+            }
+            for face in run.interfaces
+        ],
         "findings": [asdict(finding) for finding in run.findings],
     }

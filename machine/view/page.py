@@ -18,9 +18,9 @@ MARKER = re.compile(r"<!--(?:TITLE|CSP|DATA)-->|/\*(?:STYLE|SCRIPT)\*/")
 DATA = b'<script type="application/octet-stream" id="tiltprint">'
 
 
-def parts_page(decomposition: Decomposition, profile: Profile) -> bytes:
-    """The page of parts alone."""
-    return page(decomposition.name, of_parts(decomposition, profile))
+def parts_page(decomposition: Decomposition, profile: Profile, alternatives: Sequence[Alternative] = ()) -> bytes:
+    """The page of parts alone; arguments as of_parts takes them."""
+    return page(decomposition.name, of_parts(decomposition, profile, alternatives))
 
 
 def print_page(

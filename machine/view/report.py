@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Alternative, Program
-from machine.quantities import duration, filament_g, newtons
+from machine.quantities import duration, filament_g, newtons, percent
 from machine.reader.parsed import MoveKind
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
@@ -20,7 +20,7 @@ from machine.view.settings import settings_tables
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, standing_still
-from mdp.joint import joints_of, weakest_of
+from mdp.joint import Joint, weakest_of
 from mdp.mesh import Floats
 from profiles.profile import Profile
 
@@ -34,20 +34,27 @@ COMPARED = "Compared"
 COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "stairs mm²", "findings", "risky mm²")
 STANDS_ON = "base cm³"
 CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
+LAID = ["contact %", "plastic %"]
+CONTACT = (
+    "contact: of the joint's section, what beads of the first layer cover and earlier parts reach up to; plastic: what that "
+    "layer gets of what the room below its tip holds there"
+)
 BREAKS = "breaks: pushed sideways at the end of its arm, the farthest place of what it holds; an estimate of the cold weld alone"
 RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
 
 
-def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, Any]:
-    """The report of a page of parts alone."""
+def parts_report(
+    decomposition: Decomposition, profile: Profile, joints: Sequence[Joint], alternatives: Sequence[Alternative] = ()
+) -> dict[str, Any]:
+    """The report of a page of parts alone; alternatives: as they print, where that was tried."""
     facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
     rows = [_solid(part, profile) for part in decomposition.parts]
     parts = _table("Parts", SOLID, rows, [RISKY])
     tables = [
         parts,
-        *_joints(decomposition, profile),
+        *_joints(joints),
         *_front(decomposition),
-        _areas(decomposition, profile),
+        _alternatives(alternatives) if alternatives else _areas(decomposition, profile),
         *settings_tables(profile),
     ]
     return {"facts": facts, "tables": tables}
@@ -59,17 +66,20 @@ def print_report(
     layers: Layers,
     ends_s: Floats,
     *,
+    joints: Sequence[Joint] = (),
     alternatives: Sequence[Alternative] = (),
     known: bool = True,
     ours: bool = True,
 ) -> dict[str, Any]:
-    """The report of a whole print. ends_s: (n,) when each row ends; alternatives: the same model printed in one part.
+    """The report of a whole print. ends_s: (n,) when each row ends; joints: of a model that is known; alternatives: it printed in
+    one part.
 
     known: the machine is no guess; ours: the file was made with this profile, else its settings are not told.
     """
     tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile, "" if known else profile.machine.name)]
+    tables += _joints(joints) or _interfaces(program.run)
     if program.decomposition is not None:
-        tables += [*_joints(program.decomposition, profile), *_front(program.decomposition)]
+        tables += _front(program.decomposition)
         tables.append(_alternatives(alternatives) if alternatives else _areas(program.decomposition, profile))
     names = _names(profile) if ours else _assumptions(profile, known)
     facts = [*_figures(program.run, profile, layers), *names]
@@ -115,15 +125,29 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
     return _table("Parts", head, rows, [RISKY] * bool(solids) + [CUT] * bool(interfaces))
 
 
-def _joints(decomposition: Decomposition, profile: Profile) -> list[Table]:
-    """What the joint under every part bears; of a model in one piece nothing."""
-    joints = joints_of(decomposition.parts, profile)
+def _joints(joints: Sequence[Joint]) -> list[Table]:
+    """Every joint: its area and seam, how its first layer lies where it is sliced, and what it bears."""
+    sliced = any(joint.contact_share is not None for joint in joints)
     weakest, rows = weakest_of(joints), []
     for joint in joints:
+        laid = _laid(joint.contact_share, joint.plastic_over_room) if sliced else []
+        lengths = [f"{joint.seam_mm:.0f}", f"{joint.arm_mm:.1f}"]
         forces = [newtons(joint.load_n), newtons(joint.tension_n)]
-        name = f"{joint.part}{' (the weakest)' * (joint is weakest)}"
-        rows.append([name, f"{joint.area_mm2:.1f}", f"{joint.arm_mm:.1f}", *forces])
-    return [_table("Joints", ["part", "mm²", "arm mm", "breaks at N", "pulled off at N"], rows, [BREAKS])] if joints else []
+        rows.append([str(joint.part), f"{joint.area_mm2:.1f}", *laid, *lengths, *forces])
+    head = ["part", "mm²", *(LAID if sliced else []), "seam mm", "arm mm", "breaks at N", "pulled off at N"]
+    notes = [*([CONTACT] if sliced else []), BREAKS]
+    notes += [] if weakest is None else [f"the weakest: the joint of part {weakest.part}"]
+    return [_table("Joints", head, rows, notes)] if joints else []
+
+
+def _interfaces(run: DryRun) -> list[Table]:
+    """What G-code alone tells of where its parts stand on others."""
+    rows = [[str(face.part), f"{face.area_mm2:.1f}", *_laid(face.contact, face.over_room)] for face in run.interfaces]
+    return [_table("Joints", ["part", "mm²", *LAID], rows, [CONTACT])] if rows else []
+
+
+def _laid(contact: float | None, over_room: float | None) -> Row:
+    return [percent(contact, 1), percent(over_room)]
 
 
 def _front(decomposition: Decomposition) -> list[Table]:

@@ -1,5 +1,6 @@
 """Scene: the solids of the page: surfaces of the parts, and the machine's bodies and axes."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from machine.view.encoding import Column
 from machine.view.parts import residual_faces, risky_before, risky_before_mm2
 from mdp.decomposition import Decomposition, Part
-from mdp.joint import joints_of
+from mdp.joint import Joint
 from mdp.mesh import Floats
 from mdp.pose import unit
 from mdp.save import joint_values, plane_values
@@ -40,10 +41,10 @@ def _marks(part: Part, profile: Profile) -> NDArray[np.int64]:
     return marks
 
 
-def solids(decomposition: Decomposition, profile: Profile) -> list[dict[str, Any]]:
-    """What the header tells of each part's pose, base plane and place in the surfaces."""
+def solids(decomposition: Decomposition, profile: Profile, joints: Sequence[Joint]) -> list[dict[str, Any]]:
+    """What the header tells of each part's pose, base plane, joint and place in the surfaces."""
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
-    joints = {joint["part"]: joint for joint in joint_values(joints_of(decomposition.parts, profile))}
+    by_part = {joint["part"]: joint for joint in joint_values(joints)}
     records, vertex, face = [], 0, 0
     for part in decomposition.parts:
         ends = vertex + len(part.mesh.vertices), face + len(part.mesh.faces)
@@ -59,7 +60,7 @@ def solids(decomposition: Decomposition, profile: Profile) -> list[dict[str, Any
                 "volume_mm3": part.volume_mm3,
                 "risky_before_mm2": risky_before_mm2(part, angle, counted),
                 "risky_after_mm2": part.risky_area_mm2,
-                "joint": joints.get(part.index),
+                "joint": by_part.get(part.index),
                 "mesh": {"vertices": [vertex, ends[0]], "faces": [face, ends[1]]},
             }
         )

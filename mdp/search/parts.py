@@ -14,6 +14,7 @@ from mdp.search.node import Node
 from mdp.search.problem import Problem
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
+from mdp.sweep.rims import NO_RIM
 from profiles.machine import Machine
 
 MOST_FEATHERED = 0.1  # share of a seam; a person is told of more
@@ -43,7 +44,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
 
     options = [[level(machine)], *(allowed(position) for position in range(1, len(bases)))]
     chosen = least_rotation(machine, options, fits)
-    feathered = (0.0, *(seam.feather_share for seam in reversed(node.seams)))
+    seams = (NO_RIM, *reversed(node.seams))
     zones, need, parts = node.places.zones, node.terms.need, []
     for position, (base, piece, pose) in enumerate(zip(bases, pieces, chosen, strict=True)):
         needs = None if need is None else need.pieces(piece)
@@ -57,7 +58,8 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
                 rotation=rotation(machine, pose),
                 volume_mm3=piece.mesh.volume_mm3,
                 risky_area_mm2=float(piece.mesh.areas_mm2[risky].sum()),
-                feather_share=feathered[position],
+                seam_mm=seams[position].length_mm,
+                feather_share=seams[position].feather_share,
                 needing=None if needs is None else risky,
                 needing_upright=None if needs is None else _needing_upright(piece.mesh, needs, node.terms),
                 no_seam=zones.no_seam.among(piece.sources),

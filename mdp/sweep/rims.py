@@ -173,6 +173,9 @@ class Rim(NamedTuple):
         return self.feathered_mm / self.length_mm if self.length_mm > 0.0 else 0.0
 
 
+NO_RIM = Rim(0.0, 0.0, 0.0)  # of what stands on the platform
+
+
 @kernel
 def measure_rim(faces: Ints, heights: Floats, cosines: Floats, areas: Floats, weights: Floats, feather: float) -> Rim:
     """The rim at height 0 of a mesh: vertices of its (m, 3) faces at (n,) heights; cosines (m,) of face and plane."""

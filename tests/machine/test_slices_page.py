@@ -153,6 +153,10 @@ def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(b
     slice_it(browser)
     browser.wait("document.documentElement.dataset.walls === '1 2'")
     assert "takes" in text(browser, "sliced-told")
+    head, row = browser.value("[...$('joints').rows].map((row) => [...row.cells].map((cell) => cell.textContent))")
+    assert head == ["joint of part", "area", "contact", "plastic", "seam", "breaks at"]
+    assert row[0] == "2"
+    assert [cell.split()[-1] for cell in row[1:]] == ["mm²", "%", "%", "mm", "N"]
     browser.click("#look")
     browser.wait(f"{FRAME}?.document.documentElement?.dataset.picture === 'idle'")
     browser.value(in_frame(browser, "document.getElementById('tab-code').click()"))

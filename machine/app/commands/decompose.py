@@ -8,7 +8,8 @@ from machine.app.pictures.front_picture import front_picture
 from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import write_png
 from machine.app.pipeline import compilers
-from machine.app.pipeline.pipeline import decompose_model
+from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import STDOUT, ModelRequest, Outputs
 from machine.app.terminal.advice import advice
 from machine.app.terminal.plain import show
@@ -24,15 +25,18 @@ MODEL, FIGURES, PLAN, SCENE = FOLDER_FILES
 
 
 def decompose(request: ModelRequest) -> int:
-    """Find the parts of a model and save what is asked for."""
+    """Find the parts of a model and save what is asked for; to compare them they are sliced, and the model in one part."""
     outputs = request.outputs
     check_outputs(outputs)
     check_model_files(request, ())
     decomposed = decompose_model(request)
     decomposition, profile = decomposed.decomposition, decomposed.profile
-    joints = joints_of(decomposition.parts, profile)
+    alternatives = compare_with_one_part(build(decomposition, profile), profile) if request.compare else ()
+    joints = alternatives[0].joints if alternatives else joints_of(decomposition.parts, profile)
     figures = json_values(decomposition, joints, decomposed.read_s, decomposed.total_s)
     figures |= {"rotate_deg": profile.process.rotate_deg}
+    if alternatives:
+        figures |= {"compare": alternatives_json(alternatives)}
     if outputs.folder is not None:
         make_folder(outputs.folder)
         for part in decomposition.parts:
@@ -46,12 +50,13 @@ def decompose(request: ModelRequest) -> int:
             write_bytes(file, plan_text(decomposed.plan).encode())
     _draw(outputs, decomposition, profile)
     if outputs.html is not None:
-        write_bytes(outputs.html, parts_page(decomposition, profile))
+        write_bytes(outputs.html, parts_page(decomposition, profile, alternatives))
     if outputs.json is not None:
         write_json(outputs.json, figures)
     if outputs.json != STDOUT:
         tables = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
-        show(tables + joints_table(joints) + part_settings_lines(profile) + advice(decomposition, profile))
+        comparison = compare_table(alternatives) if alternatives else ""
+        show(tables + joints_table(joints) + part_settings_lines(profile) + advice(decomposition, profile) + comparison)
     return 0
 
 

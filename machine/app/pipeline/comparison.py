@@ -8,13 +8,12 @@ import numpy as np
 from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
-from machine.program import Alternative, Program
-from machine.quantities import duration, filament_g, newtons
+from machine.program import Alternative, Program, joints_of_print
+from machine.quantities import duration, filament_g
 from mdp.cost.cost import weight_of_stairs
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
-from mdp.joint import joints_of, weakest_of
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level, rotation
@@ -58,7 +57,7 @@ def in_parts(program: Program, profile: Profile) -> Alternative:
     assert ours is not None  # programs of other slicers have nothing to compare with
     count = len(ours.parts)
     way = Alternative(f"in {count} part{'s' * (count > 1)}", "", count, risky_mm2=ours.residual_area_mm2)
-    return replace(_figures(way, program, profile), joints=joints_of(ours.parts, profile))
+    return replace(_figures(way, program, profile), joints=joints_of_print(program, profile))
 
 
 def straight_up(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
@@ -153,14 +152,8 @@ def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
     rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm2"] for way in alternatives]
     head, *lines = table(rows).splitlines()
-    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, _weakest(way), way.message) if note]
+    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
     return "\n".join(["", head, *lines, *notes]) + "\n"
-
-
-def _weakest(way: Alternative) -> str:
-    """What its weakest joint bears."""
-    joint = weakest_of(way.joints)
-    return "" if joint is None else f"the weakest joint, of part {joint.part}, bears {newtons(joint.load_n)} N at the far end"
 
 
 def _costs(alternative: Alternative) -> list[str]:

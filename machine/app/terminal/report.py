@@ -6,7 +6,7 @@ from textwrap import wrap
 from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Program
-from machine.quantities import duration, minutes, newtons
+from machine.quantities import duration, minutes, newtons, percent
 from machine.view.parts import risky_before_mm2
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.joint import Joint, weakest_of
@@ -46,14 +46,19 @@ def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_pla
 
 
 def joints_table(joints: Sequence[Joint]) -> str:
-    """What the joint under every part bears, and which is the weakest; nothing for a model in one piece."""
+    """Every joint: its area and seam, how its first layer lies where it is sliced, what it bears, and which is the weakest;
+    nothing for a model in one piece."""
     weakest = weakest_of(joints)
     if weakest is None:
         return ""
-    rows = [["joint of part", "area mm2", "arm mm", "breaks at N", "pulled off at N"]]
+    sliced = any(joint.contact_share is not None for joint in joints)
+    laid = ["contact %", "plastic / room %"] if sliced else []
+    rows = [["joint of part", "area mm2", *laid, "seam mm", "arm mm", "breaks at N", "pulled off at N"]]
     for joint in joints:
+        shares = [percent(joint.contact_share, 1), percent(joint.plastic_over_room)] if sliced else []
+        lengths = [f"{joint.seam_mm:.0f}", f"{joint.arm_mm:.1f}"]
         forces = [newtons(joint.load_n), newtons(joint.tension_n)]
-        rows.append([str(joint.part), f"{joint.area_mm2:.1f}", f"{joint.arm_mm:.1f}", *forces])
+        rows.append([str(joint.part), f"{joint.area_mm2:.1f}", *shares, *lengths, *forces])
     sentence = (
         f"weakest: the joint of part {weakest.part}, by estimate it breaks at {newtons(weakest.load_n)} N sideways at the far end"
     )

@@ -4,7 +4,7 @@ The room of a column reaches from the tip of that first layer down to what earli
 frame: bars as high as their layers and as wide as their plastic makes them, at whatever slant they were laid.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -76,12 +76,31 @@ class Interface:
         return over_room(self.plastic, np.where(self.touching & self.section, self.room, np.nan), self.lattice)
 
 
-def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
+@dataclass(frozen=True)
+class InterfaceBalance:
+    """What an interface comes to, without its columns: area_mm2, contact, over_room, beads_over_room as there; touching_mm2: of
+    the section, where earlier parts reach up to it."""
+
+    part: int
+    row: int
+    area_mm2: float
+    contact: float
+    over_room: float
+    beads_over_room: float
+    touching_mm2: float
+
+    @classmethod
+    def of(cls, face: Interface) -> "InterfaceBalance":
+        """The balance of an interface."""
+        touching_mm2 = float((face.touching & face.section).sum()) * face.lattice.column_mm2
+        return cls(face.part, face.row, face.area_mm2, face.contact, face.over_room, face.beads_over_room, touching_mm2)
+
+
+def findings(program: ParsedProgram, balances: Sequence[InterfaceBalance], profile: Profile) -> Iterator[Finding]:
     """A warning of code room for every part whose first layer has far more or less plastic than its flow puts into its room."""
-    for face in interfaces(program, deposited, profile):
-        flow = profile.of_part(face.part).process.interface_flow * profile.material.flow
-        share, touching = face.beads_over_room / flow, float((face.touching & face.section).sum()) * face.lattice.column_mm2
-        if touching >= LEAST_TOLD_MM2 and not LEAST_TOLD <= share <= MOST_TOLD:
+    for face in balances:
+        share = face.beads_over_room / (profile.of_part(face.part).process.interface_flow * profile.material.flow)
+        if face.touching_mm2 >= LEAST_TOLD_MM2 and not LEAST_TOLD <= share <= MOST_TOLD:
             message = (
                 f"the first layer of part {face.part} gets {share:.2f} of the plastic that its room on earlier parts is to have, "
                 f"{LEAST_TOLD:g} to {MOST_TOLD:g} are expected"

@@ -183,6 +183,29 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png", "front.png"))
 
 
+def test_decompose_compares_the_sliced_parts_with_one_piece_and_tells_how_their_joints_lie(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    given = ["tee.stl", "--as-is", "--set", "search.stair_weight=0.01", *FAST, "--json", "out.json"]
+    assert main(["decompose", *given]) == 0
+    (joint,) = json.loads(Path("out.json").read_text())["joints"]
+    assert (joint["contact_share"], joint["plastic_over_room"]) == (None, None)
+    assert "contact %" not in capsys.readouterr().out
+    assert main(["decompose", *given, "--compare", "--html", "out.html"]) == 0
+    record = json.loads(Path("out.json").read_text())
+    assert [way["name"] for way in record["compare"]] == ["parts", "upright", "oriented"]
+    assert record["joints"] == record["compare"][0]["joints"]
+    sliced = record["joints"][0]
+    assert {key: sliced[key] for key in joint if joint[key] is not None} == {k: v for k, v in joint.items() if v is not None}
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("2 ") and " 0.0" not in line)
+    assert row.split()[1:4] == [
+        f"{sliced['area_mm2']:.1f}",
+        f"{100 * sliced['contact_share']:.1f}",
+        f"{100 * sliced['plastic_over_room']:.0f}",
+    ]
+
+
 def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     assert main(["decompose", "tee.stl", *FAST, "--search", "published", "--beam-width", "3", "--json", "a.json"]) == 0
@@ -210,7 +233,7 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
     first, again = (json.loads(Path(name).read_text()) for name in ("a.json", "again.json"))
     assert set(first) == {
         "time_s", "filament_mm", "extruded_mm3", "travel_mm", "layers", "parts", "reorientations", "retractions", "bounds_mm",
-        "axes", "findings",
+        "axes", "interfaces", "findings",
     }  # fmt: skip
     assert first == again
 

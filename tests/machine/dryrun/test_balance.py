@@ -5,10 +5,10 @@ from math import cos, pi, radians, sin, tan
 import numpy as np
 import pytest
 
-from machine.dryrun import dry_run
 from machine.dryrun.balance.columns import NOTHING, Bars, inside_loops, laid, lattice_over, over_room, tops
 from machine.dryrun.balance.interfaces import Interface, interfaces, wall_edges
 from machine.dryrun.balance.layers import PartBalance, layer_balances
+from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.strokes import beads_of
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import Lines, layers, on, word
@@ -92,6 +92,17 @@ def test_a_first_layer_with_another_flow_has_so_much_more_plastic_over_its_room(
     good, bad = faces(list(bent("generic_ac")[2])), faces(richer(2, 1, factor))
     assert bad[0].over_room / good[0].over_room == pytest.approx(factor, rel=0.06)
     assert bad[1].over_room == pytest.approx(good[1].over_room, rel=0.02)
+
+
+def test_the_dry_run_keeps_of_every_interface_what_the_columns_come_to() -> None:
+    profile, _, lines = bent("generic_ac")
+    balances = dry_run(lines, profile).interfaces
+    assert [(face.part, face.area_mm2, face.contact, face.over_room, face.beads_over_room) for face in balances] == [
+        (face.part, face.area_mm2, face.contact, face.over_room, face.beads_over_room) for face in faces(list(lines))
+    ]
+    told = summary(dry_run(richer(2, 1, 1.5), profile))["interfaces"]
+    assert [face["part"] for face in told] == [2, 3]
+    assert told[0]["plastic_over_room"] == pytest.approx(1.5 * balances[0].over_room, rel=0.06)
 
 
 def test_other_axes_and_firmwares_show_the_same_interfaces() -> None:

@@ -214,7 +214,7 @@ def test_the_summary_has_the_agreed_keys_and_is_json() -> None:
     figures = summary(_run())
     assert list(figures) == [
         "time_s", "filament_mm", "extruded_mm3", "travel_mm", "layers", "parts", "reorientations",
-        "retractions", "bounds_mm", "axes", "findings",
+        "retractions", "bounds_mm", "axes", "interfaces", "findings",
     ]  # fmt: skip
     assert set(figures["findings"][0]) == {"severity", "code", "line", "part", "layer", "message"}
     assert json.loads(json.dumps(figures)) == figures

@@ -1,15 +1,17 @@
 """The report beside the picture: its figures add up to the dry run's."""
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from machine.dryrun.dryrun import dry_run
-from machine.program import Alternative, Program
+from machine.program import Alternative, Program, joints_of_print
 from machine.view.layers import layers_of
 from machine.view.paths import end_times_s
-from machine.view.report import parts_report, print_report
+from machine.view.report import LAID, parts_report, print_report
+from mdp.joint import joints_of
 from profiles.profile import load
 from tests.machine.view.test_view import STEPS, example
 
@@ -80,10 +82,40 @@ def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -
     assert known["notes"] == ["straight up: too high"]
 
 
+def test_joints_of_a_sliced_model_tell_contact_and_plastic_those_of_g_code_nothing_else() -> None:
+    profile, program = example()
+    (face,) = program.run.interfaces
+    laid = [f"{100 * face.contact:.1f}", f"{100 * face.over_room:.0f}"]
+    named = (layers_of(program.run.program, 0.2), end_times_s(program.run))
+    report = print_report(program, profile, *named, joints=joints_of_print(program, profile))
+    joints = next(table for table in report["tables"] if table["title"] == "Joints")
+    assert joints["head"][:5] == ["part", "mm²", "contact %", "plastic %", "seam mm"]
+    assert joints["rows"][0][:4] == ["2", "100.0", *laid]
+    assert joints["notes"][-1] == "the weakest: the joint of part 2"
+    alone = tables(replace(program, decomposition=None))["Joints"]
+    assert (alone["head"], alone["rows"]) == (["part", "mm²", *LAID], [["2", f"{face.area_mm2:.1f}", *laid]])
+
+
+def test_parts_alone_tell_only_what_is_known_of_their_joints_unless_they_were_sliced_to_compare() -> None:
+    profile, program = example()
+    assert program.decomposition is not None
+    bare, sliced = joints_of(program.decomposition.parts, profile), joints_of_print(program, profile)
+    way = Alternative("in 2 parts", "", 2, 60.0, 1000.0, 3.0, 0.0)
+    alone, beside = (
+        parts_report(program.decomposition, profile, bare),
+        parts_report(program.decomposition, profile, sliced, [way]),
+    )
+    heads = [
+        [table["head"] for table in report["tables"] if table["title"] in ("Joints", "Compared")] for report in (alone, beside)
+    ]
+    assert (heads[0][0][1:4], heads[0][1]) == (["mm²", "seam mm", "arm mm"], ["print", "risky mm²", "less"])
+    assert (heads[1][0][1:4], heads[1][1]) == (["mm²", *LAID], ["", "in 2 parts"])
+
+
 def test_parts_alone_have_no_layers_and_no_time() -> None:
     profile, program = example()
     assert program.decomposition is not None
-    report = parts_report(program.decomposition, profile)
+    report = parts_report(program.decomposition, profile, joints_of(program.decomposition.parts, profile))
     assert report["facts"][:2] == [["parts", "2"], ["volume", "7.00 cm³"]]
     assert "layers" not in report["tables"][0]["head"]
 

@@ -349,6 +349,13 @@ def test_a_search_leaves_no_base_that_the_nozzle_could_break(load_n: int, object
     assert any("because the nozzle could break the part" in note for note in found.notes) == (parts == 1)
 
 
+def test_every_part_knows_how_long_its_seam_is_seen() -> None:
+    wide, narrow = m3.Manifold.cube((20.0, 20.0, 20.0)), m3.Manifold.cube((10.0, 12.0, 10.0)).translate((5.0, 4.0, 20.0))
+    cut = _cut(mesh_of(wide + narrow), (UP, 10.0), (UP, 24.0), profile=_profile("search.nozzle_load_n=0"))
+    assert [part.seam_mm for part in cut.parts] == pytest.approx([0.0, 80.0, 44.0])
+    assert cut.seam_mm == pytest.approx(124.0)
+
+
 def test_a_part_with_a_feather_edge_is_told() -> None:
     wedge = mesh_of(
         below(solid_of(shapes.box(20.0, 20.0, 40.0)), Plane(np.array([0.0, np.sin(0.2), np.cos(0.2)]), 30.0 * np.cos(0.2)))

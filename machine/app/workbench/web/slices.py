@@ -4,6 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from machine.app.workbench.session.session import Session
+from mdp.save import joint_values
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 
@@ -51,6 +52,7 @@ def _sliced(session: Session) -> dict[str, Any] | None:
         "ready": sorted(slices.walls),
         "time_s": sliced.time_s,
         "filament_mm": sliced.filament_mm,
+        "joints": joint_values(sliced.cost.joints),
         "findings": [asdict(finding) for finding in sliced.findings[:MOST_FINDINGS]],
         "more_findings": max(len(sliced.findings) - MOST_FINDINGS, 0),
         "errors": [error.message for error in sliced.errors[:MOST_FINDINGS]],

@@ -16,6 +16,7 @@ from machine.view.encoding import pack
 from machine.view.parts import page_colours
 from machine.view.scene import solids, surfaces
 from mdp.decomposition import Decomposition, Part
+from mdp.joint import joints_of
 from profiles.errors import MoveError
 from profiles.profile import Profile
 
@@ -29,7 +30,8 @@ def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
     """Surfaces and figures of all parts in print order, and as `fit` what the machine does not reach of them, in the sentence of
     `export`."""
     colours = page_colours(len(decomposition.parts))
-    parts = [part | {"colour": colour} for part, colour in zip(solids(decomposition, profile), colours, strict=True)]
+    records = solids(decomposition, profile, joints_of(decomposition.parts, profile))
+    parts = [part | {"colour": colour} for part, colour in zip(records, colours, strict=True)]
     return pack({"parts": parts, "fit": out_of_reach(decomposition.parts, profile)}, surfaces(decomposition, profile))
 
 

@@ -63,15 +63,25 @@ def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
 
 
 def test_the_joints_stand_in_print_order_and_the_weakest_is_named() -> None:
-    joints = (Joint(2, 70.18, 21.16, 36.585, 842.19), Joint(3, 111.33, 29.13, 19.529, 12605.3))
+    joints = (Joint(2, 70.18, 21.16, 36.585, 842.19, 31.2), Joint(3, 111.33, 29.13, 19.529, 12605.3, 40.0))
     assert joints_table(joints).splitlines() == [
-        "joint of part  area mm2  arm mm  breaks at N  pulled off at N",
-        "2                  70.2    21.2           37              840",
-        "3                 111.3    29.1           20            13000",
+        "joint of part  area mm2  seam mm  arm mm  breaks at N  pulled off at N",
+        "2                  70.2       31    21.2           37              840",
+        "3                 111.3       40    29.1           20            13000",
         "weakest: the joint of part 3, by estimate it breaks at 20 N sideways at the far end",
         "",
     ]
     assert joints_table(()) == ""
+
+
+def test_a_joint_that_is_sliced_has_its_contact_and_its_plastic_one_that_is_not_a_dash() -> None:
+    sliced = Joint(2, 70.18, 21.16, 36.585, 842.19, 31.2, contact_share=0.9712, plastic_over_room=1.024)
+    lines = joints_table((sliced, Joint(3, 111.33, 29.13, 19.529, 12605.3, 40.0))).splitlines()
+    assert lines[:3] == [
+        "joint of part  area mm2  contact %  plastic / room %  seam mm  arm mm  breaks at N  pulled off at N",
+        "2                  70.2       97.1               102       31    21.2           37              840",
+        "3                 111.3          -                 -       40    29.1           20            13000",
+    ]
 
 
 def test_pins_are_counted_part_by_part_and_none_are_not_told() -> None:

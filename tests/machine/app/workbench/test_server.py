@@ -225,6 +225,7 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         assert bench.ask(f"print/{sliced['key']}")[1] == bench.ask("print.html")[1] != (folder / "tee.html").read_bytes()
         assert bench.ask(f"print/{sliced['key']}/text")[1] == bench.ask("print.gcode")[1]
         direction = np.frombuffer(bench.ask(f"walls/{sliced['number']}/2")[1], "<f4", 3)
+        assert [(joint["part"], joint["contact_share"] > 0.9) for joint in sliced["joints"]] == [(2, True)]
         assert (sliced["ready"], direction.tolist()) == ([1, 2], [1.0, 0.0, 0.0])
         page.do("compare")
         parts, upright, _ = page.until(lambda state: state["compared"])["compared"]

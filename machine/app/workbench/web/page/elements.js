@@ -4,6 +4,7 @@ import { $, made } from "../../../../view/template/page.js";
 
 export const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
+export const newtons = (force) => `${Number(force.toPrecision(2))} N`;
 
 /** Pairs of a name and a text, and of a class where the text has one; what has not changed stays, and what is selected in it. */
 export function tellIn(id, pairs) {

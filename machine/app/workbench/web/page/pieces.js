@@ -6,7 +6,7 @@ import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../v
 import { arrowsOf, LEFT, RED, surfacesOf } from "../../../../view/template/model.js";
 import { $ } from "../../../../view/template/page.js";
 import { solidOf } from "../../../../view/template/solids.js";
-import { choiceRow, mm2, putTable, swatch } from "./elements.js";
+import { choiceRow, mm2, newtons, putTable, swatch } from "./elements.js";
 import { anglesOf, choosePart } from "./planes.js";
 import { store, subscribe, update } from "./store.js";
 import { cornersAt, faceMet, wordOf } from "./triangles.js";
@@ -129,14 +129,12 @@ export function apartPanel(picture) {
   });
 }
 
-const newtons = (force) => `${Number(force.toPrecision(2))} N`;
-
 /** What the joint of the chosen part bears, else the weakest of all. */
 function jointInWords(joints, chosen) {
   const joint = joints.find(({ part }) => part === chosen) || joints.find(({ weakest }) => weakest);
   if (!joint) return "";
   const force = `breaks at about ${newtons(joint.load_n)}, pushed sideways ${joint.arm_mm.toFixed(0)} mm away, or pulled off at ${newtons(joint.tension_n)}`;
-  return `The joint of part ${joint.part}${joint.weakest ? ", the weakest," : ""} has ${mm2(joint.area_mm2)} and ${force}.`;
+  return `The joint of part ${joint.part}${joint.weakest ? ", the weakest," : ""} has ${mm2(joint.area_mm2)}, a seam of ${joint.seam_mm.toFixed(0)} mm and ${force}.`;
 }
 
 const pieceRow = ({ index, colour, volume_mm3: volume, risky_after_mm2: risky, joint, direction }, chosen) => choiceRow("piece", index, index === chosen, [swatch(colour), `${index}`],

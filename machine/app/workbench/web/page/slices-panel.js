@@ -1,7 +1,7 @@
 // Slices panel: copies and pauses, the parts sliced, what the print takes, what the dry run complains of, and what one piece would cost.
 
 import { $, duration, made, roughly } from "../../../../view/template/page.js";
-import { alike, listIn, mm2, swatch, tellIn } from "./elements.js";
+import { alike, listIn, mm2, newtons, putTable, swatch, tellIn } from "./elements.js";
 import { send } from "./line.js";
 import { onState, store, update } from "./store.js";
 
@@ -22,6 +22,7 @@ export function slicesPanel(showFinding) {
     if (alike(sliced, before?.sliced)) return;
     if (!sliced) update({ looking: false });
     tellIn("sliced-told", sliced ? [["takes", duration(sliced.time_s)], ["filament", `${(sliced.filament_mm / 1000).toFixed(2)} m`]] : []);
+    putTable($("joints"), sliced?.joints || [], JOINT_HEAD, () => (sliced?.joints || []).map(jointRow));
     showFindings(sliced, showFinding);
   });
 }
@@ -39,6 +40,14 @@ function showShares(slicing, colours) {
     return made("li", { className: share === 1 ? "ready" : "" }, swatch(colours[k]), `part ${k + 1}`, bar);
   }));
 }
+
+const JOINT_HEAD = [["joint of part"], ["area"], ["contact"], ["plastic"], ["seam"], ["breaks at"]];
+const percent = (share, digits = 0) => (share === null ? "–" : `${(100 * share).toFixed(digits)} %`);
+
+/** A joint: its area, how its first layer lies, how long it is seen, and what pushes the part off. */
+const jointRow = ({ part, area_mm2: area, contact_share: contact, plastic_over_room: plastic, seam_mm: seam, load_n: load }) => made("tr", {},
+  made("th", { text: `${part}`, scope: "row" }),
+  ...[mm2(area), percent(contact, 1), percent(plastic), `${seam.toFixed(0)} mm`, newtons(load)].map((text) => made("td", { text })));
 
 function showFindings(sliced, showFinding) {
   const { findings = [], more_findings: more = 0 } = sliced || {};
