@@ -1,6 +1,10 @@
 """Measure the serial link: its share of a UART's bandwidth, lines a second over a pseudo-terminal, memory over millions of lines.
 
-Run: python tools/bench_link.py [terminal] [uart] [virtual] [memory] [alone] [--lines 100000]      (without a name: all of them)
+Run: python tools/bench_link.py [terminal] [sim] [uart] [virtual] [memory] [alone] [--lines 100000] [--file FILE.gcode]
+(without a name: all of them)
+
+sim: as `print --port sim` streams, its serial log, limits of the machine and display of progress included;
+--file: a program of its own for it.
 """
 
 import argparse
@@ -13,7 +17,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
-from machine.app.printer.serial_log import tap
+from machine.app.printer.serial_log import SerialLog, tap
+from machine.app.printer.stream import QUEUE, USB_BYTES
 from machine.link.medium import Medium
 from machine.link.protocol import connection as protocol
 from machine.link.protocol.framing import frame
@@ -24,6 +29,7 @@ from machine.simulator.simulator import SimulatedPrinter
 from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.profile import load
 
+PARTS = ["terminal", "sim", "uart", "virtual", "memory", "alone"]
 BAUDS = (115200, 250000)
 LINE_BYTES = 63
 UART_LINES = 4000
@@ -88,6 +94,18 @@ def over_the_terminal(lines: list[str], build: BuildOptions) -> tuple[float, flo
     with SimulatedPrinter(load().machine, build=build) as printer:
         wall, work = perf_counter(), process_time()
         print_lines(lines, printer.path, 250000)
+        return perf_counter() - wall, process_time() - work
+
+
+def as_print_does(lines: list[str]) -> tuple[float, float]:
+    """The same for the built-in printer."""
+    profile = load()
+    usb = profile.model_copy(update={"machine": profile.machine.model_copy(update={"receive_bytes": USB_BYTES})})
+    with TemporaryDirectory() as folder, SimulatedPrinter(profile.machine, build=BuildOptions(queue=QUEUE)) as printer:
+        log = SerialLog(Path(folder) / "print.log", "bench")
+        wall, work = perf_counter(), process_time()
+        print_lines(lines, printer.path, 250000, profile=usb, medium=tap(log.note), on_progress=lambda progress: None)
+        log.close()
         return perf_counter() - wall, process_time() - work
 
 
@@ -178,15 +196,21 @@ def read(path: Path) -> Iterator[str]:
 def main() -> None:
     """Print one line for each measurement."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="*", choices=["terminal", "uart", "virtual", "memory", "alone"])
+    parser.add_argument("what", nargs="*", choices=PARTS)
     parser.add_argument("--lines", type=int, default=100000)
+    parser.add_argument("--file", type=Path)
     asked = parser.parse_args()
-    what = asked.what or ["terminal", "uart", "virtual", "memory", "alone"]
+    what = asked.what or PARTS
     lines = program(asked.lines)
     kinds = (("window", True), ("ping-pong", False))
     for name, advanced in kinds if "terminal" in what else ():
         wall_s, work_s = over_the_terminal(lines, BuildOptions(advanced_ok=advanced))
         print(f"{name:10s} {len(lines) / wall_s:8.0f} lines/s  ({len(lines)} lines in {wall_s:.1f} s, processor {work_s:.1f} s)")
+    if "sim" in what:
+        printed = lines if asked.file is None else asked.file.read_text().splitlines()
+        wall_s, work_s = as_print_does(printed)
+        figures = f"({len(printed)} lines in {wall_s:.1f} s, {1e6 * work_s / len(printed):.1f} us of processor a line)"
+        print(f"{'sim':10s} {len(printed) / wall_s:8.0f} lines/s  {figures}")
     for where in (kind for kind in ("uart", "virtual") if kind in what):
         for baud in BAUDS:
             for name, advanced in kinds:

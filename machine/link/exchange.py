@@ -61,10 +61,10 @@ class Exchange:
 
     def send(self, command: str) -> int:
         """Wait for room and send; returns the line's number, counted from the greeting on."""
-        can_send = self.connection.can_send
-        while not can_send(command):
+        offer, now_s = self.connection.offer, self.medium.now_s
+        while not (number := offer(command, now_s())):
             self.pump()
-        return self.connection.send(command, self.medium.now_s())
+        return number
 
     def settle(self) -> None:
         """Wait until every line sent is acknowledged."""
@@ -107,7 +107,8 @@ class Exchange:
         now_s = self.medium.now_s()
         if data:
             for event in connection.receive(data, now_s):
-                self._position = position_in(event) or self._position
+                if position := position_in(event):
+                    self._position = position
                 self._on_event(event)
         connection.tick(now_s)
         if connection.fault is not None:

@@ -123,7 +123,8 @@ class Feed:
     def _commands(self, lines: Iterable[str]) -> Iterator[tuple[int, str]]:
         for line, text in enumerate(lines, 1):
             command = command_of(text, line, self._job.limit)
-            self._barriers.layer_ended |= self._position.read_comment(text)
+            if ";" in text:
+                self._barriers.layer_ended |= self._position.read_comment(text)
             if command:
                 if command[0] in "Mm":
                     self._position.read_m73(command, self.exchange.medium.now_s() - self._start_s)
@@ -134,8 +135,9 @@ class Feed:
 
     def _before(self, command: str) -> None:
         """What is due before the next command of the program."""
-        for own in self._pending.next_lines(self.modal):
-            self.exchange.send(own)
+        if self._pending.lines:
+            for own in self._pending.next_lines(self.modal):
+                self.exchange.send(own)
         if self._reconnected:
             self._reconnected = False
             self._verify_position("after the port came back")

@@ -53,7 +53,8 @@ class LineHistory:
 
     def acknowledge(self, number: int, free: int | None = None) -> None:
         """All lines up to this number of the wire have been taken; free: places of the planner right after it."""
-        self.number = max(self.number, number)
+        if number > self.number:
+            self.number = number
         flight, planned = self._flight, self._planned
         while flight and flight[0].number <= number:
             step = flight.popleft()
@@ -61,8 +62,10 @@ class LineHistory:
             self.commands += 1
             if step.moves and len(planned) < MOST_WAITING:
                 planned.append(step)
-        self.tracked = self.tracked or free is not None
-        waiting = self._waiting if free is None else self._waiting_beside(free)
+        if free is None:
+            waiting = self._waiting
+        else:
+            self.tracked, waiting = True, self._waiting_beside(free)
         if waiting is None:
             return
         while len(planned) > waiting:

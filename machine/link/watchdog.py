@@ -114,6 +114,9 @@ class PrinterReports:
 
     def read(self, event: events.Event, now_s: float) -> PendingCommand | None:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
+        if isinstance(event, events.PlainOk):  # nearly every answer
+            self.waiting = ""
+            return None
         if isinstance(event, events.Ok | events.Busy):
             # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
             paused = isinstance(event, events.Busy) and "paused for" in event.text
@@ -135,6 +138,8 @@ class PrinterReports:
 
     def leaves_out(self, command: str) -> bool:
         """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""
+        if not self.unknown:
+            return False
         name = name_of(command)
         return name in self.unknown and (_shows(name) or name in TUNES or name.startswith(TUNING))
 

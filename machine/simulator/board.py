@@ -162,10 +162,12 @@ class Board:
     @property
     def idle_s(self) -> float:
         """When the firmware lets its motors go if nothing moves before; inf: never."""
-        planner = self.motion.planner
-        next_s = planner.next_s() if self.motion.energised else inf
-        since_s = max(planner.ended_s, self.awake_s) if next_s == inf else next_s
-        return since_s + self.idle_after_s if self.motion.energised else inf
+        motion = self.motion
+        if not motion.energised:
+            return inf
+        next_s = motion.planner.next_s()
+        since_s = max(motion.planner.ended_s, self.awake_s) if next_s == inf else next_s
+        return since_s + self.idle_after_s
 
     def idle(self) -> None:
         """Nothing has moved for so long."""

@@ -46,7 +46,7 @@ class SimulatedFirmware:
         self._room = (self._build.queue if self._rules.has_build_options else None) or self._rules.queue_lines
         self._emergency = EmergencyParser(self._build.realtime) if self._reads_bytes() else None
         self._busy_s = self._wait_s = inf
-        self._queue: deque[tuple[str, str]] = deque()
+        self._queue: deque[tuple[str, str, str, str]] = deque()  # label of the answer; text; its name and rest
         self._wake_s: float | None = None
         self._work: Iterator[float] | None = None
         self._waits = False  # the program itself waits for the command at work
@@ -83,9 +83,10 @@ class SimulatedFirmware:
 
     def advance(self, until_s: float = inf) -> bytes:
         """Work until a virtual time; with inf until there is nothing to do, the clock jumping over all waits."""
-        board = self.board
+        board, lines = self.board, self._receiver.lines
         while not self.dead:
-            self._fetch()
+            if lines:
+                self._fetch()
             if self._wake_s is not None:
                 if self._wake_s > until_s:
                     self._pass(until_s)
@@ -102,6 +103,8 @@ class SimulatedFirmware:
                 if until_s < inf:
                     self._pass(until_s)
                 break
+        if not lines and len(self._queue) < self._room:
+            self._receiver.idle()
         if until_s < inf:
             board.now_s = max(board.now_s, until_s)
         if self.dead:
@@ -172,7 +175,7 @@ class SimulatedFirmware:
 
     def _answer_waiting(self) -> None:
         """The command at work ends with its ok, those behind it are refused."""
-        waiting = [text for _, text in self._queue]
+        waiting = [text for _, text, _, _ in self._queue]
         if self._work is not None:
             self._said.append("ok")
             del waiting[0]
@@ -227,28 +230,28 @@ class SimulatedFirmware:
 
         Without an emergency parser Marlin looks for its orders here: a line is seen when it enters the queue.
         """
-        receiver, room = self._receiver, self._room
-        while len(receiver) and len(self._queue) < room:
+        receiver, queue, room = self._receiver, self._queue, self._room
+        lines = receiver.lines
+        while lines and len(queue) < room:
             taken = receiver.take()
             if isinstance(taken, str):
                 self._said += receiver.ask_again(taken, self._build.resend_ok)
                 continue
             if taken is not None:
-                self._queue.append(taken)
-                if self._emergency is None and self._rules.urgent == "bytes" and taken[1] in EARLY:
-                    self._act_at_once(taken[1])
-        if not len(receiver) and len(self._queue) < room:
-            receiver.idle()
+                label, text = taken
+                queue.append((label, text, *split_command(text)))
+                if self._emergency is None and self._rules.urgent == "bytes" and text in EARLY:
+                    self._act_at_once(text)
 
     def _run(self) -> None:
         """Begin or go on with the oldest line of the queue."""
         board = self.board
-        label, text = self._queue[0]
+        label, text, name, rest = self._queue[0]
         if self._work is None:
-            name, rest = split_command(text)
-            if name in MOVES[:2]:
-                if not board.motion.planner.free(board.now_s):
-                    self._sleep(board.motion.planner.next_s())
+            if name in ("G0", "G1"):
+                planner = board.motion.planner
+                if not planner.free(board.now_s):
+                    self._sleep(planner.next_s())
                     return
                 answer = move(board, dict(read_words(rest)), text)
             else:
@@ -314,9 +317,10 @@ class SimulatedFirmware:
         """Let the clock run, saying on the way what is due."""
         board = self.board
         while not self.dead:
-            busy_s = self._busy_s if self._wake_s is not None and not board.waits_for_heat else inf
-            trip_s = min(board.nozzle.trip_s, board.bed.trip_s)
-            wait_s = self._wait_s if self._wake_s is None and not self._queue else inf
+            sleeps, nozzle_s, bed_s = self._wake_s is not None, board.nozzle.trip_s, board.bed.trip_s
+            busy_s = self._busy_s if sleeps and not board.waits_for_heat else inf
+            trip_s = nozzle_s if nozzle_s < bed_s else bed_s
+            wait_s = inf if sleeps or self._queue else self._wait_s
             due_s = min(busy_s, wait_s, board.report_s, board.position_s, trip_s, board.idle_s)
             if due_s > to_s or due_s == inf:
                 break

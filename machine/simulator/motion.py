@@ -113,9 +113,10 @@ class Motion:
 
     def _clamp(self, destination: list[float]) -> None:
         """Marlin stops at soft limits without a word, on axes that were homed; on others what the program meant is counted."""
+        homed, everywhere, offset = self.homed, not self._starts_at_home, self.modes.offset
         for axis, (low, high) in enumerate(self.limits):
-            limited = axis in self.homed or not self._starts_at_home
-            coordinate = destination[axis] + (0.0 if limited else self.modes.offset[axis])
+            limited = everywhere or axis in homed
+            coordinate = destination[axis] if limited else destination[axis] + offset[axis]
             if not low - SLACK <= coordinate <= high + SLACK:
                 self.clamped += 1
                 destination[axis] = min(max(destination[axis], low), high) if limited else destination[axis]
@@ -178,17 +179,16 @@ class Motion:
     def reach(self, destination: Sequence[float], now_s: float, feed_mm_s: float | None = None) -> None:
         """Plan one straight move, at the speed that F asks for or at a given one."""
         here, real = self.position, self._real
-        positions = self._tcp.positions(destination) if self.follows else destination[:5]
-        end = [p + o for p, o in zip(positions, self._offset, strict=True)]
+        x, y, z, tilt, turn = self._tcp.positions(destination) if self.follows else destination[:5]
+        from_x, from_y, from_z, from_tilt, from_turn = self._offset
+        end = [x + from_x, y + from_y, z + from_z, tilt + from_tilt, turn + from_turn]
         self._meet_ends(end)
         end.append(real[5] + (destination[5] - here[5]) * self.flow_share)
         feed = self.feed_mm_s * self.feed_share if feed_mm_s is None else feed_mm_s
         if self.follows and destination[:5] != here[:5] and (seconds := self._seconds(here, destination)) > 0.0:
             feed = _length(real, end) / seconds
-        strokes = end[5] != real[5]
-        most_mm_s2 = self._printing if strokes else self._travelling
-        speeds, accelerations = self.speeds, self.accelerations
-        block = block_of(real, end, feed, speeds=speeds, accelerations=accelerations, most_mm_s2=most_mm_s2)
+        most_mm_s2 = self._printing if end[5] != real[5] else self._travelling
+        block = block_of(real, end, feed, self.speeds, self.accelerations, most_mm_s2)
         self.position, self._real = list(destination), end
         if block is not None:
             self.energised = True

@@ -23,10 +23,10 @@ def move(board: Board, words: WordValues, text: str) -> Work:
     if board.rules.out_of_range and (beyond := motion.beyond(words)) is not None:
         board.say(board.rules.out_of_range.format(_coordinates(beyond)))
         return None
-    pieces = motion.pieces(motion.target(words, pushes))
-    if len(pieces) > 1:
+    target = motion.target(words, pushes)
+    if motion.follows and len(pieces := motion.pieces(target)) > 1:
         return _run(board, pieces)
-    motion.reach(pieces[0], board.now_s)
+    motion.reach(target, board.now_s)
     return None
 
 

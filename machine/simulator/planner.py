@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
+from operator import sub
 
 from machine.firmware.marlin import FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S
 
@@ -38,15 +39,21 @@ class Block:
     peak: float = 0.0
     begin_s: float = 0.0
     duration_s: float = 0.0
+    end_s: float = 0.0
 
     def settle(self, begin_s: float, v0: float, next2: float) -> None:
         """Fix the block's speeds when it begins; next2: square of the speed at which its successor may begin."""
         a, length = self.acceleration, self.length
-        v1 = sqrt(min(next2, v0 * v0 + 2.0 * a * length))
-        peak = min(self.cruise, sqrt(0.5 * (v0 * v0 + v1 * v1) + a * length))
+        most2 = v0 * v0 + 2.0 * a * length
+        v1 = sqrt(next2 if next2 < most2 else most2)
+        peak = sqrt(0.5 * (v0 * v0 + v1 * v1) + a * length)
+        if peak > self.cruise:
+            peak = self.cruise
         ramps = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * a)
+        even = length - ramps if length > ramps else 0.0
         self.v0, self.v1, self.peak, self.begin_s = v0, v1, peak, begin_s
-        self.duration_s = (2.0 * peak - v0 - v1) / a + max(0.0, length - ramps) / peak
+        self.duration_s = duration_s = (2.0 * peak - v0 - v1) / a + even / peak
+        self.end_s = begin_s + duration_s
 
     def share(self, now_s: float) -> float:
         """How much of the way lies behind it, 0 to 1."""
@@ -82,8 +89,9 @@ class ExecutedMoves:
     def add(self, block: Block) -> None:
         """A block begins."""
         rows = self.rows
-        rows.extend((*block.start, *block.end, block.feed, block.begin_s, block.duration_s))
-        self._count(block.start, block.end, block.duration_s, 1)
+        start, end, duration_s = block.start, block.end, block.duration_s
+        rows.extend((*start, *end, block.feed, block.begin_s, duration_s))
+        self._count(start, end, duration_s, 1)
         if self._most is not None and len(rows) >= self._most:
             del rows[: -self._most // 2]
 
@@ -103,7 +111,7 @@ class ExecutedMoves:
         self.moves += times
         self.moving_s += times * duration_s
         pushed = end[5] - start[5]
-        if pushed > EXTRUDES_MM and any(a != b for a, b in zip(start[:5], end[:5], strict=True)):
+        if pushed > EXTRUDES_MM and start[:5] != end[:5]:
             self.strokes += times
             self.pushed_mm += times * pushed
 
@@ -126,13 +134,15 @@ class Planner:
 
     def free(self, now_s: float) -> int:
         """Free places."""
-        self.run(now_s)
+        current = self._current
+        if current is None or current.end_s <= now_s:
+            self.run(now_s)
         return self._blocks - len(self._waiting) - (self._current is not None)
 
     def next_s(self) -> float:
         """When the block under way ends or the first one begins; inf: nothing is planned."""
         if self._current is not None:
-            return self._current.begin_s + self._current.duration_s
+            return self._current.end_s
         return self._gate_s if self._waiting else inf
 
     def run(self, now_s: float) -> None:
@@ -140,11 +150,10 @@ class Planner:
         while True:
             current = self._current
             if current is not None:
-                end_s = current.begin_s + current.duration_s
-                if end_s > now_s:
+                begin_s, v0 = current.end_s, current.v1
+                if begin_s > now_s:
                     return
-                self._last, self._current, self.ended_s = current, None, end_s
-                begin_s, v0 = end_s, current.v1
+                self._last, self._current, self.ended_s = current, None, begin_s
             else:
                 begin_s, v0 = self._gate_s, 0.0
             if not self._waiting or begin_s > now_s:
@@ -156,9 +165,8 @@ class Planner:
 
     def add(self, block: Block, jerk: float, now_s: float) -> None:
         """Queue a block; jerk: the speed an axis may change at once at a corner, mm/s."""
-        self.run(now_s)
         waiting = self._waiting
-        queued = len(waiting) + (self._current is not None)
+        queued = self._blocks - self.free(now_s)
         if 2 <= queued < self._blocks // 2 + 1:
             self._slow_down(block, queued)
         if waiting:
@@ -181,11 +189,11 @@ class Planner:
         """Blocks that have not begun, timed as if nothing more came; they stay as they are."""
         begin_s, v0 = self._gate_s, 0.0
         if self._current is not None:
-            begin_s, v0 = self._current.begin_s + self._current.duration_s, self._current.v1
+            begin_s, v0 = self._current.end_s, self._current.v1
         timed = []
         for index, block in enumerate(self._waiting):
             block.settle(begin_s, v0, self._waiting[index + 1].entry2 if index + 1 < len(self._waiting) else 0.0)
-            begin_s, v0 = begin_s + block.duration_s, block.v1
+            begin_s, v0 = block.end_s, block.v1
             timed.append(block)
         return timed
 
@@ -204,7 +212,7 @@ class Planner:
         self._waiting.clear()
         if cut is not None:
             cut.end = stop = cut.at(now_s)
-            cut.duration_s = now_s - cut.begin_s
+            cut.duration_s, cut.end_s = now_s - cut.begin_s, now_s
         return stop
 
     def at(self, now_s: float, idle: Axes) -> Axes:
@@ -224,7 +232,9 @@ class Planner:
         """Raise the entry speeds of waiting blocks from the newest back, as far as that changes anything."""
         following2 = 0.0
         for block in reversed(self._waiting):
-            entry2 = min(block.corner2, following2 + 2.0 * block.acceleration * block.length)
+            entry2 = following2 + 2.0 * block.acceleration * block.length
+            if entry2 > block.corner2:
+                entry2 = block.corner2
             if entry2 == block.entry2:
                 return
             block.entry2 = following2 = entry2
@@ -234,17 +244,16 @@ def corner2(before: Block, after: Block, jerk: float) -> float:
     """Square of the greatest speed at a corner: no axis changes its speed by more than `jerk`."""
     if before.measure != after.measure:
         return 0.0
-    v = min(before.cruise, after.cruise)
-    for a, b in zip(before.direction, after.direction, strict=True):
-        change = abs(a - b)
-        if change * v > jerk:
-            v = jerk / change
+    v = before.cruise if before.cruise < after.cruise else after.cruise
+    change = max(map(abs, map(sub, before.direction, after.direction)))
+    if change * v > jerk:
+        v = jerk / change
     return v * v
 
 
-def block_of(start: Axes, end: Axes, feed: float, *, speeds: Axes, accelerations: Axes, most_mm_s2: float) -> Block | None:
+def block_of(start: Axes, end: Axes, feed: float, speeds: Axes, accelerations: Axes, most_mm_s2: float) -> Block | None:
     """A block from place to place; None when nothing moves. most_mm_s2: acceleration set for moves of X Y Z."""
-    deltas = [b - a for a, b in zip(start, end, strict=True)]
+    deltas = list(map(sub, end, start))
     x, y, z, tilt, turn, filament = deltas
     length, measure = sqrt(x * x + y * y + z * z), 0
     if length <= TINY:
@@ -253,15 +262,16 @@ def block_of(start: Axes, end: Axes, feed: float, *, speeds: Axes, accelerations
             length, measure = abs(filament), 2
             if length <= TINY:
                 return None
-    direction = [delta / length for delta in deltas]
+    direction = [0.0] * 6
     cruise, acceleration = feed, inf
-    for share, speed, most in zip(direction, speeds, accelerations, strict=True):
-        if share:
+    for axis, delta in enumerate(deltas):
+        if delta:  # most moves leave half of the axes where they are
+            direction[axis] = share = delta / length
             share = abs(share)
-            if cruise * share > speed:
-                cruise = speed / share
-            if acceleration * share > most:
-                acceleration = most / share
+            if cruise * share > speeds[axis]:
+                cruise = speeds[axis] / share
+            if acceleration * share > accelerations[axis]:
+                acceleration = accelerations[axis] / share
     if measure == 0 and most_mm_s2 < acceleration:
         acceleration = most_mm_s2
     return Block(start, end, direction, feed, length, measure, cruise, acceleration)

@@ -9,6 +9,7 @@ from machine.link.protocol.framing import checksum
 HALF_BYTES = 1024
 MISSING = "Missing checksum"  # as OctoPrint's virtual printer says it with forceChecksum; nothing follows
 CHECKSUM_BYTES = 128  # bytes that the checksum is folded from at once
+MOVE = re.compile(rb"N([0-9]+) (G[01] [^*;]*)\*([0-9]{1,3})")  # nearly every line
 DIGITS = re.compile(rb"\s*([-+]?\d+)")
 ORDER_BYTES = 96  # of a line more is not looked at
 ORDER = re.compile(rb"\s*(?:N-?\d+\s*)?(?:(M(?:108|112|410|876)|[SPR]000)(?!\d))")
@@ -19,35 +20,35 @@ class Receiver:
     """rx_ring: bytes of a receive ring that overflows, None: whatever comes is kept. longest: characters kept of a line;
     insists: lines without number and checksum are refused.
 
-    last: number of the last numbered line that was taken.
+    last: number of the last numbered line that was taken; lines: those that have come and wait.
     """
 
     def __init__(self, rules: SimulationRules, longest: int, rx_ring: int | None, insists: bool = False) -> None:
         self._rules, self._longest, self._rx_ring, self._insists = rules, longest, rx_ring, insists
         self.last = self.lost_bytes = 0
-        self._lines: deque[bytes] = deque()
+        self.lines: deque[bytes] = deque()
         self._half = b""
         self._read = 0  # bytes of the oldest line that have left the ring
 
     def __len__(self) -> int:
-        return len(self._lines)
+        return len(self.lines)
 
     def receive(self, data: bytes) -> list[bytes]:
         """Bytes arrive; the lines that they end."""
         if self._rx_ring is not None:
-            waiting = len(self._half) + sum(len(line) + 1 for line in self._lines) - self._read
+            waiting = len(self._half) + sum(len(line) + 1 for line in self.lines) - self._read
             fitting = data[: max(0, self._rx_ring - 1 - waiting)]
             self.lost_bytes += len(data) - len(fitting)
             data = fitting
         *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
-        self._lines.extend(lines)
+        self.lines.extend(lines)
         if len(self._half) > HALF_BYTES:  # a line without end: what is too long for a command is not kept
             self._half = self._half[:CHECKSUM_BYTES]
         return lines
 
     def forget(self) -> None:
         """What has come is thrown away."""
-        self._lines.clear()
+        self.lines.clear()
         self._half = b""
         self._read = 0
 
@@ -58,7 +59,15 @@ class Receiver:
     def take(self) -> tuple[str, str] | str | None:
         """The oldest line: its label for ADVANCED_OK and its command, or what is wrong with it; None: nothing to do."""
         self._read = 0
-        line = self._lines.popleft().partition(b";")[0][: self._longest].lstrip(b" ")
+        line = self.lines.popleft()
+        if (move := MOVE.fullmatch(line)) and self._rules.numbers == "resend" and len(line) <= self._longest:
+            number, command, given = move.groups()
+            if int(number) == self.last + 1 and int(given) == checksum(line[: move.end(2)]):
+                self.last += 1
+                return f" N{self.last}", command.decode("ascii", "replace").rstrip()
+        if b";" in line:
+            line = line[: line.index(b";")]
+        line = line[: self._longest].lstrip(b" ")
         if not line and self._rules.answers_blank:
             return "", ""
         if not line:
@@ -97,7 +106,7 @@ class Receiver:
         """What is wrong with a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
         star = line.rfind(b"*")
         renumbers = b"M110" in line
-        second = line.find(b"N", line.find(b"M110")) if renumbers else -1
+        second = line.find(b"N", line.find(b"M110")) if renumbers else 0
         digits = DIGITS.match(line, 1 + max(second, 0))
         number = int(digits[1]) if digits else 0
         if not renumbers and number != self.last + 1:

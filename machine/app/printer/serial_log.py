@@ -73,9 +73,10 @@ class SerialLog:
         for now_s, direction, data in chunks:
             if torn := self._torn.get(direction):
                 data = torn + data
-            *lines, self._torn[direction] = data.split(b"\n")
-            stamp = self._stamp(now_s)
-            written += [f"{stamp} {direction} {_readable(line)}\n" for line in lines if line]
+            end = data.rfind(b"\n") + 1
+            self._torn[direction] = data[end:]
+            if end:
+                written.append(_stamped(data[: end - 1], f"{self._stamp(now_s)} {direction} "))
         if written:
             self._write("".join(written))
 
@@ -148,6 +149,15 @@ class TappedWire:
 def tap(tell: Traffic, medium: Medium = SERIAL) -> Medium:
     """A medium whose wires tell what goes over them."""
     return replace(medium, open=lambda name, baud: TappedWire(medium.open(name, baud), tell))
+
+
+def _stamped(lines: bytes, stamp: str) -> str:
+    """Whole lines, each behind its stamp; those without a character are left out."""
+    text = lines.decode("latin-1")
+    usual = text.isascii() and text.replace("\n", "").isprintable()
+    if usual and "\n\n" not in f"\n{text}\n":
+        return stamp + text.replace("\n", "\n" + stamp) + "\n"
+    return "".join(f"{stamp}{_readable(line)}\n" for line in lines.split(b"\n") if line)
 
 
 def _readable(line: bytes) -> str:

@@ -23,6 +23,7 @@ class PrintedBounds:
 
     machine: Machine
     _boxes: dict[tuple[float, float], list[float]] = field(default_factory=dict)
+    _reached: Coordinates = ()  # the end of the newest stroke, which is in its box already
 
     def track(self, modal: ModalState, command: str) -> tuple[bool, bool]:
         """Hand a command to `modal` and keep the boxes in step; whether it moves something, and whether it extrudes."""
@@ -32,8 +33,12 @@ class PrintedBounds:
         extrudes = modal.pushed_mm > 0.0 and not pulled
         if extrudes:
             after = modal.coordinates()
-            for coordinates in (before, *_far_corners(modal, command, before, after), after):
-                self.extrude_to(coordinates)
+            if before != self._reached:
+                self.extrude_to(before)
+            for corner in _far_corners(modal, command, before, after):
+                self.extrude_to(corner)
+            self.extrude_to(after)
+            self._reached = after
         return True, extrudes
 
     def extrude_to(self, coordinates: Coordinates) -> None:
@@ -47,11 +52,10 @@ class PrintedBounds:
         if box is None:
             self._boxes[tilt, turn] = [x, y, z, x, y, z]
             return
-        for axis, value in enumerate((x, y, z)):
-            if value < box[axis]:
-                box[axis] = value
-            elif value > box[axis + 3]:
-                box[axis + 3] = value
+        least_x, least_y, least_z, most_x, most_y, most_z = box
+        if not (least_x <= x <= most_x and least_y <= y <= most_y and least_z <= z <= most_z):
+            box[:3] = min(x, least_x), min(y, least_y), min(z, least_z)
+            box[3:] = max(x, most_x), max(y, most_y), max(z, most_z)
 
     def corners(self, followed_table: bool = False) -> Printed:
         """The corners of all boxes in the workpiece frame; followed_table: the places were those of the table already."""
@@ -67,6 +71,8 @@ class PrintedBounds:
 
 def _far_corners(modal: ModalState, command: str, before: Coordinates, after: Coordinates) -> list[Coordinates]:
     """Corners of the box around an arc that was just taken, at the pose and height of its end; none of another move."""
+    if command[:3] == "G1 ":  # nearly every stroke
+        return []
     name, rest = split_command(command.upper())
     words = modal.axes.words
     if name not in ("G2", "G3") or before[0] is None or before[1] is None or after[0] is None or after[1] is None:

@@ -81,12 +81,20 @@ class Connection:
         """Whether this command may be sent now."""
         if self.state is not State.OPEN or self._last_number_used or self._decoder.incomplete:
             return False
-        return self.window.has_space(command, self._flow.lines(self.greeting.firmware.line, self.greeting.emergency_parser))
+        greeting = self.greeting
+        return self.window.has_space(command, self._flow.lines(greeting.firmware.line, greeting.emergency_parser))
 
     def send(self, command: str, now_s: float) -> int:
         """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on."""
-        if not self.can_send(command):
+        number = self.offer(command, now_s)
+        if not number:
             raise LocalProtocolError(f"{command!r} was to be sent while the printer has no room for it")
+        return number
+
+    def offer(self, command: str, now_s: float) -> int:
+        """The same where there is room for it; else 0, and nothing is sent."""
+        if not self.can_send(command):
+            return 0
         self._send(command, now_s)
         self._last_number_used = self.window.wire_number(self.window.sent) >= self.greeting.firmware.line.last_number
         return self.window.sent
@@ -142,7 +150,7 @@ class Connection:
     def _handle(self, event: events.Event, now_s: float) -> None:
         match event:
             case events.Ok():
-                if identity := events.identity_in(event):
+                if not isinstance(event, events.PlainOk) and (identity := events.identity_in(event)):
                     self._learn(identity)
                 self._handle_ok(event, now_s)
             case events.Resend() if self.state is not State.SYNC:
@@ -178,6 +186,9 @@ class Connection:
         unknown = self._oks.take_unknown()
         if ok.line is not None:
             self._flow.learn(ok.rx_free)
+            if self.state is State.OPEN and isinstance(ok, events.PlainOk):  # nearly every answer
+                self._acknowledge(self.window.line_number(ok.line), False, now_s)
+                return
         elif ok.planner_free is not None and self.advanced and not unknown:
             self._follow(Signal.UNCHECKED, now_s, verdict.torn_line(self.window.last_acknowledged))
             return

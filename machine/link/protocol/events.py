@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +28,7 @@ class Position:
     axes: tuple[tuple[str, float], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Ok:
+class Ok(NamedTuple):
     """A line was accepted. Number and free places come with Marlin's ADVANCED_OK, a temperature after M105.
 
     position: Smoothie puts the answer to M114 behind its ok.
@@ -40,6 +40,12 @@ class Ok:
     temperature: Temperature | None = None
     text: str = ""
     position: Position | None = None
+
+
+class PlainOk(Ok):
+    """An ok with nothing but number and free places behind it, or nothing at all; equal to the Ok that says the same."""
+
+    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +127,7 @@ Report = Temperature | Position | Capability | Identity | Area | Action | Echo |
 Event = Ok | Resend | Busy | LineError | FirmwareFault | Start | Banner | Wait | Report
 
 NAME = "FIRMWARE_NAME:"
-OK = re.compile(r"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
+OK = re.compile(rb"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
 RESEND = re.compile(r"(?:resend:|rs)\s*N?(\d{1,10})", re.IGNORECASE)
 NOZZLE = re.compile(r"(?:^|\s)T0?:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 BED = re.compile(r"(?:^|\s)B:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
@@ -153,6 +159,8 @@ DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed"
 
 def read_event(raw: bytes) -> Event:
     """The event of one received line (without its newline). Never raises: rubbish is Unknown."""
+    if ok := OK.fullmatch(raw):  # nearly every line
+        return _plain_ok(ok)
     text = raw.decode("ascii", "replace").strip()
     if text.startswith("ok"):
         return _ok(text)
@@ -232,10 +240,15 @@ def _read_report(text: str) -> Event:
     return _area(text) or _temperature(text) or Unknown(text)
 
 
+def _plain_ok(ok: re.Match[bytes]) -> PlainOk:
+    """An ok with its numbers, or alone."""
+    line, planner, rx = ok.groups()
+    return PlainOk(_whole(line), _whole(planner), _whole(rx), None, ok[0].decode("ascii"))
+
+
 def _ok(text: str) -> Event:
-    if ok := OK.fullmatch(text):
-        line, planner, rx = ok.groups()
-        return Ok(_whole(line), _whole(planner), _whole(rx), None, text)
+    if ok := OK.fullmatch(text.encode("ascii", "replace")):
+        return _plain_ok(ok)
     if not text.isascii() or not text.startswith("ok "):
         return Unknown(text)
     if text.startswith(("ok T", "ok B:")):  # Klipper reports the bed first
@@ -243,7 +256,7 @@ def _ok(text: str) -> Event:
     return Ok(text=text, position=_position(text) if " X:" in text else None)
 
 
-def _whole(digits: str | None) -> int | None:
+def _whole(digits: bytes | None) -> int | None:
     return None if digits is None else int(digits)
 
 

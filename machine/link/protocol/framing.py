@@ -1,5 +1,6 @@
 """Framing: a command becomes `N<number> <command>*<checksum>`; what may not be sent is refused."""
 
+import re
 from collections.abc import Sequence
 
 from machine.firmware.line import FRAME_CHARACTERS
@@ -9,6 +10,7 @@ from profiles.errors import LocalProtocolError
 
 LINE_LIMIT = DIALECT.longest_line
 FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers refuses it with the one it wants
+_is_plain_move = re.compile(r"G[01](?: [A-Z]-?[0-9.]+)+").fullmatch
 REFUSED = {
     "M0": "waits for a person at the printer's own buttons",
     "M1": "waits for a person at the printer's own buttons",
@@ -24,9 +26,13 @@ def checksum(body: bytes) -> int:
     if len(body) > 128:
         raise ValueError(f"{len(body)} bytes to check: at most 128 are allowed")
     x = int.from_bytes(body, "little")
-    for shift in (512, 256, 128, 64, 32, 16, 8):
-        x ^= x >> shift
-    return x & 0xFF
+    x ^= x >> 512
+    x ^= x >> 256
+    x ^= x >> 128
+    x ^= x >> 64
+    x ^= x >> 32
+    x ^= x >> 16
+    return (x ^ x >> 8) & 0xFF
 
 
 def frame(number: int, command: str, limit: int = LINE_LIMIT) -> bytes:
@@ -54,6 +60,8 @@ def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
     source: the line's number in the program, or what it is called, for messages. Raises LocalProtocolError for a character
     outside printable ASCII, for a `*`, and for commands that only the sender itself may give.
     """
+    if _is_plain_move(line) and len(line) <= limit - FRAME_CHARACTERS:  # nearly every line
+        return line
     command, _, remark = line.partition(";")
     command = command.strip()
     if not command or f";{remark}".startswith(PAUSE_REMARK):

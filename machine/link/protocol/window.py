@@ -1,7 +1,7 @@
 """The lines between sender and printer: which are in flight, which were acknowledged, which can be repeated."""
 
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from machine.firmware.line import FRAME_BYTES, LineRules
 from machine.link.protocol.framing import LINE_LIMIT, frame
@@ -13,8 +13,7 @@ FIRST_NUMBER_AGAIN = 1000  # numbers begin here when they begin anew: a printer 
 NEAR = 8  # one acknowledgement too many or few is usual after noise; a Resend for a line further back is asked about
 
 
-@dataclass(frozen=True, slots=True)
-class LineInFlight:
+class LineInFlight(NamedTuple):
     """A line that was sent and is not acknowledged yet. slow_timeout_s: 0 of a quick command."""
 
     number: int
@@ -112,7 +111,8 @@ class Window:
         while flight and flight[0].number <= number:
             self._bytes -= flight.popleft().size
             count += 1
-        self.acknowledged = max(self.acknowledged, number)
+        if number > self.acknowledged:
+            self.acknowledged = number
         return count
 
     def clear_flight(self) -> None:
