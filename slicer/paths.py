@@ -42,7 +42,7 @@ class Path:
     points: (n, 2) mm, n >= 2; a closed path repeats its first point at the end. flow: factor on the bead's volume.
     approach: (k, 2) mm, points that the travel to the first point passes, k >= 0. retract: pull the filament back
     during that travel. fan: part fan 0..1 where it differs from the layer's. below_mm: how far below the layer's z the path
-    begins and ends; it climbs evenly between.
+    begins and ends; it climbs evenly between. wiped: whether the tip may go over it again while the filament is pulled back.
     """
 
     kind: Kind
@@ -54,6 +54,7 @@ class Path:
     retract: bool
     fan: float | None = None
     below_mm: tuple[float, float] = (0.0, 0.0)
+    wiped: bool = True
 
     @property
     def z_mm(self) -> Floats:

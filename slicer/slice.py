@@ -18,7 +18,8 @@ from profiles.profile import Profile
 from slicer.bead import Bead, simplify
 from slicer.cooling import fan_share, hanging_fan, layer_time_s, rising_fan, speeds_mm_s
 from slicer.finish.vase import bottom_layers, vase_layers
-from slicer.interface.interface import begin_inside, interface_edges
+from slicer.geometry.polygons import Polygons
+from slicer.interface.interface import begin_inside, interface_edges, skin_beside
 from slicer.interface.interlock import fill_grooves
 from slicer.interface.pins import plan_pins, pour
 from slicer.interface.plastic import interface_mm3
@@ -32,6 +33,7 @@ from slicer.speed import first_layer_speeds
 from slicer.support.reason import explain
 from slicer.support.support import Supports, own_supports
 from slicer.travel.order import order_beads
+from slicer.travel.wiping import keep_wipes_off
 from slicer.walls.overhang import split_overhangs
 from slicer.walls.seam import Surroundings, place_seams, rear_of
 from slicer.walls.variable.pieces import in_pieces
@@ -84,7 +86,8 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
             bare.append(i)
         around = Surroundings(rear, seams, tip, edges, float(sections.heights.cut_mm[i]), i, unwanted[i])
         beads, seams = place_seams([*own, *auxiliary], process, around)
-        layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers else None)
+        skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
+        layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers else None, skin)
         if layer.paths:
             tip = layer.paths[-1].points[-1]
             layers.append(layer)
@@ -114,14 +117,14 @@ def _unsupported(supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupport
     return tuple(replace(area, layer=int(count[area.layer])) for area in explain(supports))
 
 
-def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None) -> Layer:
-    """The beads of a layer in order, with speeds, flow, fan and heat."""
+def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
+    """The beads of a layer in order, with speeds, flow, fan and heat. skin: its outer walls beside the edges of interfaces."""
     sections, own = shells.sections, shells.layers[index].process
     profile, process, material, on_platform = sections.profile, sections.process, sections.profile.material, sections.on_platform
     outline, height_mm = sections.outlines[index], float(sections.heights.height_mm[index])
     if index == 0 and not on_platform:
         beads = [*pour(sections.pins, profile, height_mm), *begin_inside(beads)]
-    placed = order_beads(beads, outline, own, tip, shells.supports.areas[index])
+    placed = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
     placed = split_overhangs(placed, outline, sections.below(index), own)
     if index == 0 and not on_platform and process.interlock == "grooves":
         placed = fill_grooves(placed, sections.part, process, height_mm)
@@ -143,6 +146,7 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None) 
         Path(p.bead.kind, simplify(p.points), p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, own_fan)
         for p, own_fan, speed in zip(placed, fans, speeds, strict=True)
     )
+    paths = keep_wipes_off(paths, skin, material.wipe_mm)
     return Layer(float(sections.heights.tip_mm[index]), height_mm, paths, layer_fan, add_c)
 
 

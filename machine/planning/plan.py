@@ -14,13 +14,14 @@ from machine.planning.priming import run_in
 from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Speeds, Turn, route, top_z
 from machine.planning.stops import Stop, stops_by_layer
-from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, trail_after, travel_speed, wipe_trail
+from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, trail_after, travel_speed
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.profile import Profile
 from slicer.paths import Kind, Layer, Path, SlicedPart, bead_area_mm2
 from slicer.speed import stroke_accelerations
+from slicer.travel.wiping import wipe_trail
 
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 

@@ -13,10 +13,9 @@ from profiles.profile import Profile
 from slicer.bead import length_mm
 from slicer.paths import Path
 from slicer.speed import travel_mm_s2
+from slicer.travel.wiping import STANDING_MM, first_length, runs_round, wipe_trail
 
-STANDING_MM = 1e-6
 TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
-RING = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
 
 
 @dataclass
@@ -111,9 +110,12 @@ def trail_after(points: Floats, path: Path, before: Floats, shift: Floats, wipe_
     """The way of a wipe of wipe_mm after a stroke (n, 3).
 
     Where the stroke is shorter it goes on, back over the way to its beginning, to the strokes before it in the layer; where
-    there are none, to and fro. before: the way over those, from where the last of them ended; none after a retraction.
+    there are none, to and fro. before: the way over those, from where the last of them ended; none after a retraction. Where
+    it must not go over the stroke itself, it goes on over those at once.
     """
-    trail = wipe_trail(points, path.width_mm)
+    if not path.wiped and not (len(before) and runs_round(points, path.width_mm)):
+        return points[:0]
+    trail = wipe_trail(points, path.width_mm) if path.wiped else points[[-1, 0]]
     if float(np.linalg.norm(points[-1] - points[0])) >= wipe_mm or length_mm(trail) >= wipe_mm:
         return trail
     if len(before) and abs(float(before[0, 2] - points[0, 2])) <= STANDING_MM:
@@ -127,25 +129,3 @@ def trail_after(points: Floats, path: Path, before: Floats, shift: Floats, wipe_
         once = once[::-1]
         trail = np.vstack([trail, once[1:]])
     return trail
-
-
-def wipe_trail(points: Floats, width_mm: float) -> Floats:
-    """The way of a wipe after a stroke (n, 3): on along a ring, over its seam; back along a line."""
-    gap = float(np.linalg.norm(points[-1] - points[0]))
-    if gap <= width_mm and length_mm(points) > RING * width_mm:
-        return np.vstack([points[-1:], points]) if gap > STANDING_MM else points
-    return points[::-1]
-
-
-def first_length(way: Floats, length: float) -> Floats:
-    """The first `length` mm of a polyline (n, 3), or all of it; without points that repeat."""
-    if len(way) < 2 or length <= 0.0:
-        return way[:0]
-    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
-    way, steps = way[np.concatenate([[True], steps > STANDING_MM])], steps[steps > STANDING_MM]
-    done = np.cumsum(steps)
-    last = int(np.searchsorted(done, length))
-    if last >= len(steps):
-        return way
-    share = 1.0 - (done[last] - length) / steps[last]
-    return np.vstack([way[: last + 1], way[last] + share * (way[last + 1] - way[last])])

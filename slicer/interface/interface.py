@@ -7,14 +7,16 @@ import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
-from slicer.bead import Bead
+from profiles.process import Process
+from slicer.bead import Bead, outer_wall_width_mm
 from slicer.geometry.cross_section import cross_sections
-from slicer.geometry.polygons import Polygons, clean, contours, union
+from slicer.geometry.polygons import Polygons, clean, contours, offset, strips, union
 from slicer.paths import Kind
 from slicer.sections import Sections
 from slicer.travel.islands import OUTSIDE
 from slicer.travel.order import BEFORE_WALLS, FILL, LAST
 
+SKIN = 0.8  # line widths inside the section from where on a tip is off the outer wall, whose middle lies at 0.5
 BELOW_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
 
 
@@ -82,3 +84,33 @@ def interface_edges(sections: Sections) -> Floats:
             rims.append(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm]))
     segments = [np.hstack([rim, np.roll(rim, -1, axis=0)]) for rim in rims]
     return np.concatenate(segments) if segments else np.zeros((0, 6))
+
+
+def skin_beside(edges: Floats, section: Polygons, z_mm: float, process: Process) -> Polygons:
+    """Outer walls of a section near the edges of interfaces, where what a travel or wipe leaves shows along the joint."""
+    near = _beside(edges, z_mm, process.interface_seam_mm)
+    width_mm = min(process.line_width_mm, outer_wall_width_mm(process))
+    return near if near.is_empty() else near ^ (section - offset(section, -SKIN * width_mm))
+
+
+def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
+    """What of the plane at a height lies about as near as that to segments (n, 6) in space."""
+    low, high = np.minimum(edges[:, 2], edges[:, 5]) - z_mm, np.maximum(edges[:, 2], edges[:, 5]) - z_mm
+    near = edges[(low < reach_mm) & (high > -reach_mm)]
+    if not len(near):
+        return Polygons()
+    rise = near[:, 5] - near[:, 2]
+    level = np.abs(rise) < 1e-9
+    at = (z_mm - near[:, 2] + reach_mm * np.array([[-1.0], [1.0]])) / np.where(level, 1.0, rise)
+    begin, end = (
+        near[:, :3] + share[:, None] * (near[:, 3:] - near[:, :3]) for share in np.where(level, [[0], [1]], _clipped(at))
+    )
+    heights = np.array([begin[:, 2], end[:, 2]]) - z_mm
+    least = np.where(heights.prod(axis=0) < 0.0, 0.0, np.abs(heights).min(axis=0))
+    return strips([*np.stack([begin[:, :2], end[:, :2]], axis=1)], np.sqrt(np.maximum(reach_mm**2 - least**2, 0.0)))
+
+
+def _clipped(shares: Floats) -> Floats:
+    """(2, n) shares of segments in order, within them."""
+    inside: Floats = np.sort(shares, axis=0).clip(0.0, 1.0)
+    return inside

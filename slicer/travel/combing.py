@@ -24,16 +24,36 @@ TAUT = 3.0  # a detour along the border may be longer than allowed by this facto
 NOWHERE = np.zeros((0, 2))
 
 
+@kernel
+def crosses(border: Cells, since: Floats, to: Floats) -> NDArray[np.bool_]:
+    """(n, 2) by two whether segments cross a border."""
+    out = np.empty(len(to), np.bool_)
+    for k in range(len(to)):
+        out[k] = not free(border, Segment(since[k, 0], since[k, 1], to[k, 0], to[k, 1]))
+    return out
+
+
+@kernel
+def lie_within(border: Cells, points: Floats) -> NDArray[np.bool_]:
+    """Which of (n, 2) points a border encloses."""
+    out = np.empty(len(points), np.bool_)
+    for k in range(len(points)):
+        out[k] = within(border, points[k, 0], points[k, 1])
+    return out
+
+
 class Combing:
     """Where the tip may travel over an area of one layer, a section or its support, without a retraction."""
 
-    def __init__(self, area: Polygons, width_mm: float) -> None:
-        self._area, self._width_mm = area, width_mm
+    def __init__(self, area: Polygons, width_mm: float, barred: Polygons | None = None) -> None:
+        """barred: what of it no travel passes."""
+        self._area, self._width_mm, self._barred = area, width_mm, barred
 
     @cached_property
     def safe(self) -> Cells:
         """The border that no travel without a retraction crosses."""
-        return cells_of(offset(self._area, -SAFE * self._width_mm))
+        inside = offset(self._area, -SAFE * self._width_mm)
+        return cells_of(inside if self._barred is None else inside - self._barred)
 
     @cached_property
     def _behind(self) -> Cells:

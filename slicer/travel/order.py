@@ -43,11 +43,17 @@ class Placed:
 
 
 def order_beads(
-    beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None, support: Polygons | None = None
+    beads: Sequence[Bead],
+    section: Polygons,
+    process: Process,
+    tip: Floats | None,
+    support: Polygons | None = None,
+    skin: Polygons | None = None,
 ) -> list[Placed]:
     """The beads of one layer in printing order.
 
-    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed.
+    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
+    beside an edge of an interface, which no travel passes over.
     """
     if not beads:
         return []
@@ -56,7 +62,7 @@ def order_beads(
     placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
     to = np.array([points[0] for _, points in placed])
     since = np.array([first, *(points[-1] for _, points in placed[:-1])])
-    retracts, detours = travels(since, to, section, support, process)
+    retracts, detours = travels(since, to, section, support, process, skin)
     retracts[0] = retracts[0] or tip is None
     return [
         Placed(bead, points, bool(pull), detours.get(k, NOWHERE))

@@ -18,6 +18,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import start_at
 from slicer.geometry.segments import Segment, nearest_share, squared_distance_in_space
 from slicer.paths import Kind
+from slicer.walls.lead import SAMPLE_MM, begin_with_room, lead_in
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
@@ -27,7 +28,6 @@ SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
 ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
 NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
 NO_CORNER = (0.0, 0.0)  # no corner is worth a way
-SAMPLE_MM = 2.0  # straight sides are tried at this distance when their ends are too near an interface
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
 FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
 NO_EDGES = np.zeros((0, 6))
@@ -76,8 +76,9 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
                     loop, _ = _start_at_best(loop, _beside(loop, known), interfaces._replace(edges=NO_EDGES, keep_mm=np.zeros(0)))
                 else:
                     loop, free = _start_at_best(loop, _target(loop, process, around), interfaces)
-                    seams[k] = loop[0]
                     lead_mm = 0.0 if free else bead.width_mm
+                    loop = loop if free else begin_with_room(loop, lead_mm)
+                    seams[k] = loop[0]
                 out[k] = replace(bead, points=_open(loop, process.seam_gap * bead.width_mm, lead_mm))
     return out, np.array(list(seams.values())).reshape(-1, 2)
 
@@ -154,31 +155,9 @@ def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
         share = (beyond[last] - gap_mm) / steps[last]
         points = np.concatenate([points[: last + 1], (points[last] + share * (points[last + 1] - points[last]))[None]])
     if lead_mm > 0.0:
-        way = _inward(loop)
-        inward = way * min(lead_mm, 0.5 * _room_mm(loop, way))
+        inward = lead_in(loop, lead_mm)
         points = np.concatenate([(points[0] + inward)[None], points, (points[-1] + 0.5 * inward)[None]])
     return points
-
-
-def _inward(loop: Floats) -> Floats:
-    """Unit vector to the left of the loop at its beginning, where the solid is."""
-    steps = np.array([loop[0] - loop[-1], loop[1] - loop[0]])
-    steps /= np.maximum(np.hypot(*steps.T), 1e-12)[:, None]
-    along = steps.sum(axis=0)
-    length = float(np.hypot(*along))
-    along = along / length if length > 1e-6 else steps[1]
-    return np.array([-along[1], along[0]])
-
-
-def _room_mm(loop: Floats, way: Floats) -> float:
-    """How far the inside of a loop (n, 2) reaches from its beginning along a unit vector; 0 where that leads out of it."""
-    sides, beside = start_at(loop, 1) - loop, (loop - loop[0]) @ np.array([-way[1], way[0]])
-    following = start_at(beside, 1)
-    crossed = np.flatnonzero((beside > 0.0) != (following > 0.0))
-    share = beside[crossed] / (beside[crossed] - following[crossed])
-    along = (loop[crossed] + share[:, None] * sides[crossed] - loop[0]) @ way
-    along = along[along > 1e-6]
-    return float(along.min()) if len(along) % 2 else 0.0
 
 
 @kernel

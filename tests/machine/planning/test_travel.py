@@ -8,7 +8,7 @@ import pytest
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import BeginLayer, MachineProgram, Retract, Stroke, Travel, Wipe
 from machine.planning.plan import plan
-from machine.planning.travel import first_length, trail_after, wipe_trail
+from machine.planning.travel import trail_after
 from machine.reader.parse import parse_gcode
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
@@ -16,6 +16,7 @@ from profiles.profile import Profile, load
 from slicer.bead import length_mm
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
+from slicer.travel.wiping import first_length, wipe_trail
 from tests.shapes import box
 from tests.slicer.hand import whole
 
@@ -139,3 +140,13 @@ def test_a_wipe_never_goes_back_to_the_layer_below() -> None:
 
 def test_a_stroke_as_long_as_the_wipe_is_wiped_over_itself() -> None:
     assert len(_wiped(_short(5.0), np.array([[9.0, 0.5, 0.2], [0.0, 0.5, 0.2]]))) == 2
+
+
+def test_a_wipe_that_must_not_go_over_its_ring_goes_over_the_inner_wall_or_nowhere() -> None:
+    ring = np.array([[5, 0.9], [5, 0.3], [9, 0.3], [9, 9], [1, 9], [1, 0.3], [5, 0.3], [5, 0.6]], dtype=float)
+    path = Path(Kind.OUTER_WALL, ring, 0.6, 20.0, 1.0, np.zeros((0, 2)), False, wiped=False)
+    points = np.column_stack([ring, np.full(len(ring), 0.2)])
+    inner = np.array([[5, 0.9, 0.2], [8, 0.9, 0.2]])
+    way = first_length(trail_after(points, path, inner, np.zeros(3), 2.0), 2.0)
+    assert way == pytest.approx(np.array([[5, 0.6, 0.2], [5, 0.9, 0.2], [6.7, 0.9, 0.2]]))
+    assert not len(trail_after(points, path, inner[:0], np.zeros(3), 2.0))

@@ -18,6 +18,7 @@ from slicer.interface.interface import (
     plane_in_frame_of,
     plastic_below,
     sections_of,
+    skin_beside,
     touching,
 )
 from slicer.interface.model import joined
@@ -166,3 +167,21 @@ def test_a_layer_on_plastic_begins_with_its_longest_line_inside_unless_it_has_su
     assert [b.length_mm for b in begun] == [b.length_mm for b in sorted(beads, key=lambda b: beads.index(b) != first)]
     assert first is None or begun[0].points is beads[first].points
     assert first in (0, None) or begun[0].rank == OUTSIDE
+
+
+@settings(max_examples=20)
+@given(seeds)
+def test_the_skin_beside_an_edge_is_the_outer_wall_as_near_to_it_in_space(seed: int) -> None:
+    random, process = np.random.default_rng(seed), profile().process
+    square, z_mm = Polygons.square((20.0, 20.0)), 3.0
+    edge = np.array([[0.0, *random.uniform((0, 0), (20, 6)), 0.0, *random.uniform((0, 0), (20, 6))]])
+    skin = as_shapely(skin_beside(edge, square, z_mm, process))
+    a, b = edge[0, :3], edge[0, 3:]
+    for y in np.linspace(0.5, 19.5, 39):
+        place = np.array([0.1, y, z_mm])
+        share = np.clip((place - a) @ (b - a) / max((b - a) @ (b - a), 1e-9), 0.0, 1.0)
+        away = float(np.linalg.norm(place - a - share * (b - a)))
+        covered = skin.contains(shapely.Point(0.1, y))
+        assert covered or away > process.interface_seam_mm
+        assert not covered or away < 2.0**0.5 * process.interface_seam_mm + 0.01
+    assert not skin.intersects(shapely.box(0.37, 0.37, 19.63, 19.63))

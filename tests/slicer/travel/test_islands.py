@@ -114,3 +114,25 @@ def test_support_comes_before_the_part_where_a_part_begins_and_else_where_the_wa
     beads = [line(5, 5), line(35, 5, OUTSIDE, Kind.SUPPORT)]
     kinds = [p.bead.kind for p in order_beads(beads, section, STRAIGHT, None if first else np.array([4.0, 5.0]), support)]
     assert kinds == ([Kind.SUPPORT, Kind.INFILL] if first else [Kind.INFILL, Kind.SUPPORT])
+
+
+def test_a_travel_goes_round_the_outer_wall_beside_an_interface_or_retracts() -> None:
+    notched = Polygons.square((20.0, 20.0)) - Polygons([np.array([(9.0, 0.0), (11.0, 0.0), (10.0, 9.7)])])
+    since, to, near = np.array([[2.0, 10.0]]), np.array([[18.0, 10.0]]), np.array([[1.0, 10.0]])
+    skin = notched - offset(notched, -0.36)
+    process = profile().process
+    assert travels(since, to, notched, Polygons(), process) == (np.array([False]), {})
+    retracts, detours = travels(since, to, notched, Polygons(), process, skin)
+    way = shapely.LineString([since[0], *detours[0], to[0]])
+    assert not retracts[0]
+    assert not as_shapely(skin).intersects(way)
+    assert travels(since, to, notched, Polygons(), STRAIGHT, skin)[0].tolist() == [True]
+    assert travels(since, near, notched, Polygons(), process, skin) == (np.array([False]), {})
+
+
+def test_a_short_hop_over_the_outer_wall_beside_an_interface_retracts() -> None:
+    gap = Polygons.square((8.0, 8.0)) + Polygons.square((8.0, 8.0)).translate((8.2, 0.0))
+    skin = gap - offset(gap, -0.36)
+    since, to = np.array([[7.5, 4.0]]), np.array([[8.7, 4.0]])
+    assert travels(since, to, gap, Polygons(), STRAIGHT)[0].tolist() == [False]
+    assert travels(since, to, gap, Polygons(), STRAIGHT, skin)[0].tolist() == [True]

@@ -195,3 +195,16 @@ def test_first_layers_on_a_wider_part_begin_beside_it_when_they_reach_beyond() -
 
 def test_rear_of_a_part_lies_behind_its_middle() -> None:
     assert rear_of(box(10, 20, 5).bounds_mm) == pytest.approx([0, 30])
+
+
+def test_a_wall_that_begins_inside_does_so_where_there_is_room_not_in_a_sharp_corner() -> None:
+    wedge = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 3.0]])
+    rim = np.hstack([np.insert(wedge, 2, 0.1, axis=1), np.insert(np.roll(wedge, -1, axis=0), 2, 0.1, axis=1)])
+    beads, _ = place_seams(
+        [Bead(Kind.OUTER_WALL, wedge, 0.45, 0)], process("corner"), around(before=[(0.0, 0.0)], interfaces=rim)
+    )
+    begin, end = (shapely.Point(beads[0].points[k]) for k in (0, -1))
+    wall = shapely.LinearRing(wedge)
+    assert wall.distance(begin) > 0.7 * 0.45
+    assert wall.distance(end) > 0.35 * 0.45
+    assert shapely.Polygon(wedge).contains(begin)

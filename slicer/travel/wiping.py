@@ -1,0 +1,57 @@
+"""Wiping: over what the tip goes while the filament is pulled back: what it has just printed, so that the drop stays there."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.bead import length_mm
+from slicer.geometry.cells import cells_of
+from slicer.geometry.polygons import Polygons
+from slicer.paths import Path
+from slicer.travel.combing import crosses, lie_within
+
+STANDING_MM = 1e-6
+RING = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
+
+
+def keep_wipes_off(paths: Sequence[Path], skin: Polygons, wipe_mm: float) -> tuple[Path, ...]:
+    """The paths, unwiped where they end beside the skin and a wipe of that length would lead onto it."""
+    if skin.is_empty():
+        return tuple(paths)
+    border = cells_of(skin)
+    ends = lie_within(border, np.array([path.points[-1] for path in paths]).reshape(-1, 2))
+    out = list[Path]()
+    for path, ends_on_it in zip(paths, ends.tolist(), strict=True):
+        way = first_length(wipe_trail(path.points, path.width_mm), wipe_mm)
+        leads_there = not ends_on_it and len(way) > 1 and bool(crosses(border, way[:-1], way[1:]).any())
+        out.append(replace(path, wiped=False) if leads_there else path)
+    return tuple(out)
+
+
+def runs_round(points: Floats, width_mm: float) -> bool:
+    """Whether a path ends where it begins, or nearly."""
+    return float(np.linalg.norm(points[-1] - points[0])) <= width_mm and length_mm(points) > RING * width_mm
+
+
+def wipe_trail(points: Floats, width_mm: float) -> Floats:
+    """The way of a wipe after a stroke (n, 2 or 3): on along a ring, over its seam; back along a line."""
+    if not runs_round(points, width_mm):
+        return points[::-1]
+    stands = float(np.linalg.norm(points[-1] - points[0])) <= STANDING_MM
+    return points if stands else np.vstack([points[-1:], points])
+
+
+def first_length(way: Floats, length: float) -> Floats:
+    """The first `length` mm of a polyline (n, 2 or 3), or all of it; without points that repeat."""
+    if len(way) < 2 or length <= 0.0:
+        return way[:0]
+    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
+    way, steps = way[np.concatenate([[True], steps > STANDING_MM])], steps[steps > STANDING_MM]
+    done = np.cumsum(steps)
+    last = int(np.searchsorted(done, length))
+    if last >= len(steps):
+        return way
+    share = 1.0 - (done[last] - length) / steps[last]
+    return np.vstack([way[: last + 1], way[last] + share * (way[last + 1] - way[last])])
