@@ -14,7 +14,7 @@ from machine.planning.priming import run_in
 from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Speeds, Turn, route, top_z
 from machine.planning.stops import Stop, stops_by_layer
-from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, trail_after, travel_speed
+from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, travel_speed
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
@@ -128,7 +128,8 @@ def _route(turn: Turn, part: int, printed: Printed, profile: Profile) -> Route:
 
 def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
     speed = limits.turn_speed(pose.tilt_deg - tip.pose.tilt_deg, pose.turn_deg - tip.pose.turn_deg, profile.machine)
-    tip.pose, tip.trail = pose, tip.trail[:0]
+    tip.pose = pose
+    tip.forget()
     return Reorient(pose, speed)
 
 
@@ -137,13 +138,12 @@ def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate:
     z = layer.z_mm + float(shift[2])
     for path, next_path in zip(layer.paths, [*layer.paths[1:], None], strict=True):
         points = np.column_stack([path.points + shift[:2], z + path.z_mm])
-        before = tip.trail
         yield from to_path(tip, path, points[0], shift, profile)
         yield from prime(tip, profile)
         coast = profile.material.coast_mm if next_path is not None and next_path.retract else 0.0
         stroke = _stroke(path, layer.height_mm, points, profile, accelerations, coast_mm=coast)
         yield run_in(stroke, layer, tip, profile)
-        tip.trail = trail_after(points, path, before if tip.trail is before else before[:0], shift, profile.material.wipe_mm)
+        tip.printed.append((points, path, shift))
         tip.at_mm = points[-1]
 
 

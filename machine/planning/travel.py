@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import dist
 
 import numpy as np
 
@@ -22,8 +23,8 @@ TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter
 class Tip:
     """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back.
 
-    trail: (n, 3) the strokes just printed, in the sense in which a wipe goes over them. run_in_mm: filament that the next
-    strokes inside are to push beyond their own.
+    trail: (n, 3) a way that a wipe may go over; printed: strokes (n, 3) after it, their paths and shifts from the part frame,
+    none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond their own.
     """
 
     at_mm: Floats
@@ -32,11 +33,25 @@ class Tip:
     prime_extra_mm: float = 0.0
     run_in_mm: float = 0.0
     trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    printed: list[tuple[Floats, Path, Floats]] = field(default_factory=list)
+
+    def forget(self) -> None:
+        """Nothing of what was printed is to be wiped over any more."""
+        self.trail = self.trail[:0]
+        self.printed.clear()
+
+    def way_back(self, wipe_mm: float) -> Floats:
+        """The way (n, 3) that a wipe may go from here, that long where there is as much."""
+        begin = next((k for k in range(len(self.printed) - 1, -1, -1) if _suffices(*self.printed[k][:2], wipe_mm)), 0)
+        trail = self.trail
+        for points, path, shift in self.printed[begin:]:
+            trail = trail_after(points, path, trail, shift, wipe_mm)
+        return trail
 
 
 def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile) -> Iterator[Move]:
     """To a path's start: up to the layer first, then along the approach; or pulled back and lifted, straight."""
-    if float(np.linalg.norm(start - tip.at_mm)) <= STANDING_MM:
+    if dist(start.tolist(), tip.at_mm.tolist()) <= STANDING_MM:
         return
     if path.retract:
         yield from retract(tip, profile)
@@ -45,7 +60,7 @@ def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile
     if abs(over - float(tip.at_mm[2])) > STANDING_MM:
         yield from go(tip, [*tip.at_mm[:2], over], profile)
     between = np.column_stack([path.approach.reshape(-1, 2) + shift[:2], np.full(len(path.approach), over)])
-    points = np.vstack([tip.at_mm, between, [*start[:2], over]])
+    points = np.array([tip.at_mm, *between, [*start[:2], over]])
     keep = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])
     if keep.sum() > 1:
         tip.at_mm = points[keep][-1]
@@ -56,8 +71,8 @@ def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile
 
 def go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:
     """A straight travel; straight up and down at the lift speed."""
-    points = np.array([tip.at_mm, target], dtype=np.float64)
-    if float(np.linalg.norm(points[1] - points[0])) > STANDING_MM:
+    if dist(tip.at_mm.tolist(), target) > STANDING_MM:
+        points = np.array([tip.at_mm, target], dtype=np.float64)
         upright = bool(np.all(np.abs(points[1, :2] - points[0, :2]) <= STANDING_MM))
         speed = lift_speed(profile) if upright else travel_speed(profile)
         speed = limits.travel_speed(points, speed, profile.machine)
@@ -82,8 +97,8 @@ def retract(tip: Tip, profile: Profile) -> Iterator[Move]:
         return
     tip.retracted_mm += amount
     tip.prime_extra_mm = max(tip.prime_extra_mm, profile.material.retract_prime_extra_mm)
-    way = first_length(tip.trail, profile.material.wipe_mm)
-    tip.trail = tip.trail[:0]
+    way = first_length(tip.way_back(profile.material.wipe_mm), profile.material.wipe_mm)
+    tip.forget()
     length = np.linalg.norm(np.diff(way, axis=0), axis=1)
     if len(way) < 2 or float(np.linalg.norm(way[0] - tip.at_mm)) > STANDING_MM:
         yield Retract(amount, filament_speed(profile))
@@ -104,6 +119,11 @@ def prime(tip: Tip, profile: Profile) -> Iterator[Move]:
 def filament_speed(profile: Profile) -> float:
     """mm/s at which filament is pulled back and pushed forward."""
     return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+
+
+def _suffices(points: Floats, path: Path, wipe_mm: float) -> bool:
+    """Whether what was printed before a stroke does not matter for a wipe after it."""
+    return length_mm(points) >= wipe_mm if path.wiped else not runs_round(points, path.width_mm)
 
 
 def trail_after(points: Floats, path: Path, before: Floats, shift: Floats, wipe_mm: float) -> Floats:
