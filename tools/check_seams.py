@@ -16,6 +16,7 @@ percentile; met: along which share of it that is no more than MET_MM. --list: wh
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +42,7 @@ from profiles.profile import Profile, load
 HEAD = ("model", "part", "rim mm", "wipes", "below", "primes", "below", "travels", "below", "walls mm", "p95", "met %")
 ON_RIM = 0.75  # of the outer wall's width: its own middle lies half of it inside
 NEAR_MM = 0.9  # walls do not begin within process.interface_seam_mm of it, 1 mm, measured at the middle of their layer
-MET_MM = 0.05  # a column of what it is measured with
+MET_MM = 0.05  # the width of a column of what measures it
 DEEP = 1.25  # of the outer wall's width: where nothing near is so far inside there is no other wall to be over
 LOW_MM = 0.05  # over its layer a tip touches what lies there
 STEP_MM = 0.05  # of looks along moves
@@ -277,9 +278,7 @@ def played(model: str, settings: list[str]) -> tuple[DryRun, Profile]:
         return dry_run(lines, profile, known=()), profile
     profile = load(settings=settings)
 
-    def search(mesh):  # noqa: ANN001, ANN202
-        return decompose(mesh, model, profile, price=pricing(profile))
-
+    search = partial(decompose, name=model, profile=profile, price=pricing(profile))
     decomposition = lay_down(mesh_of(locate(model), profile), profile, pricing, search).decomposition
     return build(decomposition, profile).run, profile
 
