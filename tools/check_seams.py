@@ -10,12 +10,13 @@ stroke of an outer wall that gets more than its like; travels: those that begin,
 parts' layers show of each. In brackets: how many of them have to be there: where no place within NEAR_MM is DEEP inside, where a
 bead that does not run round begins or ends, or over support, which is broken off.
 walls mm, p95: how far inside the outer edge of the first layer's outer wall what lies below it ends, at the median and the 95th
-percentile. --list: where each one is, X and Y of the machine.
+percentile; met: along which share of it that is no more than MET_MM. --list: where each one is, X and Y of the machine.
 """
 
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,9 +39,10 @@ from mdp.search.search import decompose
 from profiles.machine import Machine
 from profiles.profile import Profile, load
 
-HEAD = ("model", "part", "rim mm", "wipes", "below", "primes", "below", "travels", "below", "walls mm", "p95")
+HEAD = ("model", "part", "rim mm", "wipes", "below", "primes", "below", "travels", "below", "walls mm", "p95", "met %")
 ON_RIM = 0.75  # of the outer wall's width: its own middle lies half of it inside
 NEAR_MM = 0.9  # walls do not begin within process.interface_seam_mm of it, 1 mm, measured at the middle of their layer
+MET_MM = 0.05  # the width of a column of what measures it
 DEEP = 1.25  # of the outer wall's width: where nothing near is so far inside there is no other wall to be over
 LOW_MM = 0.05  # over its layer a tip touches what lies there
 STEP_MM = 0.05  # of looks along moves
@@ -276,9 +278,7 @@ def played(model: str, settings: list[str]) -> tuple[DryRun, Profile]:
         return dry_run(lines, profile, known=()), profile
     profile = load(settings=settings)
 
-    def search(mesh):
-        return decompose(mesh, model, profile, price=pricing(profile))
-
+    search = partial(decompose, name=model, profile=profile, price=pricing(profile))
     decomposition = lay_down(mesh_of(locate(model), profile), profile, pricing, search).decomposition
     return build(decomposition, profile).run, profile
 
@@ -293,7 +293,8 @@ def rows(model: str, run: DryRun, profile: Profile) -> Iterator[str]:
         for what in ("wipe", "prime", "travel"):
             of_kind = [mark for mark in left if mark.what == what]
             cells += [_count([mark for mark in of_kind if (mark.part == joint.part) == own]) for own in (True, False)]
-        cells += [f"{np.median(edges[joint.part]):.2f}", f"{np.quantile(edges[joint.part], 0.95):.2f}"]
+        inside = edges[joint.part]
+        cells += [f"{np.median(inside):.2f}", f"{np.quantile(inside, 0.95):.2f}", f"{100 * (inside <= MET_MM + 1e-6).mean():.0f}"]
         yield "| " + " | ".join(cells) + " |"
         for mark in left:
             yield f"    line {mark.line}: part {mark.part} {mark.what} at {mark.x_mm:.2f} {mark.y_mm:.2f} {mark.why}".rstrip()

@@ -10,13 +10,14 @@ from mdp.mesh import Floats, Mesh
 from profiles.process import Process
 from slicer.bead import Bead, outer_wall_width_mm
 from slicer.geometry.cross_section import cross_sections
-from slicer.geometry.polygons import Polygons, clean, contours, offset, strips, union
+from slicer.geometry.polygons import Polygons, clean, contours, offset, union
 from slicer.paths import Kind
 from slicer.sections import Sections
 from slicer.travel.islands import OUTSIDE
 from slicer.travel.order import BEFORE_WALLS, FILL, LAST
 
 SKIN = 0.8  # line widths inside the section from where on a tip is off the outer wall, whose middle lies at 0.5
+SIDES = 32  # of what is round about an edge
 BELOW_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
 
 
@@ -107,7 +108,14 @@ def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
     )
     heights = np.array([begin[:, 2], end[:, 2]]) - z_mm
     least = np.where(heights.prod(axis=0) < 0.0, 0.0, np.abs(heights).min(axis=0))
-    return strips([*np.stack([begin[:, :2], end[:, :2]], axis=1)], np.sqrt(np.maximum(reach_mm**2 - least**2, 0.0)))
+    reaches = np.sqrt(np.maximum(reach_mm**2 - least**2, 0.0))
+    return union([_around(a, b, reach) for a, b, reach in zip(begin, end, reaches.tolist(), strict=True)])
+
+
+def _around(begin: Floats, end: Floats, reach_mm: float) -> Polygons:
+    """What lies as near as that to a segment seen from above."""
+    disc = Polygons.circle(reach_mm, SIDES)
+    return Polygons.batch_hull([disc.translate((float(x), float(y))) for x, y in (begin[:2], end[:2])])
 
 
 def _clipped(shares: Floats) -> Floats:

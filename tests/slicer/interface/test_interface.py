@@ -1,5 +1,7 @@
 """Frames, sections and edges between the parts of a model: they share it out, and points stay where they are."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 import shapely
@@ -23,8 +25,9 @@ from slicer.interface.interface import (
 )
 from slicer.interface.model import joined
 from slicer.interface.plastic import _nearest_areas
-from slicer.paths import Kind
+from slicer.paths import Kind, Layer
 from slicer.sectioning import section_part
+from slicer.slice import slice_part
 from slicer.travel.islands import OUTSIDE
 from tests.mdp.solids import random_direction, random_solid
 from tests.shapes import box
@@ -185,3 +188,17 @@ def test_the_skin_beside_an_edge_is_the_outer_wall_as_near_to_it_in_space(seed: 
         assert covered or away > process.interface_seam_mm
         assert not covered or away < 2.0**0.5 * process.interface_seam_mm + 0.01
     assert not skin.intersects(shapely.box(0.37, 0.37, 19.63, 19.63))
+
+
+def test_where_faces_are_upright_in_both_parts_the_outer_walls_at_a_joint_are_one() -> None:
+    lower, upper = cut(box(20, 20, 40), ((0.5, 0.0, 0.8), 15.0))  # the faces at y = -10 and 10 stand along both directions
+    above, below = slice_part(upper, profile(), (lower,)), slice_part(lower, profile(), (), (upper,))
+    for part, layers in ((upper, above.layers[:1]), (lower, below.layers[-40:-20])):
+        assert _edges_along_y(part, layers) == pytest.approx((-10.0, 10.0), abs=0.05)
+
+
+def _edges_along_y(part: Part, layers: Sequence[Layer]) -> tuple[float, float]:
+    """The least and the greatest y, in the workpiece, of the outer edges of outer walls."""
+    walls = [(path, layer.z_mm) for layer in layers for path in layer.paths if path.kind is Kind.OUTER_WALL]
+    y = [(in_workpiece(part, np.insert(path.points, 2, z, axis=1))[:, 1], 0.5 * path.width_mm) for path, z in walls]
+    return min(float(at.min()) - half for at, half in y), max(float(at.max()) + half for at, half in y)

@@ -1,0 +1,54 @@
+"""Marks at the seams of joints: none on a box that is cut askew; what is planted there is counted."""
+
+from pathlib import Path
+
+import pytest
+
+from machine.app.pipeline.pipeline import build
+from machine.dryrun.dryrun import dry_run
+from mdp.decomposition import Decomposition
+from profiles.profile import Profile, load
+from tests.shapes import box
+from tests.slicer.hand import cut
+
+TOOLS = Path(__file__).parents[2] / "tools"
+
+
+@pytest.fixture(scope="module")
+def printed() -> tuple[tuple[str, ...], Profile]:
+    mesh, profile = box(16, 16, 14), load()
+    parts = tuple(cut(mesh, ((0.3, 0.0, 0.95), 8.0)))
+    return tuple(build(Decomposition("box", mesh, parts, 1, "classic", 0.0, 0.0, 0, 0, 0.0), profile).lines), profile
+
+
+def counted(lines: list[str], profile: Profile, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What is left on the rim of the part above by itself."""
+    monkeypatch.syspath_prepend(str(TOOLS))
+    import check_seams
+
+    program = dry_run(lines, profile, known=()).program
+    ((_, outlines),) = check_seams.joints(program, profile.machine)
+    return [mark.what for outline in outlines if outline.part == 2 for mark in check_seams.marks(program, outline)]
+
+
+def test_nothing_is_left_on_the_rim_of_a_box_cut_askew(
+    printed: tuple[tuple[str, ...], Profile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines, profile = printed
+    assert counted(list(lines), profile, monkeypatch) == []
+
+
+@pytest.mark.parametrize(
+    ("planted", "what"),
+    [
+        (["G1 E-0.8 F2100", "G1 E0.8 F2100"], ["prime"]),
+        (["G91", "G1 X0.5 E-0.2 F2100", "G0 X-0.5", "G90", "M83", "G1 E0.2"], ["wipe", "prime", "travel"]),
+    ],
+)
+def test_what_is_planted_on_the_rim_is_counted(
+    printed: tuple[tuple[str, ...], Profile], planted: list[str], what: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines, profile = list(printed[0]), printed[1]
+    wall = lines.index(";TYPE:External perimeter", lines.index(";PART:2 of 2"))
+    on_it = next(k for k in range(wall + 1, len(lines)) if lines[k].startswith("G1")) + 1
+    assert sorted(counted([*lines[:on_it], *planted, *lines[on_it:]], profile, monkeypatch)) == sorted(what)
