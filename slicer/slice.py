@@ -35,7 +35,8 @@ from slicer.support.support import Supports, own_supports
 from slicer.travel.order import order_beads
 from slicer.travel.wiping import keep_wipes_off
 from slicer.walls.overhang import split_overhangs
-from slicer.walls.seam import Surroundings, place_seams, rear_of
+from slicer.walls.seam import NO_SEAMS, Surroundings, place_seams, rear_of, seam_limits
+from slicer.walls.seam_plan import plan_seams
 from slicer.walls.variable.pieces import in_pieces
 from slicer.zones import no_seam_segments
 
@@ -74,6 +75,11 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     sections, process = supports.sections, supports.sections.process
     rear, edges = rear_of(sections.mesh.bounds_mm), interface_edges(sections)
     unwanted = no_seam_segments(sections.part, sections.mesh, sections.heights.cut_mm)
+    heights_mm = sections.heights.cut_mm.tolist()
+    planned = [NO_SEAMS] * len(heights_mm)
+    if process.seam == "aligned" and process.walls:
+        limits = [seam_limits(edges, zone, z_mm, process) for zone, z_mm in zip(unwanted, heights_mm, strict=True)]
+        planned = plan_seams(sections, limits)
     layers: list[Layer] = []
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = rear, np.zeros((0, 2)), 0, len(sections.outlines)
@@ -84,7 +90,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
             last = i
         elif process.walls and (i in sections.too_thin or not sections.own[i].is_empty()):
             bare.append(i)
-        around = Surroundings(rear, seams, tip, edges, float(sections.heights.cut_mm[i]), i, unwanted[i])
+        around = Surroundings(rear, seams, tip, edges, heights_mm[i], i, unwanted[i], planned[i])
         beads, seams = place_seams([*own, *auxiliary], process, around)
         skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
         layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers else None, skin)

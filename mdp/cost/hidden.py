@@ -16,7 +16,7 @@ from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import kernel, part
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.sweep.rays import TriangleTree, first_hit, triangle_tree
+from mdp.sweep.rays import TriangleTree, blocked_shares, first_hit, frames_about, triangle_tree
 from mdp.topology.linked_faces import opposites
 
 NEIGHBOURHOOD = 0.03  # radius over which the surface is looked at, as a share of the model's diagonal
@@ -26,7 +26,6 @@ REACH = 0.3  # of a ray that sees nothing, as a share of the model's diagonal
 OPEN = 0.1  # share of the rays that may be blocked where a place still counts as open
 MOST_NEIGHBOURS = 512  # faces of a neighbourhood; a finer mesh is looked at within a smaller radius
 LIFT = 1e-6  # of a ray's start above its face, as a share of the model's diagonal
-ANY_FACE = -2.0  # no cosine is less
 FINE = 20_000  # faces; a finer mesh is looked at on a coarser copy
 COARSER = 1e-3  # how far from its surface that copy may lie, as a share of the model's diagonal
 WORTH = 0.7  # share of the faces above which a copy saves too little
@@ -76,8 +75,11 @@ def _stand_for(begin: int, end: int, tree: TriangleTree, middles: Floats, normal
 def _shares(mesh: Mesh, diagonal_mm: float) -> Floats:
     """(m,) the same, every face looked at."""
     surface = _look_around(mesh)
-    occluded, hidden = np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
-    in_threads(_occlude, len(mesh.faces), triangle_tree(mesh), surface.middles, spread_like_light(RAYS), diagonal_mm, occluded)
+    places = surface.middles + LIFT * diagonal_mm * surface.normals
+    occluded = blocked_shares(
+        triangle_tree(mesh), places, frames_about(surface.normals), spread_like_light(RAYS), REACH * diagonal_mm
+    )
+    hidden = np.zeros(len(mesh.faces))
     in_threads(_hide, len(mesh.faces), surface, NEIGHBOURHOOD * diagonal_mm, occluded, hidden)
     return hidden
 
@@ -92,29 +94,6 @@ def _look_around(mesh: Mesh) -> Neighbourhood:
     sine = np.einsum("mki,mki->mk", np.cross(normals[:, None], beyond), directions)
     angles = np.arctan2(-sine, np.einsum("mi,mki->mk", normals, beyond))
     return Neighbourhood(corners.mean(axis=1), normals, mesh.areas_mm2, across, angles * lengths, directions)
-
-
-@kernel
-def _occlude(begin: int, end: int, tree: TriangleTree, middles: Floats, rays: Floats, diagonal: float, out: Floats) -> None:
-    """The share of a hemisphere of rays from every face that meets the surface again."""
-    origin, ray = floats(3, 0.0), floats(3, 0.0)
-    normals = tree.normals
-    for f in range(begin, end):
-        x, y, z = normals[f, 0], normals[f, 1], normals[f, 2]
-        # A basis around the normal (Duff et al. 2017).
-        sign = 1.0 if z >= 0.0 else -1.0
-        a = -1.0 / (sign + z)
-        b = x * y * a
-        for axis in range(3):
-            origin[axis] = middles[f, axis] + LIFT * diagonal * normals[f, axis]
-        blocked = 0
-        for k in range(len(rays)):
-            u, v, w = rays[k, 0], rays[k, 1], rays[k, 2]
-            ray[0] = u * (1.0 + sign * x * x * a) + v * b + w * x
-            ray[1] = u * sign * b + v * (sign + y * y * a) + w * y
-            ray[2] = -u * sign * x - v * y + w * z
-            blocked += int(first_hit(tree, origin, ray, REACH * diagonal, -1, ANY_FACE) >= 0)
-        out[f] = blocked / len(rays)
 
 
 @kernel

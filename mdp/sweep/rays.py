@@ -6,10 +6,12 @@ import numpy as np
 
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import inlined, kernel, part
+from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 
 LEAF_FACES = 4
 DEPTH = 64
+ANY_FACE = -2.0  # no cosine is less
 
 
 class TriangleTree(NamedTuple):
@@ -122,3 +124,43 @@ def first_hit(tree: TriangleTree, origin: Floats, ray: Floats, reach: float, own
             if t < reach:
                 reach, hit = t, f
     return hit
+
+
+def blocked_shares(
+    tree: TriangleTree, places: Floats, frames: Floats, rays: Floats, reach_mm: float, in_turn: bool = False
+) -> Floats:
+    """(n,) the share of rays, given in each place's frame (n, 3, 3), whose rows are its axes, that meet the surface within reach.
+
+    in_turn: on one core, for a process that has no threads.
+    """
+    out = np.zeros(len(places))
+    if in_turn:
+        _block(0, len(places), tree, places, frames, rays, reach_mm, out)
+    else:
+        in_threads(_block, len(places), tree, places, frames, rays, reach_mm, out)
+    return out
+
+
+def frames_about(normals: Floats) -> Floats:
+    """(n, 3, 3) a frame for each unit vector (n, 3), which is its third row (Duff et al. 2017)."""
+    x, y, z = normals.T
+    sign = np.where(z >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    rows = [[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y], [x, y, z]]
+    return np.ascontiguousarray(np.array(rows).transpose(2, 0, 1))
+
+
+@kernel
+def _block(
+    begin: int, end: int, tree: TriangleTree, places: Floats, frames: Floats, rays: Floats, reach: float, out: Floats
+) -> None:
+    origin, ray = floats(3, 0.0), floats(3, 0.0)
+    for f in range(begin, end):
+        blocked = 0
+        for k in range(len(rays)):
+            for axis in range(3):
+                origin[axis] = places[f, axis]
+                ray[axis] = rays[k, 0] * frames[f, 0, axis] + rays[k, 1] * frames[f, 1, axis] + rays[k, 2] * frames[f, 2, axis]
+            blocked += int(first_hit(tree, origin, ray, reach, -1, ANY_FACE) >= 0)
+        out[f] = blocked / len(rays)

@@ -1,8 +1,8 @@
 """Seam: where a wall that runs round begins and ends.
 
-Every outer wall begins at the place of least cost: the distance to a target (the seam of the layer below, the rear, the tip),
-less a reward for corners, which hide a seam. Places near the edge of an interface are out of the question. Inner walls begin
-beside their outer wall.
+Every outer wall begins at the place of least cost: the distance to a target (a planned place, the seam of the layer below, the
+rear, the tip), less a reward for corners, which hide a seam. Places near the edge of an interface are out of the question.
+Inner walls begin beside their outer wall.
 """
 
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
@@ -18,19 +19,19 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import start_at
 from slicer.geometry.segments import Segment, nearest_share, squared_distance_in_space
 from slicer.paths import Kind
+from slicer.walls.corner import corner_strength
 from slicer.walls.lead import SAMPLE_MM, begin_with_room, lead_in
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
-ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise is none
-SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, and from where on it does so fully
-SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
 ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
 NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
+PLANNED = (0.7, 0.2)  # the same beside a planned place
 NO_CORNER = (0.0, 0.0)  # no corner is worth a way
+FOLLOW_MM, FOLLOW = 2.0, 0.3  # a planned place so near to the seam below draws it by this share of the way: the line is smooth
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
 FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
-NO_EDGES = np.zeros((0, 6))
+NO_EDGES, NO_SEAMS = np.zeros((0, 6)), np.zeros((0, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,8 @@ class Surroundings:
     """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
 
     tip: (2,) where the nozzle comes from. interfaces: (n, 6) segments of their edges, z_mm: the layer's middle. layer: number.
-    unwanted: (k, 6) segments at z_mm, within a line width of which a person wants no seam.
+    unwanted: (k, 6) segments at z_mm, within a line width of which a person wants no seam. planned: (m, 2) where seams are hidden
+    best, of use to aligned ones.
     """
 
     rear: Floats
@@ -48,6 +50,7 @@ class Surroundings:
     z_mm: float
     layer: int
     unwanted: Floats = field(default_factory=lambda: NO_EDGES)
+    planned: Floats = field(default_factory=lambda: NO_SEAMS)
 
 
 def rear_of(bounds_mm: Floats) -> Floats:
@@ -63,7 +66,7 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
     beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
     inside instead, over its inner walls, and so does one on which a person wants no seam anywhere.
     """
-    interfaces = _at_height(around, process)
+    interfaces = seam_limits(around.interfaces, around.unwanted, around.z_mm, process)
     seams: dict[int, Floats] = {}
     out = list(beads)
     for kind in WALLS:
@@ -98,7 +101,7 @@ class _Target(NamedTuple):
     outer_mm: float
 
 
-class _Interfaces(NamedTuple):
+class SeamLimits(NamedTuple):
     """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
 
     edges: Floats
@@ -106,15 +109,24 @@ class _Interfaces(NamedTuple):
     keep_mm: Floats
 
 
-def _at_height(around: Surroundings, process: Process) -> _Interfaces:
-    """Those interface edges that lie within reach of a layer, and where a person wants no seam."""
-    keep_mm, z = process.interface_seam_mm, around.interfaces[:, [2, 5]] - around.z_mm
-    near = around.interfaces[(z.min(axis=1) < keep_mm) & (z.max(axis=1) > -keep_mm)]
-    distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(around.unwanted)])
-    return _Interfaces(np.concatenate([near, around.unwanted]), float(around.z_mm), distances_mm)
+def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Process) -> SeamLimits:
+    """Those of (n, 6) interface edges that lie within reach of a layer, and (k, 6) where a person wants no seam in it."""
+    keep_mm, z = process.interface_seam_mm, interfaces[:, [2, 5]] - z_mm
+    near = interfaces[(z.min(axis=1) < keep_mm) & (z.max(axis=1) > -keep_mm)]
+    distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(unwanted)])
+    return SeamLimits(np.concatenate([near, unwanted]), float(z_mm), distances_mm)
 
 
-def _start_at_best(loop: Floats, target: _Target, interfaces: _Interfaces) -> tuple[Floats, bool]:
+@kernel
+def keeps_clear(places: Floats, limits: SeamLimits) -> NDArray[np.bool_]:
+    """(n,) whether (n, 2) places are clear of the limits."""
+    clear = np.ones(len(places), np.bool_)
+    for k in range(len(places)):
+        clear[k] = _clear(limits, places[k, 0], places[k, 1])
+    return clear
+
+
+def _start_at_best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[Floats, bool]:
     """The loop (n, 2) begun at its place of least cost, and whether that is clear of interface edges."""
     at, share, free = _best(loop, target, interfaces)
     if share > 0.0:
@@ -139,6 +151,11 @@ def _target(loop: Floats, process: Process, around: Surroundings) -> _Target:
     if process.seam == "random":
         return _Target(*_point_at(loop, (GOLDEN * (around.layer + 1)) % 1.0), *NO_CORNER)
     distance, x, y = _nearest(loop, around.before, REACH_MM)
+    planned, px, py = _nearest(loop, around.planned, REACH_MM)
+    if planned < np.inf:
+        if np.hypot(px - x, py - y) < FOLLOW_MM and distance < np.inf:
+            px, py = x + FOLLOW * (px - x), y + FOLLOW * (py - y)
+        return _Target(px, py, *PLANNED)
     if distance == np.inf:
         return _Target(*rear, *ANYWHERE)
     return _Target(x, y, *(ANYWHERE if process.seam == "corner" else NEARBY))
@@ -222,7 +239,7 @@ def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, floa
 
 
 @kernel
-def _best(loop: Floats, target: _Target, interfaces: _Interfaces) -> tuple[int, float, bool]:
+def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, float, bool]:
     """The place of least cost as (side, share of it), and whether it keeps clear of interface edges."""
     n = len(loop)
     distance, at, share = _project(loop, target.x, target.y)
@@ -243,7 +260,8 @@ def _best(loop: Floats, target: _Target, interfaces: _Interfaces) -> tuple[int, 
             cx, cy = side.x0 + s / count * dx, side.y0 + s / count * dy
             cost = np.hypot(cx - target.x, cy - target.y) + 1e-6 * cx
             if s == 0 and target.inner_mm > 0.0:
-                cost -= _reward(loop, i, target)
+                strength = corner_strength(loop, i)
+                cost -= strength * target.inner_mm if strength > 0.0 else -strength * target.outer_mm
             if cost < least:
                 clear = _clear(interfaces, cx, cy)
                 if clear or not free:
@@ -254,36 +272,7 @@ def _best(loop: Floats, target: _Target, interfaces: _Interfaces) -> tuple[int, 
 
 
 @part
-def _reward(loop: Floats, i: int, target: _Target) -> float:
-    """What the corner at a vertex is worth: nothing up to SMOOTH_DEG of turn, all from SHARP_DEG on."""
-    px, py = _arm(loop, i, -1)
-    qx, qy = _arm(loop, i, 1)
-    bx, by, cx, cy = loop[i, 0] - px, loop[i, 1] - py, qx - loop[i, 0], qy - loop[i, 1]
-    cross, dot = bx * cy - by * cx, bx * cx + by * cy
-    if dot > SMOOTH_COSINE * np.hypot(bx, by) * np.hypot(cx, cy):
-        return 0.0
-    turn = np.degrees(np.arctan2(abs(cross), dot))
-    strength = min((turn - SMOOTH_DEG) / (SHARP_DEG - SMOOTH_DEG), 1.0)
-    return float(strength * (target.inner_mm if cross < 0.0 else target.outer_mm))
-
-
-@part
-def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
-    """The point ARM_MM along the loop from a vertex, forward or backward."""
-    n, left, at = len(loop), ARM_MM, i
-    for _ in range(n):
-        ax, ay = loop[at % n, 0], loop[at % n, 1]
-        dx, dy = loop[(at + sense) % n, 0] - ax, loop[(at + sense) % n, 1] - ay
-        step = np.hypot(dx, dy)
-        if step >= left:
-            return ax + left / step * dx, ay + left / step * dy
-        left -= step
-        at += sense
-    return loop[at % n, 0], loop[at % n, 1]
-
-
-@part
-def _clear(interfaces: _Interfaces, x: float, y: float) -> bool:
+def _clear(interfaces: SeamLimits, x: float, y: float) -> bool:
     """Whether a place at their height keeps clear of all interface edges."""
     for e in range(len(interfaces.edges)):
         begin, end = interfaces.edges[e, :3], interfaces.edges[e, 3:]
