@@ -29,7 +29,7 @@ CONFINED = {
         "machine/app/pipeline/precompile",
         "machine/calibration/coupon/",
     ),
-    "numba": ("mdp/kernels/kernel",),
+    "numba": ("mdp/kernels/kernel", "mdp/kernels/library"),
     "shapely": ("slicer/travel/islands", "machine/dryrun/placement"),
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
