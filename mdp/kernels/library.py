@@ -89,13 +89,14 @@ def use_plain_options() -> None:
 
 def option_values(config: Any) -> dict[str, Any]:
     """What TargetConfig.values() gives: those that were set, and the defaults of the others."""
-    values: dict[str, Any] = _defaults(type(config)) | config._values
+    kind: Any = type(config)
+    values: dict[str, Any] = _defaults(kind) | config._values
     return values
 
 
 @cache
-def _defaults(kind: type) -> dict[str, Any]:
-    return {name: option.default for name, option in vars(kind)["options"].items()}
+def _defaults(kind: Any) -> dict[str, Any]:
+    return {name: option.default for name, option in kind.options.items()}
 
 
 def _environments(module: Any) -> list[str]:
