@@ -29,7 +29,7 @@ CONFINED = {
         "machine/app/pipeline/precompile",
         "machine/calibration/coupon/",
     ),
-    "numba": ("mdp/kernels/kernel",),
+    "numba": ("mdp/kernels/kernel", "mdp/kernels/library"),
     "shapely": ("slicer/travel/islands", "machine/dryrun/placement"),
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
@@ -177,3 +177,10 @@ def test_files_at_the_top_of_a_folder_are_values_below_its_rooms_or_stages_above
 @pytest.mark.parametrize("room", sorted({path.rpartition("/")[0] for path in modules()}))
 def test_a_room_has_at_most_fifteen_files(room: str) -> None:
     assert len([file for file in (ROOT / room).glob("*.py") if file.name != "__init__.py"]) <= MOST_FILES
+
+
+def test_a_file_that_is_not_there_is_refused_before_numpy_is_loaded() -> None:
+    run = "main(['export', 'none.stl', '-o', 'x.gcode'])"
+    program = f"import sys; from machine.app.cli import main; {run}; print('numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("False\n", "tiltprint: none.stl: there is no such file\n")

@@ -64,7 +64,7 @@ class Passes(event.Listener):
 
     def on_end(self, event: Any) -> None:
         """The newest one has ended."""
-        self.add(event.data["name"], *self._open.pop())
+        self.add(event.data["name"].partition(" [")[0], *self._open.pop())
 
     def add(self, name: str, began_s: float, inner_s: float) -> None:
         """Book a phase that ends now."""

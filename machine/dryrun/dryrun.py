@@ -1,6 +1,7 @@
 """Dryrun: a G-code text played through the machine's kinematics, without a machine."""
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import Future
 from dataclasses import asdict, dataclass
 from math import pi
 from typing import Any, NamedTuple
@@ -19,11 +20,14 @@ from machine.planning.limits import axis_limits
 from machine.planning.timing import move_times
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
+from mdp.kernels.threads import ahead
 from mdp.mesh import Floats
 from profiles.errors import GcodeError
+from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import Kind
 
+AT_ONCE = 50_000  # rows
 MOST_MM = 10_000.0  # five times what the largest printers reach
 
 
@@ -79,17 +83,17 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     program = parse_gcode(text, machine)
     _refuse_far_places(program)
     rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
-    ends = [workpiece_path(machine, side[rows]) for side in (program.start, program.end)]
-    segments = np.stack(ends, axis=1)
+    segments = _segments(program, rows, machine)
     area = pi * profile.material.diameter_mm**2 / 4.0
     stop = motion.standstills(program)
     contacts = None
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
         deposited = beads_of(program, segments, rows, profile)
-        contacts = replay(program, deposited, profile)
+        replayed = ahead(replay, program, deposited, profile)  # half of all work, on a core of its own
         balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
-        known = _findings(text, program, Laid(deposited, contacts, balances), profile)
+        known = _findings(text, program, Laid(deposited, replayed, balances), profile)
+        contacts = replayed.result()
     times_s = move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration)
     dwells = [(event.line, event.value) for event in program.events if event.code == "G4"]
     return DryRun(
@@ -107,22 +111,29 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
 
 
 class Laid(NamedTuple):
-    """What is deposited, what lies under it, and how its interfaces are filled."""
+    """What is deposited, what lies under it, as soon as that is replayed, and how its interfaces are filled."""
 
     deposited: Beads
-    contacts: Contacts
+    replayed: Future[Contacts]
     interfaces: tuple[InterfaceBalance, ...]
+
+
+def _segments(program: ParsedProgram, rows: NDArray[np.int64], machine: Machine) -> Floats:
+    """(m, 2, 3) ends of rows in the workpiece frame; some at a time, for what it takes to turn them is ten times as much."""
+    segments = np.empty((len(rows), 2, 3))
+    for begin in range(0, len(rows), AT_ONCE):
+        some = slice(begin, begin + AT_ONCE)
+        for side, places in enumerate((program.start, program.end)):
+            segments[some, side] = workpiece_path(machine, places[rows[some]])
+    return segments
 
 
 def _findings(text: Sequence[str], program: ParsedProgram, laid: Laid, profile: Profile) -> list[Finding]:
     """What speaks against a program, the worst first."""
-    deposited, contacts, balances = laid
+    deposited, replayed, balances = laid
     segments, rows = deposited.segments_mm, deposited.rows
-    findings = [
-        *motion.findings(program, profile.machine),
-        *clearance.findings(program, segments, rows, profile.machine),
-        *placement.findings(program, deposited, contacts),
-        *layering.findings(program, deposited, contacts),
+    moving = [*motion.findings(program, profile.machine), *clearance.findings(program, segments, rows, profile.machine)]
+    of_program = [
         *extrusion.findings(program, deposited, profile),
         *interfaces.findings(program, balances, profile),
         *sequence.findings(program, profile),
@@ -131,6 +142,9 @@ def _findings(text: Sequence[str], program: ParsedProgram, laid: Laid, profile: 
         *placement.purged_into(program, deposited),
         *heat.findings(program, profile, own_comments.has_material(text, profile)),
     ]
+    contacts = replayed.result()
+    touching = [*placement.findings(program, deposited, contacts), *layering.findings(program, deposited, contacts)]
+    findings = [*moving, *touching, *of_program]
     return sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
 
 

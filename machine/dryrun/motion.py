@@ -57,15 +57,15 @@ def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
 def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     change = deltas(program)
     length, _ = lengths(change)
-    surely = np.maximum(np.abs(change) - WRITTEN, 0.0)
-    speed = surely / np.maximum(length, 1e-9)[:, None] * (program.feed / 60.0)[:, None]
+    way, pace = np.maximum(length, 1e-9), program.feed / 60.0
     names = [*axis_limits(machine), "E"]
     for axis, (letter, most) in enumerate(zip(names, axis_speeds(machine), strict=True)):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
         rounding = length * 0.0 + 1.0 / 60.0  # F is written as a whole number
         message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most:g} {unit} (moves: {{count}})"
-        fast = speed[:, axis] > most * SLACK + rounding
-        yield from per_part(program, fast, speed[:, axis], message, code="axis-speed", severity="warning")
+        speed = np.maximum(np.abs(change[:, axis]) - WRITTEN[axis], 0.0) / way * pace
+        fast = speed > most * SLACK + rounding
+        yield from per_part(program, fast, speed, message, code="axis-speed", severity="warning")
 
 
 def _homing(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:

@@ -36,6 +36,7 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
         at = after
     if reader.turning:
         flush(reader)
+    del text
     return parsed_program(reader)
 
 

@@ -39,7 +39,7 @@ class _Rows:
 
 def parsed_program(reader: Reader) -> ParsedProgram:
     """All that was read."""
-    read = np.array(reader.rows, dtype=np.float64).reshape(-1, ROW)
+    read = np.asarray(reader.rows, dtype=np.float64).reshape(-1, ROW)  # no copy: a long program has 100 MB of rows
     start, end = (read[:, first : first + E_AXIS] for first in (BEFORE, AFTER))
     rows = _Rows(read, start, end, read[:, FEED], tuple(reader.events))
     asked = _feed_length(rows.change(), reader.dialect.largest_delta)
@@ -54,11 +54,14 @@ def parsed_program(reader: Reader) -> ParsedProgram:
     if len(followed):
         rows = _merge_turns(keep, rows, change)
         change = rows.change()
-    whole = rows.read[:, [LINE, PART, LAYER, TYPE]].astype(np.int64)
-    return ParsedProgram(
-        line=whole[:, 0], start=rows.start, end=rows.end, e_mm=rows.e_mm, filament_mm=np.cumsum(rows.e_mm), feed=rows.feed,
-        kind=_kinds(change), part=whole[:, 1], layer=whole[:, 2], type=whole[:, 3], types=tuple(reader.types),
-        width_mm=rows.read[:, WIDTH], height_mm=rows.read[:, HEIGHT], acceleration=rows.read[:, ACCELERATION],
+    kind, e_mm = _kinds(change), rows.e_mm
+    del change
+    line, part, layer, kind_of_bead = (rows.read[:, column].astype(np.int64) for column in (LINE, PART, LAYER, TYPE))
+    width, height, acceleration = (rows.read[:, column].copy() for column in (WIDTH, HEIGHT, ACCELERATION))
+    return ParsedProgram(  # columns of their own: one view of the rows would hold all of them
+        line=line, start=rows.start.copy(), end=rows.end.copy(), e_mm=e_mm, filament_mm=np.cumsum(e_mm), feed=rows.feed.copy(),
+        kind=kind, part=part, layer=layer, type=kind_of_bead, types=tuple(reader.types),
+        width_mm=width, height_mm=height, acceleration=acceleration,
         events=rows.events, ignored=reader.ignored,
         layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
         announced=reader.announced, part_totals=tuple(reader.part_totals),

@@ -15,6 +15,7 @@ from numba import config, njit
 from numba.core import event
 
 from mdp.kernels.cache import folder, note_unwritten
+from mdp.kernels.library import use_kernel_libraries, use_plain_options
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -31,6 +32,9 @@ part: Compile = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrap
 # No flag allows the compiler to change a result, so all processors and numbers of threads give the same numbers.
 vector_part: Compile = njit(error_model="numpy", fastmath={"nnan", "ninf", "nsz"}, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 inlined: Compile = njit(error_model="numpy", inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+use_kernel_libraries()
+use_plain_options()
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

@@ -1,0 +1,20 @@
+"""What large arrays have taken goes back to the system."""
+
+import ctypes
+
+import pytest
+
+from machine.app.pipeline.memory import return_large_arrays
+
+
+def test_glibc_is_told_to_take_arrays_of_a_megabyte_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = []
+    library = type("Library", (), {"mallopt": staticmethod(lambda option, value: told.append((option, value)))})
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: library)
+    return_large_arrays()
+    assert told == [(-3, 1_048_576)]
+
+
+def test_a_system_without_glibc_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
+    return_large_arrays()
