@@ -39,7 +39,7 @@ HELP = """What you type is sent, one line after the other is answered. Besides:
 """
 DIM, RED, YELLOW, CYAN = "2", "31", "33", "36"
 COLOURS: dict[type[events.Event], str] = {
-    **dict.fromkeys((events.Ok, events.Busy), DIM),
+    **dict.fromkeys((events.Ok, events.PlainOk, events.Busy), DIM),
     events.Temperature: CYAN,
     **dict.fromkeys((events.Echo, events.Action, events.Start, events.Banner), YELLOW),
     **dict.fromkeys((events.LineError, events.Resend, events.FirmwareFault), RED),

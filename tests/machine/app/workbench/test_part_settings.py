@@ -18,6 +18,7 @@ from mdp.directions.turns import turned_by
 from mdp.plans.plan_file import PlannedPart
 from mdp.pose import UP, about
 from profiles.errors import PlanError, ProfileError
+from profiles.part_settings import OF_PARTS_ON_PLASTIC
 from profiles.profile import load
 from tests.machine.app.workbench.models import changed, model
 
@@ -45,7 +46,7 @@ def test_a_part_has_values_of_its_own_that_are_marked_and_go_back() -> None:
 def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
     first, second = ({row["key"] for row in settings_list(load(), Given(), part)} for part in (1, 2))
     assert "process.scale" not in first | second
-    assert second - first == {key for key in second if key.startswith("process.interface_")} - first
+    assert second - first == {f"process.{key}" for key in OF_PARTS_ON_PLASTIC}
     assert "process.interface_fan" in second - first
 
 
