@@ -1,7 +1,8 @@
 """Coarse copy: a finely meshed model is searched on a copy with fewer faces, and only the planes that are chosen cut it itself.
 
-Whatever the search weighs is many layers wide, and the copy's surface lies within half a layer of the model's. What the
-parts need, weigh and take is worked out on the model itself; the rows of the front that are not taken stay those of the copy.
+Whatever the search weighs is many layers wide, and the copy's surface lies within a layer of the model's, nearly all of it
+within half of one. What the parts need, weigh and take is worked out on the model itself; the rows of the front that are not
+taken stay those of the copy.
 """
 
 from dataclasses import replace
@@ -20,13 +21,13 @@ from mdp.sweep.deviation import distances_mm
 from mdp.zone import Zone, Zones
 from profiles.profile import Profile
 
-OFF_LAYERS = 0.5  # how far the copy's surface may lie from the model's, in layers
+OFF_LAYERS = 1.0  # how far the copy's surface may lie from the model's, in layers
 WORTH = 0.7  # share of the faces above which a copy saves too little
-TOLERANCES = 0.5, 0.25, 0.125  # of simplifying, as shares of that: one face after another moves the surface by more than one
+TOLERANCES = 0.25, 0.125, 0.0625  # of simplifying, as shares of that: one face after another moves the surface by more than one
 
 
 def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
-    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than half a layer; None where the
+    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than a layer; None where the
     mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
     search = profile.search.effective
     fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
