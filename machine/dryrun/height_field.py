@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import part
+from mdp.kernels.kernel import borrower
 from mdp.mesh import Floats
 from slicer.geometry.segments import Segment, squared_distance
 
@@ -50,7 +50,7 @@ def empty_field(low: Floats, high: Floats) -> Field:
     return Field(np.asarray(low, np.float64), cell, shape, *heights, np.full(int(blocks.prod()), NOTHING), np.full(1, NOTHING))
 
 
-@part
+@borrower
 def _raise_cell(i: int, j: int, z: float, row: int, field: Field) -> None:
     """Raise one cell to z; `below` keeps what it was before."""
     k = i * field.shape[1] + j
@@ -62,7 +62,7 @@ def _raise_cell(i: int, j: int, z: float, row: int, field: Field) -> None:
         field.highest[0] = max(field.highest[0], z)
 
 
-@part
+@borrower
 def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
     """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along."""
     along = 0 if abs(b[0] - a[0]) >= abs(b[1] - a[1]) else 1
@@ -89,7 +89,7 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
                 _raise_cell(q, p, z, row, field)
 
 
-@part
+@borrower
 def _lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
     """Height above the tip of the hot end's lowest point at a radius; a great number beyond its widest."""
     if radius <= silhouette[0, 0]:
@@ -101,13 +101,13 @@ def _lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
     return 1e9
 
 
-@part
+@borrower
 def _distance_across(px: float, py: float, a: Point, b: Point) -> float:
     """Distance across, in X and Y alone, of a point from a move."""
     return float(np.sqrt(squared_distance(Segment(a[0], a[1], b[0], b[1]), px, py)))
 
 
-@part
+@borrower
 def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
     """True when a box that goes with the tip from a to b comes over a square; square: its middle and half of its side."""
     px, py, half = square
@@ -124,7 +124,7 @@ def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
     return low <= high
 
 
-@part
+@borrower
 def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point, b: Point, head: Head) -> float:
     """How deep the head goes into a column during a level move; 0 up to `slack`.
 
@@ -141,7 +141,7 @@ def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point,
     return deepest
 
 
-@part
+@borrower
 def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> float:
     """How deep the head goes into the field at most during a level move; 0 up to `slack`."""
     deepest, size, cell = 0.0, BLOCK * field.cell, field.cell
@@ -162,7 +162,7 @@ def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> 
     return deepest
 
 
-@part
+@borrower
 def depth_of(a: Floats, b: Floats, slack: float, field: Field, head: Head) -> float:
     """How deep the head goes into the field at most during a move; a slanting one in pieces, each at its lowest place."""
     if min(a[2], b[2]) + slack >= field.highest[0]:

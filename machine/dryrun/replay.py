@@ -15,7 +15,7 @@ from machine.dryrun.strokes import Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
 from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
 from mdp.kernels.arrays import table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
@@ -133,7 +133,7 @@ def _lay_beads(ends: Floats, half: Floats, rows: NDArray[np.int64], field: Field
         lay_bead(ends[i, 0], ends[i, 1], half[i], rows[i], field)
 
 
-@part
+@borrower
 def _under(place: tuple[float, float, float, float], row: int, strict: bool, strokes: Strokes, about: Surroundings) -> int:
     """Under a place of a bead: 0 nothing, 1 plastic that carries it, 2 plastic where the bead itself should lie.
 
@@ -163,7 +163,7 @@ def _under(place: tuple[float, float, float, float], row: int, strict: bool, str
     return 1 if top > z - reach else 0
 
 
-@part
+@borrower
 def _classify_support(
     place: tuple[float, float, float, float], side: tuple[float, float], row: int, strokes: Strokes, about: Surroundings
 ) -> int:
@@ -189,13 +189,13 @@ def _classify_support(
     return 0
 
 
-@part
+@borrower
 def _free_mm(most: float, held: float) -> float:
     """How long the last stretch of a path may be; a path that lies on nothing anywhere spans nothing."""
     return FREE_END * most if held == 1.0 else 0.0
 
 
-@part
+@borrower
 def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: Floats, contacts: Contacts) -> None:
     """Ends a stretch of beads with nothing under them; stretch: the places in rows of its first and last row, and how much longer
     it is than it may span. pending: (n, 2) of each place what hangs in air there, and what only has a neighbour.

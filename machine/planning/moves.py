@@ -6,7 +6,9 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.mesh import Floats
+from mdp.kernels.arrays import floats
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
 from slicer.paths import Kind, Unsupported
 
@@ -122,48 +124,58 @@ class Rows:
 
 def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
     """All straight moves of a program that begins with the table at (tilt_deg, turn_deg)."""
-    blocks: list[Floats] = []
+    ways: list[Floats] = []
+    pushed: list[Floats] = []
     speeds: list[float] = []
     indices: list[int] = []
     accelerations: list[float] = []
-    at = np.array([0.0, 0.0, 0.0, tilt_deg, turn_deg])
-    filament = 0.0
+    tables = [(tilt_deg, turn_deg)]  # before each move, and after the last one
+    tip = np.zeros(3)
     for index, move in enumerate(program.moves):
-        if isinstance(move, Stroke | Travel | Wipe):
-            block = np.empty((len(move.points_mm), 6))
-            block[:, :3], block[:, 3:5], block[:, 5] = move.points_mm, at[3:], filament
-            if not isinstance(move, Travel):
-                block[1:, 5] += np.cumsum(move.filament_mm if isinstance(move, Stroke) else -move.filament_mm)
-                filament = float(block[-1, 5])
-            at[:3] = move.points_mm[-1]
-            speed = move.speed_mm_s
+        table, acceleration = tables[-1], None
+        if isinstance(move, Stroke):
+            way, filament, acceleration = move.points_mm, move.filament_mm, move.acceleration_mm_s2
+        elif isinstance(move, Travel):
+            way, filament, acceleration = move.points_mm, np.zeros(len(move.points_mm) - 1), move.acceleration_mm_s2
+        elif isinstance(move, Wipe):
+            way, filament = move.points_mm, -move.filament_mm
         elif isinstance(move, Retract):
-            block = np.array([[*at, filament], [*at, filament - move.filament_mm]])
-            filament -= move.filament_mm
-            speed = move.speed_mm_s
+            way, filament = np.array([tip, tip]), np.array([-move.filament_mm])
         elif isinstance(move, Reorient):
-            before = [*at, filament]
-            at[3:] = move.pose.tilt_deg, move.pose.turn_deg
-            block = np.array([before, [*at, filament]])
-            speed = move.speed_deg_s
+            way, filament, table = np.array([tip, tip]), np.zeros(1), (move.pose.tilt_deg, move.pose.turn_deg)
         else:
             continue
-        blocks.append(block)
-        speeds.append(speed)
+        tip = way[-1]
+        ways.append(way)
+        pushed.append(filament)
+        speeds.append(move.speed_deg_s if isinstance(move, Reorient) else move.speed_mm_s)
         indices.append(index)
-        accelerations.append(_acceleration(move))
-    if not blocks:
+        accelerations.append(inf if acceleration is None else acceleration)
+        tables.append(table)
+    if not ways:
         return Rows(np.zeros((0, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0))
-    counts = [len(block) - 1 for block in blocks]
+    counts = np.array([len(filament) for filament in pushed])
+    places, angles = np.concatenate(ways), np.array(tables)
+    first = np.arange(counts.sum()) + np.repeat(np.arange(len(counts)), counts)  # a way has a point more than rows
+    sums = _sums(np.concatenate(pushed), counts)
     return Rows(
-        np.concatenate([block[:-1] for block in blocks]),
-        np.concatenate([block[1:] for block in blocks]),
+        np.column_stack([places[first], np.repeat(angles[:-1], counts, axis=0), sums[:-1]]),
+        np.column_stack([places[first + 1], np.repeat(angles[1:], counts, axis=0), sums[1:]]),
         np.repeat(speeds, counts),
         np.repeat(np.array(indices, dtype=np.int64), counts),
         np.repeat(accelerations, counts),
     )
 
 
-def _acceleration(move: Move) -> float:
-    acceleration = move.acceleration_mm_s2 if isinstance(move, Stroke | Travel) else None
-    return inf if acceleration is None else acceleration
+@kernel
+def _sums(pushed_mm: Floats, counts: Indices) -> Floats:
+    """(n + 1,) filament before each row and after the last one, added up move by move."""
+    sums = floats(len(pushed_mm) + 1, 0.0)
+    row = 0
+    for count in counts:
+        before, within = sums[row], 0.0
+        for _ in range(count):
+            within += pushed_mm[row]
+            row += 1
+            sums[row] = before + within
+    return sums

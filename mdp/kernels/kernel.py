@@ -28,7 +28,10 @@ class Compile(Protocol):
 
 
 KERNEL = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-part: Compile = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+part: Compile = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=True)
+# A part that makes no array, gives none back and calls no part but its like works on arrays that its kernel holds: who holds them
+# is not counted, which takes a lock on all cores each time.
+borrower: Compile = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
 # No flag allows the compiler to change a result, so all processors and numbers of threads give the same numbers.
 vector_part: Compile = njit(error_model="numpy", fastmath={"nnan", "ninf", "nsz"}, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 inlined: Compile = njit(error_model="numpy", inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)

@@ -35,6 +35,13 @@ from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
+WITHOUT_SEAMS = {
+    "hidden_seam_share": 1.0,
+    "feature_mm2": 0.0,
+    "feature_weight": 1.0,
+    "simplify_faces": 0,
+}  # what tells cuts apart
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -70,6 +77,9 @@ def decompose(
         check_part_count(parts)
         most = max(parts, profile.search.most_parts)
         profile = profile.model_copy(update={"search": profile.search.model_copy(update={"most_parts": most})})
+    uncut = parts == 1 and price is None and on_record is None  # nobody looks at the front
+    if uncut:
+        profile = profile.model_copy(update={"search": profile.search.model_copy(update=WITHOUT_SEAMS)})
     given, mesh = mesh, on_pedestal(mesh, profile.search.pedestal_mm)
     planned = PlanFile("") if by_hand is None else by_hand
     check_model(planned, mesh, name)
@@ -88,7 +98,7 @@ def decompose(
                 return fine
     trace = None if on_record is None else Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
     report = on_stage or (lambda progress: None)
-    if parts == 1 and price is None and trace is None:  # nobody looks at the front
+    if uncut:
         best, front, rounds = problem.root, Front(problem.root), 0
     elif profile.search.method == "published":
         _begin(problem, report)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, longs
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import opposites
 from slicer.geometry.segments import Segment, orientation
@@ -41,13 +41,13 @@ def triangulate(loops: Sequence[Floats]) -> Triangulation | None:
     return triangulation
 
 
-@part
+@borrower
 def doubled_area(points: Floats, a: int, b: int, c: int) -> float:
     """Twice the signed area of a triangle of three of the points."""
     return orientation(Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1]), points[c, 0], points[c, 1])
 
 
-@part
+@borrower
 def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
     """Whether p lies clearly inside the circle through a, b, c (counter-clockwise)."""
     x, y = points[p, 0], points[p, 1]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, ints, longs
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Ints
 from slicer.walls.variable.rule import Rule, bead_count
@@ -123,7 +123,7 @@ def _smooth(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> bool:
     return changed
 
 
-@part
+@borrower
 def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
     """Whether so many beads fit into places from one half thickness to another with widths that can be printed."""
     if count == 0:
@@ -156,7 +156,7 @@ def _spread(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> Counts
     return Counts(beads, radii, dots)
 
 
-@part
+@borrower
 def _on_axis(skeleton: Skeleton, t: int) -> bool:
     return bool(skeleton.central[3 * t] or skeleton.central[3 * t + 1] or skeleton.central[3 * t + 2])
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, longs, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 from slicer.geometry.triangulation import Triangulation
 from slicer.walls.variable.counts import Counts
@@ -77,7 +77,7 @@ def trace_loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts
     return Ribs(out.feet[:n], out.ways[:n], out.reach[:n], out.depth[:n], out.spacing[:n], out.starts[: loops + 1])
 
 
-@part
+@borrower
 def _add(out: Ribs, n: int, foot: tuple[float, float], way: tuple[float, float], reach: float) -> int:
     out.feet[n, 0], out.feet[n, 1] = foot
     out.ways[n, 0], out.ways[n, 1] = way
@@ -85,7 +85,7 @@ def _add(out: Ribs, n: int, foot: tuple[float, float], way: tuple[float, float],
     return n + 1
 
 
-@part
+@borrower
 def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: Ribs, n: int) -> int:
     """Adds the place on the rib of a corner; in the tip of a triangle in a corner of the polygon, that on its bisector."""
     points, tails, across = triangulation
@@ -98,7 +98,7 @@ def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: Ribs, n:
     return _add(out, n, (fx, fy), ((x - fx) / long, (y - fy) / long), long)
 
 
-@part
+@borrower
 def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], out: Ribs, n: int) -> int:
     """Adds the mitre between two ribs from one point, where the polygon's outline turns into it."""
     points, tails, _ = triangulation
@@ -119,7 +119,7 @@ def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, 
     return n
 
 
-@part
+@borrower
 def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, out: Ribs, n: int) -> int:
     """Adds the place where the loop crosses the axis on the way to a node beyond it."""
     t, beyond = nodes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, ints, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 from slicer.geometry.segments import Segment, nearest_share, orientation
 from slicer.geometry.triangulation import Triangulation
@@ -35,13 +35,13 @@ class Skeleton(NamedTuple):
     central: NDArray[np.bool_]
 
 
-@part
+@borrower
 def after(h: int) -> int:
     """The next half-edge of the same triangle."""
     return h - 2 if h % 3 == 2 else h + 1
 
 
-@part
+@borrower
 def before(h: int) -> int:
     """The half-edge before in the same triangle."""
     return h + 2 if h % 3 == 0 else h - 1
@@ -80,7 +80,7 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
     return out
 
 
-@part
+@borrower
 def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
     """Whether a node lies beyond the boundary, seen from its triangle: needles in a neck have their centres anywhere."""
     points, tails, across = triangulation
@@ -99,7 +99,7 @@ def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
     return True
 
 
-@part
+@borrower
 def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Fills in the circumcentre of a triangle."""
     points, tails, _ = triangulation
@@ -115,15 +115,16 @@ def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) ->
     out.centres[t, 1] = points[a, 1] + (bx * c2 - cx * b2) / doubled
 
 
-@part
+@borrower
 def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Puts a node into its triangle, where that has no circumcentre of use."""
     points, tails, _ = triangulation
+    a, b, c = tails[3 * t], tails[3 * t + 1], tails[3 * t + 2]
     for axis in range(2):
-        out.centres[t, axis] = sum([points[tails[h], axis] for h in range(3 * t, 3 * t + 3)]) / 3.0
+        out.centres[t, axis] = (points[a, axis] + points[b, axis] + points[c, axis]) / 3.0
 
 
-@part
+@borrower
 def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -> None:
     """Fills in the foot of a corner, on the two sides that meet there."""
     x, y = out.centres[h // 3, 0], out.centres[h // 3, 1]
@@ -139,13 +140,13 @@ def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -
             out.feet[h, 0], out.feet[h, 1] = fx, fy
 
 
-@part
+@borrower
 def _away(out: Skeleton, h: int) -> float:
     """How far the foot of a corner is from its node."""
     return float(np.hypot(out.feet[h, 0] - out.centres[h // 3, 0], out.feet[h, 1] - out.centres[h // 3, 1]))
 
 
-@part
+@borrower
 def _centre(out: Skeleton, near: int, far: int) -> None:
     """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other."""
     t, short, long = near // 3, _away(out, near), _away(out, far)
@@ -156,7 +157,7 @@ def _centre(out: Skeleton, near: int, far: int) -> None:
         out.centres[t, 0], out.centres[t, 1] = out.centres[t, 0] - share * ax, out.centres[t, 1] - share * ay
 
 
-@part
+@borrower
 def _slope2(out: Skeleton, h: int) -> float:
     """Square of how fast the radius changes along the axis across side h: cosine of half the angle between its two ribs."""
     t, next_side = h // 3, after(h)

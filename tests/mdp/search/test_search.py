@@ -113,6 +113,12 @@ def test_one_part_that_is_asked_for_needs_no_search() -> None:
     assert whole.residual_area_mm2 == whole.risky_area_mm2 > 0
 
 
+def test_one_part_that_is_asked_for_costs_what_the_search_counts_for_the_uncut_model() -> None:
+    whole, searched = decompose(shapes.branch(), "shape", load(), parts=1).front[0], _decompose(shapes.branch()).front[0]
+    assert (whole.support_area_mm2, whole.cost_mm2) == (searched.support_area_mm2, searched.cost_mm2)
+    assert whole.support_area_mm2 > 0.0
+
+
 def test_no_feasible_cut_names_the_constraints_with_their_counts() -> None:
     decomposition = _decompose(shapes.tee(), "search.least_volume_share=0.9")
     assert len(decomposition.parts) == 1

@@ -1,0 +1,31 @@
+"""Parts that borrow their arrays: what they must not do would free an array twice or never, and nobody would see it."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+NUMBERS = {"None", "int", "float", "bool", "Segment"}
+NUMERIC = ("abs", "arccos", "arctan2", "ceil", "cos", "degrees", "floor", "hypot", "radians", "sin", "sqrt")
+
+
+def test_no_part_that_borrows_its_arrays_gives_one_back() -> None:
+    borrowers = _decorated("borrower")
+    assert len(borrowers) > 30
+    assert {ast.unparse(function.returns) for function in borrowers if function.returns} <= NUMBERS
+
+
+def test_parts_that_borrow_their_arrays_call_no_others_and_make_no_array() -> None:
+    borrowers = _decorated("borrower")
+    others = {function.name for kind in ("part", "vector_part", "kernel") for function in _decorated(kind)}
+    others -= {function.name for function in borrowers}
+    calls = {ast.unparse(node.func) for function in borrowers for node in ast.walk(function) if isinstance(node, ast.Call)}
+    assert calls & others == set()
+    assert {call for call in calls if call.startswith("np.")} <= {f"np.{name}" for name in NUMERIC}
+
+
+def _decorated(kind: str) -> list[ast.FunctionDef]:
+    """All functions of the packages with a decorator."""
+    paths = [path for package in ("mdp", "slicer", "machine") for path in (ROOT / package).rglob("*.py")]
+    nodes = [node for path in paths for node in ast.walk(ast.parse(path.read_text("utf-8")))]
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    return [function for function in functions if kind in map(ast.unparse, function.decorator_list)]
