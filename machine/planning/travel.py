@@ -59,12 +59,16 @@ def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile
     over = max(float(start[2]), min(float(start[2]) + lift, profile.machine.z.limits_mm[1]))
     if abs(over - float(tip.at_mm[2])) > STANDING_MM:
         yield from go(tip, [*tip.at_mm[:2], over], profile)
-    between = np.column_stack([path.approach.reshape(-1, 2) + shift[:2], np.full(len(path.approach), over)])
-    points = np.array([tip.at_mm, *between, [*start[:2], over]])
-    keep = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])
-    if keep.sum() > 1:
-        tip.at_mm = points[keep][-1]
-        yield Travel(points[keep], travel_speed(profile), travel_mm_s2(profile))
+    if len(path.approach):
+        between = np.column_stack([path.approach + shift[:2], np.full(len(path.approach), over)])
+        points = np.array([tip.at_mm, *between, [*start[:2], over]])
+        points = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])]
+    else:
+        points = np.array([tip.at_mm.tolist(), [*start[:2].tolist(), over]])
+        points = points if dist(*points.tolist()) > STANDING_MM else points[:1]
+    if len(points) > 1:
+        tip.at_mm = points[-1]
+        yield Travel(points, travel_speed(profile), travel_mm_s2(profile))
     yield from go(tip, list(start), profile)
     tip.at_mm = start
 

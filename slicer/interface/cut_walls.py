@@ -14,7 +14,7 @@ from slicer.fill.skin import uncovered_area
 from slicer.geometry.polygons import Polygons, close_loop, edges, offset
 from slicer.interface.model import Model
 from slicer.paths import Kind
-from slicer.travel.split import cut_line
+from slicer.travel.split import Sides, cut_line
 from slicer.walls.gap import gaps
 from slicer.walls.layer_walls import layer_walls
 from slicer.walls.walls import Walls, wall_rank, walls
@@ -72,10 +72,9 @@ def _is_closed(run: Floats) -> bool:
 
 def _within(loop: Floats, area: Polygons) -> list[Floats]:
     """What of a loop (n, 2) lies in an area, as open or closed polylines."""
-    sides = edges(area)
-    if not len(sides):
+    if area.is_empty():
         return []
-    sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]), kind="stable")]
+    sides = Sides.of(edges(area))
     points, within = cut_line(close_loop(loop), sides)
     if within.all():
         return [points]

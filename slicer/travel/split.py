@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,21 @@ from slicer.travel.order import Placed
 SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
 
 
+class Sides(NamedTuple):
+    """Sides (k, 4) of a place by rising least y; lows: (k,) that y; tallest: how far a side reaches along y at most."""
+
+    edges: Floats
+    lows: Floats
+    tallest: float
+
+    @classmethod
+    def of(cls, edges: Floats) -> "Sides":
+        """Those of (k, 4) edges in any order."""
+        lows = np.minimum(edges[:, 1], edges[:, 3])
+        order = np.argsort(lows, kind="stable")
+        return cls(edges[order], lows[order], float(np.abs(edges[:, 3] - edges[:, 1]).max(initial=0.0)))
+
+
 def split(
     placed: Sequence[Placed], area: Polygons, kinds: Sequence[Kind], shortest_mm: float, change: Callable[[Bead], Bead]
 ) -> list[Placed]:
@@ -29,15 +45,14 @@ def split(
     The pieces of a bead follow each other without a travel, only the first one keeps its approach. No piece is shorter than
     shortest_mm.
     """
-    sides = edges(area)
-    sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]), kind="stable")]
+    sides = Sides.of(edges(area))
     out: list[Placed] = []
     for bead in placed:
         out += _split_bead(bead, sides, shortest_mm, change) if bead.bead.kind in kinds else [bead]
     return out
 
 
-def _split_bead(placed: Placed, sides: Floats, shortest_mm: float, change: Callable[[Bead], Bead]) -> list[Placed]:
+def _split_bead(placed: Placed, sides: Sides, shortest_mm: float, change: Callable[[Bead], Bead]) -> list[Placed]:
     points, within = cut_line(np.ascontiguousarray(placed.points), sides)
     if not within.any():
         return [placed]
@@ -70,14 +85,12 @@ def _steady(within: NDArray[np.bool_], lengths: Floats, shortest_mm: float) -> N
     return within
 
 
-def cut_line(points: Floats, sides: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """The polyline (n, 2) with the places added where it crosses sides (k, 4; by rising least y), and which steps lie within."""
-    lows = np.minimum(sides[:, 1], sides[:, 3])
-    tallest = float(np.abs(sides[:, 3] - sides[:, 1]).max())
+def cut_line(points: Floats, sides: Sides) -> tuple[Floats, NDArray[np.bool_]]:
+    """The polyline (n, 2) with the places added where it crosses sides, and which steps lie within."""
     size, room = -1, 2 * len(points) + 64
     while size < 0:
         out, within = np.empty((room, 2)), np.empty(room, np.bool_)
-        size = _cut_into(points, sides, lows, tallest, out, within)
+        size = _cut_into(points, *sides, out, within)
         room *= 4
     return out[:size], within[: size - 1]
 

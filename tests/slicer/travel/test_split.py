@@ -14,7 +14,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, edges
 from slicer.paths import Kind
 from slicer.travel.order import Placed
-from slicer.travel.split import cut_line, split
+from slicer.travel.split import Sides, cut_line, split
 from tests.slicer.hand import as_shapely, ragged
 
 seeds = st.integers(0, 10**6)
@@ -66,8 +66,7 @@ def test_the_pieces_of_a_line_are_the_line_and_none_is_shorter_than_allowed(seed
 @settings(max_examples=40)
 @given(seeds)
 def test_every_step_of_a_cut_line_lies_within_or_without_as_its_middle_does(seed: int) -> None:
-    area, sides = as_shapely(ragged(seed)), edges(ragged(seed))
-    sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]))]
+    area, sides = as_shapely(ragged(seed)), Sides.of(edges(ragged(seed)))
     points, within = cut_line(walk(seed), sides)
     middles = 0.5 * (points[1:] + points[:-1])
     clear = shapely.distance(area.boundary, shapely.points(middles)) > 1e-6
