@@ -20,7 +20,7 @@ from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY
 from machine.planning.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 from machine.reader.parsed import ParsedProgram
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
@@ -109,7 +109,7 @@ def _bytes(lines: Sequence[str], at: NDArray[np.int64]) -> tuple[Floats, Floats]
     return np.where(first, sizes[at], 0.0), np.where(first, sums[at] - sizes[at] - sums[before], 0.0)
 
 
-@part
+@borrower
 def _run(now: float, planned: Planned, blocks: Blocks) -> None:
     """Begin and end what begins and ends until now."""
     state, span, entry2 = planned.state, planned.span, planned.entry2
@@ -132,7 +132,7 @@ def _run(now: float, planned: Planned, blocks: Blocks) -> None:
         span[0] = i
 
 
-@part
+@borrower
 def _wait_for_room(now: float, places: int, planned: Planned, blocks: Blocks) -> float:
     """The time from which on fewer than `places` blocks are planned."""
     state, span = planned.state, planned.span

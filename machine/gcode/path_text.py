@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 
 Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int64]
@@ -61,14 +61,14 @@ def _write(points: Whole, pushed: Whole, words: PathWords, known: Whole, text: B
     return at
 
 
-@part
+@borrower
 def _copy(what: Bytes, text: Bytes, at: int) -> int:
     for k in range(len(what)):
         text[at + k] = what[k]
     return at + len(what)
 
 
-@part
+@borrower
 def _word(letter: int, value: int, digits: int, text: Bytes, at: int) -> int:
     """A blank, a letter and a whole number with a point before its last digits; returns where the text goes on."""
     text[at], text[at + 1] = SPACE, letter

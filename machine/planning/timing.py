@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 from profiles.machine import Machine
 from slicer.estimate.duration import trapezoid_s
@@ -89,7 +89,7 @@ def blocks_of(
     return Blocks(direction, length[moving], cruise[moving], acceleration[moving], measure[moving], halts), moving
 
 
-@part
+@borrower
 def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float) -> float:
     """The greatest speed at a corner: no axis changes its speed by more than the junction speed; 0 where the measure changes."""
     if blocks.measure[before] != blocks.measure[after]:
@@ -102,7 +102,7 @@ def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float)
     return float(v)
 
 
-@part
+@borrower
 def block_time(blocks: Blocks, i: int, v0: float, v1: float) -> float:
     """Seconds of a block from one speed to another."""
     return trapezoid_s(blocks.length[i], blocks.cruise[i], blocks.acceleration[i], v0, v1)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from machine.gcode.modes import E_AXIS
 from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, LINE, ROW, Reader
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 
 Bytes = NDArray[np.uint8]
@@ -123,7 +123,7 @@ def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Flo
     return line, count
 
 
-@part
+@borrower
 def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], words: Floats) -> int:
     """How many words a plain move has, each what it stands for and its value; -1: the line is none."""
     while end > begin and (text[end - 1] == 32 or 9 <= text[end - 1] <= 13):

@@ -15,7 +15,7 @@ import numpy as np
 
 from mdp.cost.cost import CostTerms
 from mdp.kernels.arrays import floats, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
@@ -156,7 +156,7 @@ def _sum_left(surface: Faces, planes: Planes, classes: Classes) -> float:
     return total
 
 
-@part
+@borrower
 def weight_along(surface: Faces, classes: Classes, cut: int, face: int) -> float:
     """How many times a face counts that is risky along the normal of a cut."""
     source = surface.sources[face]
@@ -165,7 +165,7 @@ def weight_along(surface: Faces, classes: Classes, cut: int, face: int) -> float
     return surface.weight if classes[cut, source] == UNSUPPORTABLE else 1.0 if classes[cut, source] == NEEDS_SUPPORT else 0.0
 
 
-@part
+@borrower
 def along(points: Floats, row: int, directions: Floats, second_row: int) -> float:
     """Product of a row with a row of another array."""
     product: float = points[row, 0] * directions[second_row, 0] + points[row, 1] * directions[second_row, 1]
@@ -183,7 +183,7 @@ def find_heights(polygon: Floats, size: int, planes: Planes, cut: int, heights: 
     return lowest, highest
 
 
-@part
+@borrower
 def clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
     """Put into `below` what of a convex polygon lies below height 0; the number of its corners."""
     count = 0
@@ -201,7 +201,7 @@ def clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> in
     return count
 
 
-@part
+@borrower
 def flat_area_mm2(polygon: Floats, size: int, normals: Floats, face: int) -> float:
     """Area of a flat convex polygon with a known unit normal."""
     twice = 0.0
@@ -220,7 +220,7 @@ def rim_per_mm(cosine: float, feather: float) -> float:
     return float(weigh_chord(cosine, feather) / max(sine, LEAST_SINE))
 
 
-@part
+@borrower
 def find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> float:
     """Put the ends (2, 3) of a convex polygon's chord at height 0 into `ends`, first where its outline rises through it; its
     length, mm. The polygon reaches to both sides."""

@@ -28,7 +28,7 @@ from mdp.cost.forecast import (
     weight_along,
 )
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import inlined, kernel, part
+from mdp.kernels.kernel import borrower, inlined, kernel
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
 from mdp.support_need.patches import Classes
@@ -168,7 +168,7 @@ def _divide(surface: Faces, cuts: Cuts, room: Room, face: int, waiting: int, sum
     return waiting
 
 
-@part
+@borrower
 def _add_fan(room: Room, waiting: int, apex: Floats, cut: int) -> None:
     """Have the triangle of a chord and a point of its plane wait: it closes what remains below the plane."""
     room.fans[waiting], room.cuts[waiting] = cut, cut + 1
@@ -178,7 +178,7 @@ def _add_fan(room: Room, waiting: int, apex: Floats, cut: int) -> None:
         room.corners[3 * waiting + 2, axis] = room.ends[0, axis]
 
 
-@part
+@borrower
 def _signed(ends: Floats, directions: Floats, first: int, second: int) -> float:
     """Length of a chord along the line in which two planes meet, with the sign of its sense."""
     total = 0.0

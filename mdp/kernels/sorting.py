@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import longs
-from mdp.kernels.kernel import part
+from mdp.kernels.kernel import borrower, part
 
 
 @part
@@ -39,7 +39,7 @@ def sort_into_bins(low: NDArray[Any], high: NDArray[Any], bins: int) -> tuple[ND
     return first, items
 
 
-@part
+@borrower
 def rank(values: NDArray[Any], x: float, equal: bool) -> int:
     """How many of the rising values lie below x, those equal to it counted or not (binary search)."""
     low, high = 0, len(values)
@@ -52,7 +52,7 @@ def rank(values: NDArray[Any], x: float, equal: bool) -> int:
     return low
 
 
-@part
+@borrower
 def sort(values: NDArray[Any], begin: int, end: int) -> None:
     """Bring values[begin:end] into rising order, in place (Shell 1959)."""
     gap = (end - begin) // 2

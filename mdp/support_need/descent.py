@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.kernel import inlined, part
+from mdp.kernels.kernel import borrower, inlined, part
 from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import LinkedFaces
 
@@ -71,7 +71,7 @@ def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
     return LOOSE
 
 
-@part
+@borrower
 def corner_of(surface: LinkedFaces, f: int, v: int) -> int:
     """The corner of a face at a vertex."""
     return 0 if surface.faces[f, 0] == v else (1 if surface.faces[f, 1] == v else 2)
@@ -95,7 +95,7 @@ def _across(x: float, y: float, z: float, nx: float, ny: float, nz: float) -> tu
     return y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
 
 
-@part
+@borrower
 def _put(view: View, f: int, corner: int, share: float) -> float:
     """Go to a place on the edge that begins at a corner; its height."""
     a, b = view.surface.faces[f, corner], view.surface.faces[f, (corner + 1) % 3]
@@ -127,7 +127,7 @@ def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int,
     return way_out, min(max(share, 0.0), 1.0)
 
 
-@part
+@borrower
 def _lower_end(view: View, f: int, corner: int, share: float) -> int:
     """The vertex where water goes on: the end of an edge at which it is, or else the lower one; of a face with no way out its
     lowest corner."""
@@ -176,7 +176,7 @@ def _steepest(view: View, first: int, v: int) -> tuple[int, int]:
     return way, end
 
 
-@part
+@borrower
 def _slope(view: View, v: int, w: int) -> float:
     """How steep it goes down from one vertex to another."""
     length = 0.0
@@ -192,7 +192,7 @@ def _begins_within(view: View, f: int, corner: int) -> bool:
     return outflow(view, f, corner) <= ASIDE and outflow(view, f, before) <= ASIDE and view.surface.areas_mm2[f] > 0.0
 
 
-@part
+@borrower
 def _end_on_face(view: View, f: int, own: int) -> int:
     """What a way comes to that ends on a level face."""
     if view.cosines[f] > 0.0:
@@ -200,13 +200,13 @@ def _end_on_face(view: View, f: int, own: int) -> int:
     return int(view.number[f]) if _is_others(view, f, own) else LOOSE
 
 
-@part
+@borrower
 def _is_others(view: View, f: int, own: int) -> bool:
     """Whether a face belongs to another patch."""
     return bool(view.number[f] != SAFE and view.number[f] != own)
 
 
-@part
+@borrower
 def _end_at_vertex(view: View, first: int, v: int, own: int) -> int:
     """What a way comes to that ends at a vertex: a patch about it, or else the solid beneath a pit."""
     f, forward, pit = first, True, False

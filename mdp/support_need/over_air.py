@@ -11,7 +11,7 @@ import numpy as np
 
 from mdp.directions.frame import FramedDirections
 from mdp.kernels.arrays import floats, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Ints
 from mdp.support_need.patches import Classes
 from mdp.topology.linked_faces import LinkedFaces
@@ -76,7 +76,7 @@ def _no_counts(count: int) -> Counts:
     return Counts(floats(count, np.inf), floats(count, -np.inf), zeros[0], zeros[1], zeros[2], zeros[3])
 
 
-@part
+@borrower
 def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Counts) -> None:
     """How low and how high the flat places reach."""
     for f in range(len(faces)):
@@ -86,13 +86,13 @@ def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Counts) -> No
             counts.least[p], counts.most[p] = min(counts.least[p], z), max(counts.most[p], z)
 
 
-@part
+@borrower
 def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
     """Whether nothing in the cell of a place that looks up lies lower."""
     return bool(lowest[int(y) * (CELLS + 2) + int(x)] > z)
 
 
-@part
+@borrower
 def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: int, counts: Counts) -> None:
     """Look down from those places of a raster that lie on a face, one row after the other."""
     a, b, c = face[0], face[1], face[2]
@@ -118,7 +118,7 @@ def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: in
                 counts.airy[patch] += int(_is_airy(lowest, x, y, z - slack_mm))
 
 
-@part
+@borrower
 def _share_over_air(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> float:
     """The share of a small face over air, by its middle and places near its corners."""
     airy = 0
@@ -149,7 +149,7 @@ def _see(vertices: Floats, d: Floats, frame: Floats, seen: Floats) -> float:
     return cell
 
 
-@part
+@borrower
 def _lay(seen: Floats, face: Ints, least: float, most: float, lowest: Floats) -> None:
     """Lay a face into the cells that it touches of the grid of lowest surfaces, as high as its plane is at their middles, within
     the extent of its flat place."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mdp.directions.frame import FramedDirections
 from mdp.kernels.arrays import dot, floats, ints
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Ints
 from mdp.support_need.descent import SAFE, View
 from mdp.support_need.dips import UNSEEN, Pool, begins_in_air
@@ -78,7 +78,7 @@ def classify(begin_row: int, end_row: int, surface: LinkedFaces, along: FramedDi
                     out[row, f] = CARRIES_ITSELF
 
 
-@part
+@borrower
 def _find_risky(view: View, risky_below: float, risky: Ints) -> int:
     """List the faces that overhang and rest on nothing, UNNUMBERED, all others SAFE; how many there are."""
     faces, heights, cosines, number, many = view.surface.faces, view.heights, view.cosines, view.number, 0
@@ -97,7 +97,7 @@ def _find_risky(view: View, risky_below: float, risky: Ints) -> int:
     return many - resting
 
 
-@part
+@borrower
 def _find_patches(view: View, risky: Ints, patches: Patches) -> int:
     """Number all overhanging faces, those alike that hang together; how many patches there are."""
     neighbours, number, faces, own, size, at = view.surface.neighbours, view.number, patches.faces, 0, 0, 0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import part
+from mdp.kernels.kernel import borrower, part
 from mdp.mesh import Floats, Ints
 from mdp.support_need.descent import ANCHORED, LOOSE, SAFE, View, corner_of, descend, outflow
 from mdp.support_need.spans import Sides
@@ -31,7 +31,7 @@ class Patches(NamedTuple):
     waiting: Ints
 
 
-@part
+@borrower
 def is_rim(neighbours: Ints, number: Ints, f: int, corner: int) -> bool:
     """Whether a patch ends at the edge of its face that begins at a corner."""
     g = neighbours[f, corner]
@@ -123,7 +123,7 @@ def _share(view: View, f: int, corner: int, k: int, samples: int) -> float:
     return min(max(k / (samples - 1), inside), 1.0 - inside)
 
 
-@part
+@borrower
 def rests(faces: Ints, heights: Floats, f: int, base_mm: float) -> bool:
     """Whether all of a face lies on the base."""
     return bool(max(heights[faces[f, 0]], heights[faces[f, 1]], heights[faces[f, 2]]) <= base_mm)

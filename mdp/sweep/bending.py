@@ -14,7 +14,7 @@ import numpy as np
 
 from mdp.directions.frame import frame_across
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.plane import Plane
 from mdp.sweep.components import UNKNOWN
@@ -98,7 +98,7 @@ def _measure(faces: Ints, heights: Floats, across: Floats, shells: Ints) -> tupl
     return volumes, section
 
 
-@part
+@borrower
 def _volume(faces: Ints, f: int, heights: Floats, across: Floats) -> float:
     """What a face adds to the volume above the plane: its area seen along the normal times the heights of what lies above."""
     total, alone, above = 0.0, 0.0, 0
@@ -146,7 +146,7 @@ def _find_pieces(section: Section, volumes: Floats) -> None:
         shells[k] = holders[shells[k]]
 
 
-@part
+@borrower
 def _find_holder(section: Section, volumes: Floats, areas: Floats, around: Ints, own: int) -> int:
     """The shell of positive volume and least area whose outline runs around the middle of a segment. around: zeros, (n,)."""
     segments, shells = section
@@ -187,7 +187,7 @@ def greatest_stress_per_moment(edges: Floats) -> float:
     return greatest if len(edges) > 0 else np.inf
 
 
-@part
+@borrower
 def add_edge(edge: Floats, moments: Floats) -> None:
     """Add what an edge, x, y, x, y, has of a section's MOMENTS."""
     p, q, r, s = edge[0], edge[1], edge[2], edge[3]
@@ -200,7 +200,7 @@ def add_edge(edge: Floats, moments: Floats) -> None:
     moments[XY] += (p * s + 2.0 * p * q + 2.0 * r * s + r * q) * twice / 24.0
 
 
-@part
+@borrower
 def stress_per_moment(moments: Floats, x: float, y: float) -> float:
     """|J^-1 p| of a point p of a section, 1/mm3; infinite where the section has no second moments."""
     area = moments[AREA]

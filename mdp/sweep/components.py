@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import int_table, ints
-from mdp.kernels.kernel import inlined, part
+from mdp.kernels.kernel import borrower, inlined, part
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.overhang import PLATFORM_TOLERANCE_MM
@@ -56,7 +56,7 @@ class MergeTree(NamedTuple):
     up: bool
 
 
-@part
+@borrower
 def find_critical(cosines: Floats, flatness: Floats, heights: Floats, rings: Rings, critical: Ints) -> int:
     """Vertices that are not regular, or have no single ring of neighbours; returns how many. cosines: of vertex normals and d."""
     starts, neighbours = rings.starts, rings.neighbours
@@ -89,7 +89,7 @@ def grow_tree(view: View, rings: Rings, up: bool) -> MergeTree:
     return MergeTree(heights, rings, view.critical, ints(len(heights), -1), ints(len(heights), 0), up)
 
 
-@part
+@borrower
 def find_leaf(tree: MergeTree, v: int) -> int:
     """The leaf of a vertex; labels all vertices on the way. The vertices that are leaves are labelled already."""
     heights, starts, neighbours = tree.heights, tree.rings.starts, tree.rings.neighbours
@@ -194,7 +194,7 @@ def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
     return columns
 
 
-@part
+@borrower
 def _stands_on(tree: MergeTree, v: int, vertices: Floats) -> bool:
     """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
     starts, neighbours = tree.rings.starts, tree.rings.neighbours

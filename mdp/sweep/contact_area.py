@@ -9,7 +9,7 @@ single piece stands on the whole section.
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import part
+from mdp.kernels.kernel import borrower, part
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.sweep.components import (
@@ -113,7 +113,7 @@ def _count_several(begun: Ints, ended: Ints, wanted: Ints) -> Ints:
     return several
 
 
-@part
+@borrower
 def _section(points: Floats, face: tuple[int, int, int], grid: OffsetGrid, column: int, ends: Floats) -> float:
     """A face's share of the area within the section's outline: half the triangle of its crossing segment and the origin."""
     (i, j, k), heights, d = face, grid.heights, grid.direction

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, ints, longs, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
@@ -213,7 +213,7 @@ def _flatness(vertices: Floats, faces: Ints, normals: Floats, vertex_normals: Fl
     return flat
 
 
-@part
+@borrower
 def _altitude(p: Floats, q: Floats, r: Floats) -> float:
     """Least altitude of a triangle."""
     ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import inlined, kernel, part
+from mdp.kernels.kernel import borrower, inlined, kernel, part
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 
@@ -72,7 +72,7 @@ def _enters(tree: TriangleTree, node: int, origin: Floats, inverse: Floats, reac
     return meets
 
 
-@part
+@borrower
 def _distance(p: Floats, q: Floats, r: Floats, origin: Floats, ray: Floats) -> float:
     """Distance along the ray to a triangle (Moeller and Trumbore, edges included), infinite for a miss."""
     e1x, e1y, e1z = q[0] - p[0], q[1] - p[1], q[2] - p[2]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import flags, floats, longs
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats
 from slicer.geometry.clip import Border, Indices, Pieces
@@ -175,7 +175,7 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
     return runs
 
 
-@part
+@borrower
 def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: _Border) -> int:
     """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
 
@@ -201,7 +201,7 @@ def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border:
     return n + 1
 
 
-@part
+@borrower
 def _append_piece(out: Floats, n: int, pieces: _Pieces, end: int) -> int:
     """Appends the points of a piece, beginning at one of its ends; returns the new n."""
     first, last = pieces.bounds[end // 2], pieces.bounds[end // 2 + 1] - 1

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import longs
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.kernels.sorting import sort_into_bins
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, contours, edges_of
@@ -146,7 +146,7 @@ def free(cells: Cells, segment: Segment) -> bool:
     return True
 
 
-@part
+@borrower
 def within(cells: Cells, x: float, y: float) -> bool:
     """Whether a point lies in the polygons: the edges that a ray to the right crosses, each counted in one cell."""
     grid = cells.grid

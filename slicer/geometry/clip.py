@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats, longs
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.kernels.sorting import sort_into_bins
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, contours, edges_of
@@ -116,7 +116,7 @@ def _touched(bands: _Bands, y0: float, y1: float) -> tuple[int, int]:
     return min(max(first, 0), bands.number - 1), min(last, bands.number - 1)
 
 
-@part
+@borrower
 def _crossing(segment: Segment, side: Segment) -> float:
     """Where (0..1) a segment crosses an edge; -1 where it does not, which is most often seen by x alone."""
     if max(side.x0, side.x1) < min(segment.x0, segment.x1) or min(side.x0, side.x1) > max(segment.x0, segment.x1):

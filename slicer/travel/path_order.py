@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, longs, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats
 
 REACH = 200  # exchanges reach so far along the order, less far in an order of more than a thousand paths
@@ -113,7 +113,7 @@ def _reversed_ends(sequence: _Sequence, k: int) -> tuple[float, float, float, fl
     return ends[k, 2], ends[k, 3], ends[k, 0], ends[k, 1]
 
 
-@part
+@borrower
 def _mirror(sequence: _Sequence, i: int, j: int) -> None:
     """The paths i..j in reverse order, each as it runs."""
     order, flips, fixed, ends, _, _ = sequence
@@ -195,7 +195,7 @@ def _move_neighbours(sequence: _Sequence, reach: int) -> float:
     return gained
 
 
-@part
+@borrower
 def _rotate(sequence: _Sequence, i: int, last: int, to: int) -> None:
     """Paths i..last put behind path `to`, all as they run: what lies on both sides of a place changes sides."""
     low, high = (i, to) if to > last else (to + 1, last)

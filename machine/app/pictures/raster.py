@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Ints, Mesh
 
 Image = NDArray[np.uint8]
@@ -177,7 +177,7 @@ def z_buffer(screen: Floats, width: int, height: int) -> tuple[Floats, Ints]:
     return depth, face
 
 
-@part
+@borrower
 def _lit_share(shadow: Floats, x: float, y: float, d: float, bias: float) -> float:
     """Share of the shadow map's texels around a point that see it: percentage-closer filtering over 5 x 5 texels."""
     column, row = int(x), int(y)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats
 
 NOTHING = -1e9
@@ -130,7 +130,7 @@ def tops(bars: Bars, lattice: Lattice) -> Floats:
     return top
 
 
-@part
+@borrower
 def _leaves_end(x: float, y: float, up: Floats, half: float, height: float) -> float:
     """Height at which an upright line leaves the round end of a bar: a cylinder below the end of its top, seen from there.
 
