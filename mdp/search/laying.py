@@ -5,15 +5,14 @@ search, and the most promising one by the whole search: that takes as long as th
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, inf
 
 from mdp.cost.cost import weight_of_stairs
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.mesh import Mesh
-from mdp.pedestal import on_pedestal
-from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
+from mdp.search.coarse import as_it_is, coarse_copy
 from mdp.search.front import EQUAL, Price, Pricing, Worth, front_row, price_row
 from mdp.search.parts import one_piece
 from mdp.search.problem import Problem
@@ -48,31 +47,22 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
 
     search: the whole search of a mesh; pricing: what parts take to print by a profile.
     """
-    copy = coarse_copy(mesh, profile, NO_ZONES)
-    if copy is not None:
-        return _as_copy(mesh, profile, pricing(profile), lay_down(copy, as_it_is(profile), pricing, search), search)
     worth, upright = Worth.of(profile), search(mesh)
     best = Lying(None, upright, total_mm2(upright.chosen, worth), upright.chosen)
     limit_mm2 = min(CLEARLY * best.total_mm2, best.total_mm2 - profile.search.turning_mm2)
-    glimpses = _glimpses(mesh, profile, pricing)
-    promising = _most_promising(glimpses, profile, limit_mm2)
+    copy = coarse_copy(mesh, profile, NO_ZONES)
+    looked_at, quick = (mesh, profile) if copy is None else (copy, as_it_is(profile))
+    glimpses = _glimpses(looked_at, quick, pricing)
+    promising = _most_promising(glimpses, quick, limit_mm2)
     if promising is None and len(upright.parts) > 1:
         limit_mm2 = ALIKE * best.total_mm2
-        promising = _whole(glimpses, profile, pricing, limit_mm2)
+        promising = _whole(glimpses, quick, pricing, limit_mm2)
     if promising is None:
         return best
-    decomposition = search(promising.mesh)
+    decomposition = search(promising.mesh if copy is None else standing_still(mesh, promising.orientation.rotation))
     lying = Lying(promising.orientation, decomposition, total_mm2(decomposition.chosen, worth), upright.chosen)
     fewer = len(decomposition.parts) < len(upright.parts) or limit_mm2 < best.total_mm2
     return lying if fewer and lying.total_mm2 < limit_mm2 else best
-
-
-def _as_copy(mesh: Mesh, profile: Profile, price: Pricing, copy: Lying, search: Callable[[Mesh], Decomposition]) -> Lying:
-    """A mesh laid down and cut as its coarse copy."""
-    turned = mesh if copy.orientation is None else standing_still(mesh, copy.orientation.rotation)
-    problem = Problem(on_pedestal(turned, profile.search.pedestal_mm), profile)
-    decomposition = cut_as_copy(problem, copy.decomposition, price) or search(turned)
-    return replace(copy, decomposition=decomposition, total_mm2=total_mm2(decomposition.chosen, Worth.of(profile)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,17 +1,18 @@
 """Coarse copy: a finely meshed model is searched on a copy near to it, cut itself, and costs about what its own search finds."""
 
-from functools import partial
-
 import manifold3d as m3
 import numpy as np
 import pytest
 import trimesh
 
+from mdp.cut import mesh_of, solid_of
+from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.by_hand import Refusal, cut_near, cut_or_refuse
 from mdp.search.coarse import coarse_copy
+from mdp.search.front import Price
 from mdp.search.laying import lay_down
 from mdp.search.problem import Problem
 from mdp.search.search import decompose
@@ -100,11 +101,18 @@ def test_a_model_on_a_pedestal_is_cut_above_it(fine: Mesh) -> None:
     assert len(found.parts) == 2
 
 
-def test_the_model_itself_is_laid_down_as_its_copy(fine: Mesh) -> None:
-    profile = _profile(2000)
-    lying = lay_down(fine, profile, lambda profile: lambda parts: None, partial(decompose, name="shape", profile=profile))
-    assert len(lying.decomposition.mesh.faces) == len(fine.faces)
-    assert lying.decomposition.mesh.volume_mm3 == pytest.approx(fine.volume_mm3, rel=1e-9)
+def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itself() -> None:
+    mesh, profile, searched = mesh_of(solid_of(shapes.tee()).refine(20)), _profile(2000), []
+
+    def search(mesh: Mesh) -> Decomposition:
+        searched.append(mesh)
+        return decompose(mesh, "tee", profile, price=lambda parts: Price(100.0, 1000.0))
+
+    lying = lay_down(mesh, profile, lambda profile: lambda parts: Price(100.0, 1000.0), search)
+    assert lying.orientation is not None
+    assert searched[0] is mesh
+    assert [len(mesh.faces) for mesh in searched] == 2 * [len(mesh.faces)]
+    assert lying.decomposition.mesh is searched[1]
 
 
 def test_a_plane_that_leaves_a_sliver_is_moved_to_the_nearest_that_cuts() -> None:
