@@ -118,3 +118,10 @@ def inside(edges: Floats, x: float, y: float) -> bool:
         if level_crossing(edge(edges, e), y) > x:
             odd = not odd
     return odd
+
+
+def near_height(segments: Floats, z_mm: float, reach_mm: float) -> Floats:
+    """Those of (n, 6) segments in space that come nearer than that to a height."""
+    off = segments[:, [2, 5]] - z_mm
+    near: Floats = segments[(off.min(axis=1) < reach_mm) & (off.max(axis=1) > -reach_mm)]
+    return near

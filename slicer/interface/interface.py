@@ -11,6 +11,7 @@ from profiles.process import Process
 from slicer.bead import Bead, outer_wall_width_mm
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, offset, union
+from slicer.geometry.segments import near_height
 from slicer.paths import Kind
 from slicer.sections import Sections
 from slicer.travel.islands import OUTSIDE
@@ -96,8 +97,7 @@ def skin_beside(edges: Floats, section: Polygons, z_mm: float, process: Process)
 
 def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
     """What of the plane at a height lies about as near as that to segments (n, 6) in space."""
-    low, high = np.minimum(edges[:, 2], edges[:, 5]) - z_mm, np.maximum(edges[:, 2], edges[:, 5]) - z_mm
-    near = edges[(low < reach_mm) & (high > -reach_mm)]
+    near = near_height(edges, z_mm, reach_mm)
     if not len(near):
         return Polygons()
     rise = near[:, 5] - near[:, 2]

@@ -17,7 +17,7 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.geometry.polygons import start_at
-from slicer.geometry.segments import Segment, nearest_share, squared_distance_in_space
+from slicer.geometry.segments import Segment, near_height, nearest_share, squared_distance_in_space
 from slicer.paths import Kind
 from slicer.walls.corner import corner_strength
 from slicer.walls.lead import SAMPLE_MM, begin_with_room, lead_in
@@ -111,8 +111,8 @@ class SeamLimits(NamedTuple):
 
 def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Process) -> SeamLimits:
     """Those of (n, 6) interface edges that lie within reach of a layer, and (k, 6) where a person wants no seam in it."""
-    keep_mm, z = process.interface_seam_mm, interfaces[:, [2, 5]] - z_mm
-    near = interfaces[(z.min(axis=1) < keep_mm) & (z.max(axis=1) > -keep_mm)]
+    keep_mm = process.interface_seam_mm
+    near = near_height(interfaces, z_mm, keep_mm)
     distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(unwanted)])
     return SeamLimits(np.concatenate([near, unwanted]), float(z_mm), distances_mm)
 

@@ -115,6 +115,12 @@ def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itse
     assert lying.decomposition.mesh is searched[1]
 
 
+def test_a_search_that_is_recorded_is_one_of_the_model_itself(fine: Mesh) -> None:
+    records = list[bytes]()
+    decompose(fine, "shape", _profile(2000), on_record=records.append)
+    assert len(records) == 1
+
+
 def test_a_plane_that_leaves_a_sliver_is_moved_to_the_nearest_that_cuts() -> None:
     problem = Problem(shapes.tee(), _profile(0))
     flush = Plane(np.array([1.0, 0.0, 0.0]), 19.8)
