@@ -8,17 +8,16 @@ usually takes (measured: tools/RESULTS.md), so systems without fork slice part a
 
 import os
 import signal
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import active_children, get_all_start_methods, get_context
 from multiprocessing.sharedctypes import RawArray
-from threading import Thread
 from typing import Any
 
 from mdp.decomposition import Part
+from mdp.kernels.processes import end_with
 from profiles.profile import Profile
 from slicer.finish.vase import check_vase
 from slicer.interface.pins import plan_pins
@@ -111,14 +110,7 @@ def _inherit(planned: Planned, counts: Any, parent: int) -> None:
     global _job
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C reaches the whole group: end without a word, the parent speaks
     _job = planned, counts
-    Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: int) -> None:
-    """End this process as soon as its parent is gone, whatever ended that: SIGTERM and SIGKILL leave it no time to say so."""
-    while os.getppid() == parent:
-        time.sleep(LOOK_S)
-    os._exit(1)
+    end_with(parent)
 
 
 def _slice_forked(k: int) -> SlicedPart:

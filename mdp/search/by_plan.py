@@ -10,7 +10,7 @@ from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
 from mdp.plans.plan_file import PlanFile, PlannedRow, planned_row
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
-from mdp.search.front import BY_PLAN, Pricing, front_row, pays, price_row
+from mdp.search.front import BY_PLAN, Pricing, front_row, pays, price_rows
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.problem import Problem
 from mdp.search.search import check_part_count, fewer_parts
@@ -79,13 +79,11 @@ def _priced(
 ) -> list[FrontRow]:
     """The rows of a plan's front with their prices, those that cannot be cut again as they are."""
     planned = {len(row.parts) + 1: row.parts for row in plan.front}
-    priced = []
-    for row, good in zip(rows, pays(rows), strict=True):
+    parts: dict[int, Sequence[Part]] = {}
+    for place, (row, good) in enumerate(zip(rows, pays(rows), strict=True)):
         with suppress(PlanError):
             if row.chosen:
-                row = price_row(row, chosen_parts, price)
+                parts[place] = chosen_parts
             elif good:
-                node = cut_by_hand(problem, replace(plan, parts=planned[row.parts]))
-                row = price_row(row, make_parts(problem, node), price)
-        priced.append(row)
-    return priced
+                parts[place] = make_parts(problem, cut_by_hand(problem, replace(plan, parts=planned[row.parts])))
+    return price_rows(rows, parts, price)

@@ -1,11 +1,13 @@
 """Front: the best decomposition for every number of parts that one search has met, and which of them to take."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 
 from mdp.cost.model_need import excess_mm2
 from mdp.decomposition import FrontRow, Part
+from mdp.kernels.processes import side_by_side
 from mdp.search.node import Node
 from profiles.profile import Profile
 
@@ -92,8 +94,18 @@ def _plain_mm2(node: Node) -> float:
 
 def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:
     """A row with what its parts take to print, as it is where that is not known."""
-    known = price(parts)
-    return row if known is None else replace(row, time_s=known.time_s, filament_mm=known.filament_mm)
+    return _with_price(row, price(parts))
+
+
+def price_rows(rows: Sequence[FrontRow], parts: Mapping[int, Sequence[Part]], price: Pricing) -> list[FrontRow]:
+    """Rows with what their parts take to print. parts: of the places of rows that get a price."""
+    prices = side_by_side([partial(price, of_row) for of_row in parts.values()])
+    known = dict(zip(parts, prices, strict=True))
+    return [_with_price(row, known.get(place)) for place, row in enumerate(rows)]
+
+
+def _with_price(row: FrontRow, price: Price | None) -> FrontRow:
+    return row if price is None else replace(row, time_s=price.time_s, filament_mm=price.filament_mm)
 
 
 def pays(rows: Sequence[FrontRow]) -> list[bool]:

@@ -6,11 +6,13 @@ search, and the most promising one by the whole search: that takes as long as th
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, inf
 
 from mdp.cost.cost import weight_of_stairs
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
+from mdp.kernels.processes import side_by_side
 from mdp.mesh import Mesh
 from mdp.search.coarse import as_it_is, coarse_copy
 from mdp.search.front import EQUAL, Price, Pricing, Worth, front_row, price_row
@@ -80,9 +82,10 @@ def _glimpses(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[_Glimpse
     """The first orientations in which a model can be printed, the one that costs least in one piece first."""
     worth, stair_mm2 = Worth.of(profile), weight_of_stairs(profile)
     scar_mm2, glimpses = _scar_mm2(worth), []
-    for orientation in distinct_orientations(mesh, profile)[:PRICED]:
-        turned = standing_still(mesh, orientation.rotation)
-        bare = _price_bare(turned, profile, pricing)
+    orientations = distinct_orientations(mesh, profile)[:PRICED]
+    meshes = [standing_still(mesh, orientation.rotation) for orientation in orientations]
+    prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
+    for orientation, turned, bare in zip(orientations, meshes, prices, strict=True):
         if bare is not None:
             bare_mm2 = worth.of_print(bare.time_s, bare.filament_mm)
             whole_mm2 = bare_mm2 + scar_mm2 * orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2

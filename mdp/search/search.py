@@ -25,7 +25,7 @@ from mdp.ranking.record import Trace
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
-from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row
+from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
 from mdp.search.node import Node
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.polish import make_regular, polish
@@ -121,8 +121,7 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
     nodes, parts_of = front.nodes, cache(partial(make_parts, problem))
     rows = [front_row(node) for node in nodes]
     if price is not None:
-        pairs = zip(rows, nodes, pays(rows), strict=True)
-        rows = [price_row(row, parts_of(node), price) if good else row for row, node, good in pairs]
+        rows = price_rows(rows, {place: parts_of(nodes[place]) for place, good in enumerate(pays(rows)) if good}, price)
     choice = choose(rows, problem.worth, problem.settings.most_longer)
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
