@@ -1,5 +1,7 @@
 """Support beads: outlines, sparse lines that stand on each other, dense lines next to the part."""
 
+from collections.abc import Sequence
+
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
@@ -35,21 +37,24 @@ def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: 
     rest = inner if roof.is_empty() else opening(inner - roof, 0.25 * width)
     density = process.support_foot_density if first else process.support_density
     beads += [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in _sparse(rest, density, process, spacing)]
-    lines = _lines(roof, process.infill_angle_deg + 90.0, process.support_interface_density, process, spacing)
+    lines = _lines(roof, [process.infill_angle_deg + 90.0], process.support_interface_density, process, spacing)
     return beads + [Bead(Kind.SUPPORT_INTERFACE, line, width, OUTSIDE) for line in lines]
 
 
 def _sparse(area: Polygons, density: float, process: Process, spacing: float) -> list[Floats]:
     angle = process.infill_angle_deg
     if process.support_pattern == "lines":
-        return _lines(area, angle, density, process, spacing)
-    return [line for turn in (0.0, 90.0) for line in _lines(area, angle + turn, 0.5 * density, process, spacing)]
+        return _lines(area, [angle], density, process, spacing)
+    return _lines(area, [angle, angle + 90.0], 0.5 * density, process, spacing)
 
 
-def _lines(area: Polygons, angle_deg: float, density: float, process: Process, spacing: float) -> list[Floats]:
-    """Zigzags; where no line meets the area its outline, unless it has one already."""
+def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process: Process, spacing: float) -> list[Floats]:
+    """Zigzags along each angle; where none meets the area its outline, unless it has one already."""
     width = process.line_width_mm
     apart = spacing / density
     inner = offset(area, -0.5 * width)
-    lines = zigzag_lines(inner, offset(area, -0.25 * width), angle_deg, apart, JOIN * apart) if not inner.is_empty() else []
+    if inner.is_empty():
+        return []
+    joined = offset(area, -0.25 * width)
+    lines = [line for angle_deg in angles_deg for line in zigzag_lines(inner, joined, angle_deg, apart, JOIN * apart)]
     return lines if lines or process.support_walls else [close_loop(loop) for loop in contours(inner)]

@@ -94,3 +94,10 @@ def test_every_bead_of_support_lies_in_its_place_and_the_dense_ones_in_theirs() 
 def test_sparse_lines_leave_cells_of_their_distance(pattern: str, cell: float) -> None:
     process = profile(f"process.support_pattern={pattern}", "process.support_density=0.2").process
     assert support_cell_mm(process) == pytest.approx(cell * spacing_mm(process.line_width_mm, 0.2) / 0.2)
+
+
+def test_a_place_too_small_for_a_grid_gets_its_outline_once() -> None:
+    process = profile("process.support_pattern=grid", "process.support_walls=0", "process.support_density=0.1").process
+    place = Polygons.square((1.0, 1.0)).translate((0.5, 0.5)).rotate(-process.infill_angle_deg)
+    (bead,) = support_beads(place, Polygons(), process, 0.2, False)
+    assert bead.length_mm == pytest.approx(4.0 * (1.0 - process.line_width_mm))
