@@ -160,7 +160,7 @@ class Search(Frozen):
     simplify_faces: int = Field(
         20000,
         ge=0,
-        description="a model of more faces is searched on a copy that has fewer and lies within a layer of it, and "
+        description="a model of more faces is searched on a copy that has fewer and lies within 1.5 layers of it, and "
         "cut by the planes that were found; 0: never",
     )
     most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")

@@ -1,8 +1,8 @@
 """Coarse copy: a finely meshed model is searched on a copy with fewer faces, and only the planes that are chosen cut it itself.
 
-Whatever the search weighs is many layers wide, and the copy's surface lies within a layer of the model's, nearly all of it
-within half of one. What the parts need, weigh and take is worked out on the model itself; the rows of the front that are not
-taken stay those of the copy.
+Whatever the search weighs is many layers wide, and the copy's surface lies within a layer of the model's or, where many faces are
+left, within one and a half, nearly all of it within half of one. What the parts need, weigh and take is worked out on the model
+itself; the rows of the front that are not taken stay those of the copy.
 """
 
 from dataclasses import replace
@@ -21,25 +21,26 @@ from mdp.sweep.deviation import distances_mm
 from mdp.zone import Zone, Zones
 from profiles.profile import Profile
 
-OFF_LAYERS = 1.0  # how far the copy's surface may lie from the model's, in layers
 WORTH = 0.7  # share of the faces above which a copy saves too little
-TOLERANCES = 0.25, 0.125, 0.0625  # of simplifying, as shares of that: one face after another moves the surface by more than one
+# How far simplifying may go, and how far the copy's surface may lie from the model's then, in layers: one face after another
+# moves the surface by more than the tolerance. The first goes for copies that keep half as many faces as a model may have.
+COARSEST, *FINER = (0.5, 1.5), (0.25, 1.0), (0.125, 1.0), (0.0625, 1.0)
 
 
 def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
-    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than a layer; None where the
-    mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
-    search = profile.search.effective
+    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than one layer and a half; None where
+    the mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
+    search, layer_mm = profile.search.effective, profile.process.layer_height_mm
     fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
     marked = any(not isinstance(zone, Zone) for zone in (*zones.keep, *zones.no_seam, *zones.no_support))
     if not fine or marked:
         return None
-    most_mm = OFF_LAYERS * profile.process.layer_height_mm
-    for share in TOLERANCES:
-        copy = simplify(mesh, share * most_mm)
+    for tolerance, off in (COARSEST, *FINER):
+        copy = simplify(mesh, tolerance * layer_mm)
         if len(copy.faces) >= WORTH * len(mesh.faces):
             break
-        if distances_mm(copy, mesh.vertices, most_mm).max() < most_mm:
+        few = tolerance == COARSEST[0] and len(copy.faces) < search.simplify_faces / 2
+        if not few and distances_mm(copy, mesh.vertices, off * layer_mm).max() < off * layer_mm:
             return copy
     return None
 

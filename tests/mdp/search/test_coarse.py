@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mdp.cut import mesh_of, solid_of
+from mdp.cut import mesh_of, simplify, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
@@ -51,6 +51,14 @@ def test_the_copy_has_fewer_faces_and_lies_within_a_layer(fine: Mesh) -> None:
     assert max(_farthest_mm(fine, copy), _farthest_mm(copy, fine)) < LAYER_MM
 
 
+def test_the_coarsest_copy_is_one_that_keeps_half_the_faces_a_model_may_have(fine: Mesh) -> None:
+    least = len(simplify(fine, 0.5 * LAYER_MM).faces)
+    few, many = (coarse_copy(fine, _profile(most), NO_ZONES) for most in (2 * least + 2, 2 * least - 2))
+    assert few is not None
+    assert many is not None
+    assert len(many.faces) == least < len(few.faces)
+
+
 def _farthest_mm(one: Mesh, other: Mesh) -> float:
     """How far a hundred vertices of a mesh lie from another mesh, at most."""
     triangles, places = other.vertices[other.faces], one.vertices[:: len(one.vertices) // 100]
@@ -78,7 +86,7 @@ def test_a_copy_that_spares_few_faces_is_not_used() -> None:
 
 
 def test_the_model_itself_is_cut_for_about_the_cost_that_its_own_search_finds(fine: Mesh) -> None:
-    copied, itself = (decompose(fine, "shape", _profile(faces)) for faces in (2000, 0))
+    copied, itself = (decompose(fine, "shape", _profile(faces)) for faces in (10000, 0))
     assert len(copied.parts) == len(itself.parts) == 2
     assert copied.mesh is fine
     assert sum(part.volume_mm3 for part in copied.parts) == pytest.approx(fine.volume_mm3, rel=1e-9)
