@@ -75,11 +75,9 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     sections, process = supports.sections, supports.sections.process
     rear, edges = rear_of(sections.mesh.bounds_mm), interface_edges(sections)
     unwanted = no_seam_segments(sections.part, sections.mesh, sections.heights.cut_mm)
-    heights_mm = sections.heights.cut_mm.tolist()
-    planned = [NO_SEAMS] * len(heights_mm)
-    if process.seam == "aligned" and process.walls:
-        limits = [seam_limits(edges, zone, z_mm, process) for zone, z_mm in zip(unwanted, heights_mm, strict=True)]
-        planned = plan_seams(sections, limits)
+    limits = [seam_limits(edges, zone, z_mm, process) for zone, z_mm in zip(unwanted, sections.heights.cut_mm, strict=True)]
+    aligned = process.seam == "aligned" and process.walls > 0
+    planned = plan_seams(sections, limits) if aligned else [NO_SEAMS] * len(limits)
     layers: list[Layer] = []
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = rear, np.zeros((0, 2)), 0, len(sections.outlines)
@@ -90,7 +88,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
             last = i
         elif process.walls and (i in sections.too_thin or not sections.own[i].is_empty()):
             bare.append(i)
-        around = Surroundings(rear, seams, tip, edges, heights_mm[i], i, unwanted[i], planned[i])
+        around = Surroundings(rear, seams, tip, limits[i], i, planned[i])
         beads, seams = place_seams([*own, *auxiliary], process, around)
         skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
         layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers else None, skin)

@@ -31,25 +31,33 @@ NO_CORNER = (0.0, 0.0)  # no corner is worth a way
 FOLLOW_MM, FOLLOW = 2.0, 0.3  # a planned place so near to the seam below draws it by this share of the way: the line is smooth
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
 FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
-NO_EDGES, NO_SEAMS = np.zeros((0, 6)), np.zeros((0, 2))
+NO_SEAMS = np.zeros((0, 2))
+
+
+class SeamLimits(NamedTuple):
+    """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
+
+    edges: Floats
+    z: float
+    keep_mm: Floats
+
+
+NO_LIMITS = SeamLimits(np.zeros((0, 6)), 0.0, np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
     """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
 
-    tip: (2,) where the nozzle comes from. interfaces: (n, 6) segments of their edges, z_mm: the layer's middle. layer: number.
-    unwanted: (k, 6) segments at z_mm, within a line width of which a person wants no seam. planned: (m, 2) where seams are hidden
+    tip: (2,) where the nozzle comes from. limits: what they keep clear of. layer: number. planned: (m, 2) where seams are hidden
     best, of use to aligned ones.
     """
 
     rear: Floats
     before: Floats
     tip: Floats
-    interfaces: Floats
-    z_mm: float
+    limits: SeamLimits
     layer: int
-    unwanted: Floats = field(default_factory=lambda: NO_EDGES)
     planned: Floats = field(default_factory=lambda: NO_SEAMS)
 
 
@@ -66,7 +74,6 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
     beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
     inside instead, over its inner walls, and so does one on which a person wants no seam anywhere.
     """
-    interfaces = seam_limits(around.interfaces, around.unwanted, around.z_mm, process)
     seams: dict[int, Floats] = {}
     out = list(beads)
     for kind in WALLS:
@@ -76,9 +83,9 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
                 loop = np.ascontiguousarray(bead.points)
                 lead_mm = 0.0
                 if kind is Kind.INNER_WALL:
-                    loop, _ = _start_at_best(loop, _beside(loop, known), interfaces._replace(edges=NO_EDGES, keep_mm=np.zeros(0)))
+                    loop, _ = _start_at_best(loop, _beside(loop, known), NO_LIMITS)
                 else:
-                    loop, free = _start_at_best(loop, _target(loop, process, around), interfaces)
+                    loop, free = _start_at_best(loop, _target(loop, process, around), around.limits)
                     lead_mm = 0.0 if free else bead.width_mm
                     loop = loop if free else begin_with_room(loop, lead_mm)
                     seams[k] = loop[0]
@@ -99,14 +106,6 @@ class _Target(NamedTuple):
     y: float
     inner_mm: float
     outer_mm: float
-
-
-class SeamLimits(NamedTuple):
-    """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
-
-    edges: Floats
-    z: float
-    keep_mm: Floats
 
 
 def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Process) -> SeamLimits:

@@ -15,7 +15,7 @@ from profiles.process import Process
 from slicer.bead import Bead, length_mm
 from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import slice_part
-from slicer.walls.seam import Surroundings, place_seams, rear_of
+from slicer.walls.seam import Surroundings, place_seams, rear_of, seam_limits
 from tests.shapes import box, branch, standing
 from tests.slicer.hand import BARE, cut, profile, shared, whole
 
@@ -30,7 +30,8 @@ def process(seam: str, **more: float) -> Process:
 
 def around(before: Any = NONE, tip: Sequence[float] = (0.0, 0.0), interfaces: Any = None, layer: int = 0) -> Surroundings:
     edges = np.zeros((0, 6)) if interfaces is None else np.array(interfaces, dtype=float)
-    return Surroundings(np.array([5.0, 30.0]), np.array(before, dtype=float), np.array(tip), edges, 0.1, layer)
+    limits = seam_limits(edges, np.zeros((0, 6)), 0.1, process("rear"))
+    return Surroundings(np.array([5.0, 30.0]), np.array(before, dtype=float), np.array(tip), limits, layer)
 
 
 def seam_of(loop: Floats, rule: str, **surroundings: Any) -> tuple[float, float]:
