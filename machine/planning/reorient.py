@@ -8,6 +8,7 @@ cradle and print, swept: between two poses that are tried each direction's reach
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil, hypot, inf, radians
 
 import numpy as np
@@ -17,6 +18,7 @@ from machine.planning.park_position import obstacle_top_mm
 from machine.planning.timing import move_times
 from mdp.directions.spread import spread
 from mdp.head import bodies, directions
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.errors import MoveError
@@ -82,15 +84,38 @@ class Sweep:
         Along a direction d that leans upward the gap grows with Z, so each direction gives a least Z of its own.
         every: only so many of the short turns are looked at, which gives a lower bound.
         """
-        need = max(self.machine.lift_mm, self.machine.clearance_mm)
-        across, up = self.tried[:, :2] @ np.array([x, y]), self.tried[:, 2]
-        highest = -inf
-        with np.errstate(divide="ignore", invalid="ignore"):
-            for body in bodies(self.machine):
-                missing = self.reach[::every] + need - (body.least(self.tried) + across)
-                z = np.where(up > 1e-9, missing / up, np.where(missing <= 0.0, -inf, inf))
-                highest = max(highest, float(z.min(axis=-1).max()))
-        return highest
+        need_mm = max(self.machine.lift_mm, self.machine.clearance_mm)
+        least_mm = self._least_mm + self.tried[:, :2] @ np.array([x, y])
+        return float(_least_z(self.reach, every, need_mm, least_mm, np.ascontiguousarray(self.tried[:, 2])))
+
+    @cached_property
+    def _least_mm(self) -> Floats:
+        """(b, k) how far each body of the head reaches against each direction, the tip at X0 Y0 Z0."""
+        return np.array([body.least(self.tried) for body in bodies(self.machine)])
+
+
+@kernel
+def _least_z(reach: Floats, every: int, need_mm: float, least_mm: Floats, up: Floats) -> float:
+    """The greatest Z that a body, a solid and a short turn ask for, each of them the least over all directions; a direction that
+    asks for no more than is known already settles them."""
+    highest, first = -inf, 0
+    for body in range(len(least_mm)):
+        for p in range(0, len(reach), every):
+            for s in range(reach.shape[1]):
+                least, at = inf, first
+                for k in range(-1, len(up)):
+                    d = first if k < 0 else k
+                    missing = reach[p, s, d] + need_mm - least_mm[body, d]
+                    if up[d] > 1e-9:
+                        z = missing / up[d]
+                    else:
+                        z = -inf if missing <= 0.0 else inf
+                    if z < least:
+                        least, at = z, d
+                    if least <= highest:
+                        break
+                highest, first = max(highest, least), at
+    return highest
 
 
 def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> Sweep:

@@ -4,11 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from machine.kinematics.collision import hull
 from machine.kinematics.table import machine_points
-from machine.planning.reorient import Speeds, Turn, poses_between, route, stands, way_s
-from mdp.head import corners
+from machine.planning.reorient import Speeds, Sweep, Turn, poses_between, route, stands, way_s
+from mdp.head import bodies, corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.machine import CradleBox, Machine
@@ -124,3 +126,19 @@ def test_a_machine_too_low_for_every_stand_says_how_high_it_would_need_to_be() -
     low = low.model_copy(update={"z": machine.z.model_copy(update={"limits_mm": (-80.0, 52.0)})})
     with pytest.raises(MoveError, match=r"part 2: turning the table to A60.000 C50.000 needs the tip at Z \d+\.\d mm"):
         route(_turn_of(low, None), 2, hull(PRINT, 0.0), low, SPEEDS)
+
+
+@given(st.integers(0, 10**6), st.sampled_from((1, 3)), st.floats(-80.0, 80.0), st.floats(-80.0, 80.0))
+@settings(max_examples=30)
+def test_the_least_height_is_that_of_all_directions_bodies_and_turns(seed: int, every: int, x: float, y: float) -> None:
+    machine, rng = _machine("cradle"), np.random.default_rng(seed)
+    tried = np.column_stack([rng.uniform(-1.0, 1.0, (9, 2)), rng.choice([0.0, 0.5, 1.0], 9)])
+    reach = rng.uniform(-40.0, 40.0, (7, 2, 9))
+    heights = []
+    for body in bodies(machine):
+        for short_turn in reach[::every]:
+            for solid in short_turn:
+                missing = solid + max(machine.lift_mm, machine.clearance_mm) - body.least(tried) - tried[:, :2] @ [x, y]
+                level = [-np.inf if gap <= 0.0 else np.inf for gap in missing]
+                heights.append(min(gap / up if up else flat for gap, up, flat in zip(missing, tried[:, 2], level, strict=True)))
+    assert Sweep(machine, tried, reach).least_z(x, y, every) == pytest.approx(max(heights))
