@@ -106,10 +106,8 @@ def _least_z(reach: Floats, every: int, need_mm: float, least_mm: Floats, up: Fl
                 for k in range(-1, len(up)):
                     d = first if k < 0 else k
                     missing = reach[p, s, d] + need_mm - least_mm[body, d]
-                    if up[d] > 1e-9:
-                        z = missing / up[d]
-                    else:
-                        z = -inf if missing <= 0.0 else inf
+                    level = -inf if missing <= 0.0 else inf
+                    z = missing / up[d] if up[d] > 1e-9 else level
                     if z < least:
                         least, at = z, d
                     if least <= highest:
