@@ -7,6 +7,7 @@ the machine does; where the workpiece's points are at a pose is in machine.kinem
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import atan2, ceil, cos, degrees, floor, hypot, radians, sin
 
@@ -18,6 +19,7 @@ from profiles.axes import RotaryAxis
 from profiles.machine import Machine
 
 SINGULAR = 1e-7  # sine of an angle that no table can show; nearer to the singular pose the turn is not defined
+KNOWN = 256  # rotations
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,15 @@ def unit(vector: object) -> Floats:
 
 def axis_rotation(axis: RotaryAxis, value_deg: float) -> Floats:
     """(3, 3) rotation of the table by one axis at a value."""
-    return about(unit(axis.axis), radians(-axis.sign * (value_deg - axis.zero_deg)))
+    return _about(tuple(axis.axis), radians(-axis.sign * (value_deg - axis.zero_deg)))
+
+
+@lru_cache(maxsize=KNOWN)
+def _about(axis: tuple[float, ...], angle_rad: float) -> Floats:
+    """The same about an axis of any length; everything that turns asks for it at one pose after the other."""
+    turned = about(unit(axis), angle_rad)
+    turned.flags.writeable = False
+    return turned
 
 
 def rotation(machine: Machine, pose: Pose) -> Floats:
