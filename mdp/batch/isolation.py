@@ -47,18 +47,20 @@ class Isolation:
         if process is None:
             process = self._of_thread.process = _Process()
             self._processes.append(process)
-        for attempt in range(retries + 1):
+        attempts = 0
+        while not self._ended:
             try:
                 return process.call(task, arguments, limit_s)
             except KilledError as error:
-                if self._ended or attempt == retries:
-                    raise KilledError(f"{error}, {attempt + 1} times" if attempt else str(error)) from None
-        raise AssertionError("retries is negative")
+                attempts += 1
+                if attempts > retries:
+                    raise KilledError(f"{error}, {attempts} times" if retries else str(error)) from None
+        raise KilledError("it was ended with all others")
 
     def end(self) -> None:
         """Kill all processes, whatever they do."""
         self._ended = True
-        for process in self._processes:
+        for process in list(self._processes):  # a thread may add its own meanwhile, and looks then whether all have ended
             process.end()
 
 
@@ -98,6 +100,7 @@ class _Process:
         self._idle.cancel()
         if self._child is not None:
             self._child.kill()
+            self._child.wait()
 
     def _running(self) -> "subprocess.Popen[bytes]":
         if self._child is None or self._child.poll() is not None:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol, TypeVar
@@ -39,10 +38,11 @@ class Workers:
 
 
 class Pool(Protocol):
-    """Futures of calls, as concurrent.futures and dask have them. check raises BatchError when there will be no more results."""
+    """Futures of calls, as concurrent.futures and dask have them; lost: what to raise when no more of them will have a result."""
 
     def submit(self, call: Call, number: int) -> Any: ...
-    def check(self) -> None: ...
+    def is_there(self) -> bool: ...
+    def lost(self) -> BatchError: ...
 
 
 @contextmanager
@@ -79,20 +79,22 @@ class Queue:
             try:
                 future = done.get(timeout=POLL_S)
             except Empty:
-                self._pool.check()
+                if not self._pool.is_there():
+                    raise self._pool.lost() from None
                 continue
             yield futures.pop(future), self._outcome(future)
 
     def _outcome(self, future: Any) -> Any:
         """What a call returned, or the CallError that it came to."""
         if future.cancelled():
-            self._pool.check()
+            raise self._pool.lost()
         try:
             return future.result()
         except CallError as error:
             return error
         except Exception as error:  # noqa: BLE001 - whatever a cluster says of what it could not do
-            self._pool.check()
+            if not self._pool.is_there():
+                raise self._pool.lost() from None
             return CallError(f"its workers were lost ({type(error).__name__})")
 
 
@@ -103,8 +105,11 @@ class _Cores:
     def submit(self, call: Call, number: int) -> Any:
         return self._executor.submit(self._isolation.call, *call)
 
-    def check(self) -> None:
-        pass
+    def is_there(self) -> bool:
+        return True
+
+    def lost(self) -> BatchError:
+        return BatchError("the work was stopped")
 
 
 @contextmanager
@@ -117,15 +122,12 @@ def _on_cores(count: int) -> Iterator[_Cores]:
         executor.shutdown(cancel_futures=True)
 
 
-@cache
-def _isolation_here() -> Isolation:
-    """That of a dask worker, for all its threads."""
-    return Isolation()
+_on_worker = Isolation()  # of all threads of a dask worker
 
 
 def call_on_worker(*call: Any) -> Any:
     """In a dask worker: what a call returns."""
-    return _isolation_here().call(*call)
+    return _on_worker.call(*call)
 
 
 class _Cluster:
@@ -135,9 +137,11 @@ class _Cluster:
     def submit(self, call: Call, number: int) -> Any:
         return self._client.submit(call_on_worker, *call, pure=False, priority=-number)
 
-    def check(self) -> None:
-        if self._client.status != "running":
-            raise BatchError(f"scheduler {self._address}: is gone; started again, the work goes on where it stopped")
+    def is_there(self) -> bool:
+        return bool(self._client.status == "running")
+
+    def lost(self) -> BatchError:
+        return BatchError(f"scheduler {self._address}: is gone; started again, the work goes on where it stopped")
 
 
 @contextmanager

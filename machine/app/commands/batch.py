@@ -101,7 +101,8 @@ def _rows_that_hold(table: Path, files: Mapping[str, Path], job: Job) -> dict[st
         _delete_files(job.out, earlier[name])
     done = sum(name in rows for name in files)
     if done:
-        say(f"{done} of {len(files)} models have been done before: going on with the others")
+        others = ": going on with the others" if done < len(files) else ""
+        say(f"{done} of {len(files)} models have been done before{others}")
     return rows
 
 
