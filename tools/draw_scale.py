@@ -33,6 +33,7 @@ PANELS = (
     Panel("export by a plan, by parts", "parts", "parts", "core s"),
     Panel("export in one part, by layers", "layer mm", "layers", "core s"),
     Panel("export in one part, by lines", "layer mm", "lines", "core s"),
+    Panel("export in one part, by lines", "layer mm", "lines", "memory MB"),
 )
 COLUMNS = 3
 

@@ -159,7 +159,7 @@ def batch(
     search: options.SearchOptions,
     given: options.ModelProfileOptions,
 ) -> int:
-    """Do the same with every model of a folder, on all cores or many machines. Started again it goes on where it stopped."""
+    """Export every model of a folder, on all cores or many machines. Or decompose or estimate them; started again it goes on."""
     from machine.app.commands.batch import batch
     from machine.app.requests import BatchRequest
     from mdp.batch.pool import Workers
