@@ -35,6 +35,8 @@ from mdp.ranking.ranker import ranker_named
 from profiles.errors import BatchError
 
 LOCK = "batch.lock"
+NO_FILES = "estimate"  # makes none
+CLASH = "{} would have the files of {}: another name is expected"
 REASONS = 5  # of the most common ones, told at the end
 NUMBER = re.compile(r"\d+([.,]\d+)*")
 
@@ -50,7 +52,9 @@ def batch(request: BatchRequest) -> int:
     job, table = job_of(request.do, request.asked, request.out.resolve()), request.out / f"{request.do}.csv"
     with writing_alone(request.out, LOCK):
         check_writable(table)
-        rows = _rows_that_hold(table, files, job)
+        clashes = {} if request.do == NO_FILES else same_files(files)
+        rows = _rows_that_hold(table, {name: file for name, file in files.items() if name not in clashes}, job)
+        rows |= {name: Row(name, REFUSED, sentence=CLASH.format(name, first)) for name, first in clashes.items()}
         write_rows(table, Row, _in_order(rows))
         try:
             _work_off(request, job, files, rows, table)
@@ -96,7 +100,9 @@ def _delete_files(out: Path, row: Row) -> None:
 def _rows_that_hold(table: Path, files: Mapping[str, Path], job: Job) -> dict[str, Row]:
     """The rows of earlier runs that need not be done again, those of models that are gone included."""
     earlier = {row.model: row for row in read_rows(table, Row)}
-    rows = {name: row for name, row in earlier.items() if name not in files or is_current(row, files[name], job)}
+    stems = {_stem(name) for name in files}
+    gone = {name for name, row in earlier.items() if name not in files and not (row.files and _stem(name) in stems)}
+    rows = {name: row for name, row in earlier.items() if name in gone or (name in files and is_current(row, files[name], job))}
     for name in earlier.keys() - rows.keys():
         _delete_files(job.out, earlier[name])
     done = sum(name in rows for name in files)
@@ -108,16 +114,7 @@ def _rows_that_hold(table: Path, files: Mapping[str, Path], job: Job) -> dict[st
 
 def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: dict[str, Row], table: Path) -> None:
     """Add the missing rows, to the table at once."""
-
-    def add(row: Row) -> None:
-        append_row(table, row)
-        rows[row.model] = row
-
     calls = {name: (file, job) for name, file in files.items() if name not in rows}
-    if request.do != "estimate":
-        for name, first in same_files([*rows, *calls]).items():
-            if calls.pop(name, None) is not None:
-                add(Row(name, REFUSED, sentence=f"{name} would have the files of {first}: another name is expected"))
     if not calls:
         return
     if request.workers.scheduler is None:
@@ -127,7 +124,8 @@ def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: 
         for name, result in queue.completed(row_of, calls, progress.tick):
             if isinstance(result, CallError):
                 result = Row(name, FAILED, sentence=plain_line(f"{name}: {result}"), inputs=inputs_of(files[name], job))
-            add(result)
+            append_row(table, result)
+            rows[name] = result
             progress.show(in_words(result), result.status != DONE)
 
 
@@ -138,9 +136,14 @@ def in_words(row: Row) -> str:
 
 
 def same_files(names: Iterable[str]) -> dict[str, str]:
-    """The models whose files would be those of another one, by the name of that; case does not count on some systems."""
+    """The models whose files would be those of another one, by the name of that."""
     firsts: dict[str, str] = {}
-    return {name: first for name in sorted(names) if (first := firsts.setdefault(Path(name).stem.casefold(), name)) != name}
+    return {name: first for name in sorted(names) if (first := firsts.setdefault(_stem(name), name)) != name}
+
+
+def _stem(name: str) -> str:
+    """What tells the files of a model from those of others; case does not count on some systems."""
+    return Path(name).stem.casefold()
 
 
 def _compile(job: Job) -> None:

@@ -126,8 +126,21 @@ def children_of(pid: int) -> list[Path]:
     return [Path("/proc") / child for thread in threads for child in thread.read_text().split()]
 
 
-def test_two_models_of_one_name_do_not_write_over_each_other() -> None:
+def test_two_models_of_one_name_do_not_write_over_each_other(tmp_path: Path) -> None:
     assert same_files(["b.stl", "a.stl", "A.obj", "a.ply"]) == {"a.ply": "A.obj", "a.stl": "A.obj"}
+    folder, out = models(tmp_path / "models", tee=shapes.tee()), tmp_path / "out"
+    command = ["batch", str(folder), "-o", str(out), *FAST]
+    assert main(command) == 0
+    (folder / "tee.ply").write_text("no mesh")
+    assert main(command) == 1
+    assert {name: row["sentence"].partition(":")[0] for name, row in rows_of(out / "export.csv").items()} == {
+        "tee.ply": "tee.ply",
+        "tee.stl": "tee.stl would have the files of tee.ply",
+    }
+    assert not (out / "tee.gcode").exists()
+    (folder / "tee.ply").unlink()
+    assert main(command) == 0
+    assert (out / "tee.gcode").exists()
 
 
 def test_reasons_are_counted_whatever_models_and_numbers_they_name(tmp_path: Path) -> None:
