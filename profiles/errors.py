@@ -6,6 +6,7 @@ UserError                         message (one sentence: thing, value, what is a
   DecompositionError              mdp: an invariant of the decomposition cannot be met
   PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why
   RankerError                     mdp: an .onnx file that is no ranker, a ranker that is not known
+  BatchError                      mdp/batch: a scheduler that cannot be reached, a table or folder that cannot be gone on with
   LearningError                   mdp/learning: records, a checkpoint or a ranker that cannot be learnt from or judged
   SliceError                      slicer: a setting that cannot be sliced with
   MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
@@ -64,6 +65,10 @@ class PlanError(UserError):
 
 class RankerError(UserError):
     """A ranker that does not exist or cannot be used; the message names it and says why."""
+
+
+class BatchError(UserError):
+    """Many calls that cannot begin or go on; the message names the scheduler, the worker, the folder or the table."""
 
 
 class LearningError(UserError):

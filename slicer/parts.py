@@ -17,6 +17,7 @@ from multiprocessing.sharedctypes import RawArray
 from typing import Any
 
 from mdp.decomposition import Part
+from mdp.kernels import threads
 from mdp.kernels.processes import end_with
 from profiles.profile import Profile
 from slicer.finish.vase import check_vase
@@ -84,8 +85,7 @@ def slice_parts(
 def _process_count(parts: int, layers: int) -> int:
     if parts < 2 or layers < FEWEST_LAYERS or "fork" not in get_all_start_methods():
         return 1
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(parts, cores)
+    return min(parts, threads.THREADS)
 
 
 def _slice_in_turn(planned: Planned, expected: Sequence[int], on_progress: OnProgress | None) -> tuple[SlicedPart, ...]:

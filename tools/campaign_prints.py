@@ -19,6 +19,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from mdp.batch.isolation import CallError
+from mdp.batch.pool import Workers, connected
 from tools.campaign_planted import plant_all, planted_table
 from tools.campaign_run import PRINTED, Limits, run_print, tiltprint
 from tools.campaign_runs import Run, all_runs
@@ -106,14 +108,12 @@ def worked_off(
     given: argparse.Namespace, task: Callable[..., dict[str, Any] | None], calls: dict[str, tuple[Any, ...]]
 ) -> Iterator[dict[str, Any]]:
     """The record of every call as it is done, on a cluster; what is too late has none, and what failed is told."""
-    from mdp.learning.collection.cluster import Workers, completed, connected
-
     if not calls:
         return
-    with connected(Workers(given.scheduler, given.workers, 0)) as client:
-        for name, record in completed(client, task, calls, 0, lambda: None):
-            if isinstance(record, BaseException):
-                print(f"{name}: the campaign itself failed: {type(record).__name__}: {record}", flush=True)
+    with connected(Workers(given.scheduler, given.workers, 0)) as queue:
+        for name, record in queue.completed(task, calls, lambda: None):
+            if isinstance(record, CallError):
+                print(f"{name}: the campaign itself failed: {record}", flush=True)
             elif record is not None:
                 yield record
 

@@ -1,4 +1,4 @@
-"""The command line of models: decompose, export, simulate, view, edit. Heavy imports stay inside the commands."""
+"""The command line of models: decompose, export, simulate, view, edit, batch. Heavy imports stay inside the commands."""
 
 from collections.abc import Callable
 from os.path import exists  # pathlib's raises for a name that is too long
@@ -137,6 +137,38 @@ def edit(
     return edit(EditRequest(given.profile(), names, model, port, not no_browser, upload_mib))
 
 
+def batch(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", show_default=False, help="folder of models")],
+    *,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="folder for DO.csv, a row a model, and what is made")],
+    do: Annotated[
+        str, typer.Option("--do", metavar="decompose|export|estimate", help="what to make of each; estimate: the row alone")
+    ] = "export",
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="dask scheduler whose workers do it, as tcp://HOST:8786")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="processes here; else one a core")
+    ] = None,
+    retries: Annotated[
+        int, typer.Option("--retries", metavar="N", min=0, max=100, help="how often a model that was killed is tried again")
+    ] = 2,
+    limit_s: Annotated[
+        float | None, typer.Option("--limit-s", metavar="SECONDS", min=1.0, help="a model that takes longer is given up")
+    ] = None,
+    search: options.SearchOptions,
+    given: options.ModelProfileOptions,
+) -> int:
+    """Export every model of a folder, on all cores or many machines. Or decompose or estimate them; started again it goes on."""
+    from machine.app.commands.batch import batch
+    from machine.app.requests import BatchRequest
+    from mdp.batch.pool import Workers
+    from mdp.kernels.threads import THREADS
+
+    asked = options.model_request("", search, given, cuts=Cuts(parts=search.parts))
+    return batch(BatchRequest(folder, out, do, asked, Workers(scheduler, workers or THREADS, retries, limit_s)))
+
+
 COMMANDS: dict[str, Callable[..., int]] = {
-    command.__name__: with_option_groups(command) for command in (decompose, export, simulate, view, edit)
+    command.__name__: with_option_groups(command) for command in (decompose, export, simulate, view, edit, batch)
 }

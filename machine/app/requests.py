@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from machine.planning.stops import Stop
+    from mdp.batch.pool import Workers
     from profiles.profile import Profile
 
 STDOUT = Path("-")  # stands for standard output where a file is asked for
@@ -80,6 +81,18 @@ class ModelRequest:
     def is_gcode(self) -> bool:
         """Whether the file holds G-code, by its name."""
         return Path(self.model).suffix.lower() in GCODE_SUFFIXES
+
+
+@dataclass(frozen=True)
+class BatchRequest:
+    """Every model of a folder. do: decompose, export or estimate; asked: what of each, its model is not named yet; out: folder
+    for the table and the files; workers: where they run."""
+
+    folder: Path
+    out: Path
+    do: str
+    asked: ModelRequest
+    workers: "Workers"
 
 
 @dataclass(frozen=True)

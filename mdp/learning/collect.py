@@ -13,9 +13,13 @@ from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
+from mdp.batch.isolation import CallError
+from mdp.batch.pool import Workers, connected
+from mdp.batch.progress import Progress
+from mdp.batch.rows import append_row, writing_alone
 from mdp.kernels.threads import THREADS
 from mdp.learning import command
-from mdp.learning.collection.index import FAILED, Row, Search, append_row, read_index, unfinished, write_index, writing_alone
+from mdp.learning.collection.index import FAILED, INDEX, LOCK, Row, Search, read_index, unfinished, write_index
 from mdp.learning.collection.models import model_files, name_of
 from mdp.learning.collection.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
@@ -41,7 +45,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=THREADS, metavar="N", help="processes on this machine, one core each")
     parser.add_argument("--only", default="", metavar="TEXT", help="only models whose name has this in it")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th model by name")
-    parser.add_argument("--retries", type=int, default=2, metavar="N", help="how often a search that crashed is tried again")
+    parser.add_argument("--retries", type=int, default=2, metavar="N", help="how often a search that was killed is tried again")
     parser.add_argument("--time-limit", type=float, metavar="S", help="a search ends after this time with what it has")
     for kind, usual in DEFAULTS.items():
         parser.add_argument(f"--{kind}", default=usual, metavar="NAME|FILE", help=f"profile; default {usual}")
@@ -68,7 +72,7 @@ def collect(arguments: Sequence[str] | None) -> None:
         settings.profile(terms)  # a wrong one is told before anything begins
     files = {name_of(file): file.resolve() for file in model_files(options.folder, options.only, options.every)}
     wanted = [Search(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
-    with writing_alone(options.out):
+    with writing_alone(options.out, LOCK):
         rows = _rows(options.out, settings)
         missing = unfinished(options.out, rows.values(), wanted)
         rows = {search: row for search, row in rows.items() if search not in set(missing)}
@@ -95,21 +99,18 @@ def _rows(out: Path, settings: Settings) -> dict[Search, Row]:
 
 def _run(options: argparse.Namespace, settings: Settings, files: dict[Search, Path], rows: dict[Search, Row]) -> None:
     """Search, and write each record and line as soon as it is there."""
-    from mdp.learning.collection.cluster import Workers, completed, connected
-    from mdp.learning.collection.progress import Progress
-
     calls = {search: (search, file, settings) for search, file in files.items()}
-    workers = Workers(options.scheduler, options.workers, options.retries)
-    with connected(workers) as client, Progress(len(calls)) as progress:
-        for search, result in completed(client, run, calls, options.retries, progress.tick):
-            if isinstance(result, BaseException):
-                reason = f"{FAILED}{type(result).__name__}: {result}".splitlines()[0]
+    workers = Workers(options.scheduler, options.workers, options.retries, folders=(options.folder.resolve(),))
+    with connected(workers) as queue, Progress(len(calls), "searches") as progress:
+        for search, result in queue.completed(run, calls, progress.tick):
+            if isinstance(result, CallError):
+                reason = f"{FAILED}{result}".splitlines()[0]
                 result = Result(Row(search.id, search.orientation, search.terms, settings.in_words, excluded=reason))
             if result.record:
                 _write(options.out / search.file, result.record)
-            append_row(options.out, result.row)
+            append_row(options.out / INDEX, result.row)
             rows[search] = result.row
-            progress.show(result.row)
+            progress.show(f"{search.file.removesuffix('.npz')}: {result.row.in_words}", result.row.excluded.startswith(FAILED))
 
 
 def _write(path: Path, content: bytes) -> None:

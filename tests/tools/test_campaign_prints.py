@@ -108,9 +108,7 @@ def test_a_model_that_cannot_be_read_is_refused_with_its_sentence(tmp_path: Path
     assert (record["outcome"], "is not an STL file" in record["sentence"]) == (REFUSED, True)
 
 
-@pytest.mark.train
 def test_a_campaign_that_is_started_again_runs_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("distributed")
     out = tmp_path / "out"
     for count in ("1", "2", "2"):
         monkeypatch.setattr("sys.argv", ["campaign", str(out), "--forms", "12", "--varied-share", "0", "--sample", count])

@@ -3,12 +3,13 @@
 from pathlib import Path
 
 from machine.app.file_roles import check_model_files
-from machine.app.output import check_outputs, delete, make_folder, write_bytes, write_json
+from machine.app.output import check_outputs, write_bytes, write_json
 from machine.app.pictures.front_picture import front_picture
 from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import write_png
 from machine.app.pipeline import compilers
 from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+from machine.app.pipeline.parts_folder import PLAN, save_parts
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import STDOUT, ModelRequest, Outputs
 from machine.app.terminal.advice import advice
@@ -18,10 +19,8 @@ from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
 from mdp.joint import joints_of
 from mdp.plans.writing import plan_text
-from mdp.save import FOLDER_FILES, HEADING, PART_FILES, glb, json_values, part_file, stl, threemf
+from mdp.save import json_values
 from profiles.profile import Profile
-
-MODEL, FIGURES, PLAN, SCENE = FOLDER_FILES
 
 
 def decompose(request: ModelRequest) -> int:
@@ -38,13 +37,7 @@ def decompose(request: ModelRequest) -> int:
     if alternatives:
         figures |= {"compare": alternatives_json(alternatives)}
     if outputs.folder is not None:
-        make_folder(outputs.folder)
-        for part in decomposition.parts:
-            write_bytes(outputs.folder / part_file(part.index), stl(part.mesh))
-        _drop_earlier_parts(outputs.folder, len(decomposition.parts))
-        write_bytes(outputs.folder / MODEL, threemf(decomposition))
-        write_bytes(outputs.folder / SCENE, glb(decomposition))
-        write_json(outputs.folder / FIGURES, figures)
+        save_parts(outputs.folder, decomposition, figures)
     for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
         if file is not None and not _is_same(file, request.cuts.plan):
             write_bytes(file, plan_text(decomposed.plan).encode())
@@ -58,14 +51,6 @@ def decompose(request: ModelRequest) -> int:
         comparison = compare_table(alternatives) if alternatives else ""
         show(tables + joints_table(joints) + part_settings_lines(profile) + advice(decomposition, profile) + comparison)
     return 0
-
-
-def _drop_earlier_parts(folder: Path, parts: int) -> None:
-    """Delete the parts that an earlier run has left beside the new ones; files of other programs stay."""
-    now = {part_file(index) for index in range(1, parts + 1)}
-    for file in folder.glob(PART_FILES):
-        if file.name not in now and file.is_file() and file.open("rb").read(len(HEADING)) == HEADING:
-            delete(file)
 
 
 def _is_same(file: Path, plan: Path | None) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
+from machine.dryrun.dryrun import DryRun
 from machine.program import Alternative, Program, joints_of_print
 from machine.quantities import duration, filament_g
 from mdp.cost.cost import weight_of_stairs
@@ -95,8 +96,6 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
     """A way with what its program comes to."""
     run = program.run
     filament_mm = float(np.max(run.program.filament_mm, initial=0.0))
-    supports = [number for number, kind in enumerate(run.program.types) if kind in SUPPORT]
-    support_mm3 = float(run.segment_mm3[np.isin(run.program.type[run.segment_row], supports)].sum())
     seam_mm, stairs_mm2 = 0.0, 0.0
     if program.decomposition is not None:
         seam_mm, stairs_mm2 = program.decomposition.seam_mm, _stairs_mm2(program.decomposition, profile)
@@ -105,7 +104,7 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
         time_s=run.time_s,
         filament_mm=filament_mm,
         filament_g=filament_g(filament_mm, profile.material),
-        support_mm3=support_mm3,
+        support_mm3=support_mm3(run),
         risky_mm2=max(way.risky_mm2, 0.0),
         message=run.errors[0].message if run.errors else "",
         unsupported_mm2=sum(area.mm2 for area in run.program.unsupported),
@@ -114,6 +113,12 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
         interface_mm3=program.interface_mm3,
         findings=len(run.findings),
     )
+
+
+def support_mm3(run: DryRun) -> float:
+    """The plastic that a program lays as support."""
+    supports = [number for number, kind in enumerate(run.program.types) if kind in SUPPORT]
+    return float(run.segment_mm3[np.isin(run.program.type[run.segment_row], supports)].sum())
 
 
 def _stairs_mm2(decomposition: Decomposition, profile: Profile) -> float:

@@ -7,7 +7,6 @@ from time import process_time
 
 import numpy as np
 
-from mdp.kernels.threads import use_threads
 from mdp.learning.collection.index import FAILED, NO_CUT, NO_RISK, Row, Search
 from mdp.learning.collection.models import coarser, oriented, read_model
 from mdp.search.search import decompose
@@ -55,8 +54,7 @@ class Result:
 
 
 def run(search: Search, path: Path, settings: Settings) -> Result:
-    """Search one model on one core; what is wrong with the model becomes a line, a bug is raised."""
-    use_threads(1)
+    """Search one model; what is wrong with the model becomes a line, a bug is raised."""
     row, began = Row(search.id, search.orientation, search.terms, settings.in_words), process_time()
     try:
         profile = settings.profile(search.terms)

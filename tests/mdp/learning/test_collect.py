@@ -14,7 +14,6 @@ from mdp.formats.readers import READERS
 from mdp.learning.collect import main
 from mdp.learning.collection.index import INDEX, read_index
 from mdp.mesh import Mesh
-from profiles.errors import LearningError
 from tests import shapes
 
 QUICK = ("--terms", "paper", "--beam-width", "3")
@@ -27,11 +26,9 @@ def _models(folder: Path, **meshes: Mesh) -> Path:
     return folder
 
 
-@pytest.mark.train
 def test_what_is_done_is_not_done_again_and_what_is_missing_comes_out_the_same_on_fewer_workers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    pytest.importorskip("distributed")
     models, out = _models(tmp_path / "models", tee=shapes.tee(), flat=shapes.box()), tmp_path / "out"
     (models / "broken.stl").write_text("no mesh")
     assert main([str(models), "-o", str(out), *QUICK, "--orientations", "2", "--workers", "2"]) == 0
@@ -50,60 +47,7 @@ def test_what_is_done_is_not_done_again_and_what_is_missing_comes_out_the_same_o
     assert again["tee.1.paper.npz"][1] == first["tee.1.paper.npz"][1]
 
 
-@pytest.mark.train
-def test_a_search_that_crashes_is_tried_again_and_then_told(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    from mdp.learning.collection.cluster import Workers, completed, connected
-
-    calls = {"raises": (tmp_path / "raises", False), "works": (None, False)}
-    with connected(Workers(None, 1, retries=0)) as client:
-        results = dict(completed(client, crash, calls, 1, lambda: None))
-        died = dict(completed(client, crash, {"dies": (tmp_path / "dies", True)}, 1, lambda: None))
-    assert (str(results["raises"]), results["works"]) == ("no luck", "done")
-    assert (tmp_path / "raises").read_text() == "begun begun "
-    assert type(died["dies"]).__name__ == "KilledWorker"
-
-
-def crash(count: Path | None, whole_process: bool) -> str:
-    """A task that notes that it began, then raises, ends its process, or works."""
-    if count is None:
-        return "done"
-    with count.open("a") as file:
-        file.write("begun ")
-    if whole_process:
-        os._exit(1)
-    raise RuntimeError("no luck")
-
-
-@pytest.mark.train
-def test_a_scheduler_that_is_not_there_is_one_sentence(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("distributed")
-    monkeypatch.setattr("mdp.learning.collection.cluster.REACHED_WITHIN_S", 0.3)
-    models = _models(tmp_path / "models", tee=shapes.tee())
-    assert main([str(models), "-o", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]) == 1
-    message = capsys.readouterr().err
-    assert message.startswith("error: scheduler tcp://127.0.0.1:9: cannot be reached (")
-    assert message.count("\n") == 1
-
-
-@pytest.mark.train
-def test_a_scheduler_that_dies_is_one_sentence() -> None:
-    distributed = pytest.importorskip("distributed")
-    from mdp.learning.collection.cluster import Workers, completed, connected
-
-    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
-    with (
-        pytest.raises(LearningError, match="is gone; started again, the collection goes on where it stopped"),
-        connected(Workers(cluster.scheduler_address, 1, 0)) as client,
-    ):
-        list(completed(client, time.sleep, {"long": (2.0,)}, 0, cluster.close))
-
-
-@pytest.mark.train
 def test_an_interrupt_ends_all_processes_at_once(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
     models, out = _models(tmp_path / "models", ball=shapes.ball(30.0, 128)), tmp_path / "out"
     command = [sys.executable, "-m", "mdp.learning.collect", str(models), "-o", str(out), "--orientations", "9"]
     run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)

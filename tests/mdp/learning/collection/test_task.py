@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdp.kernels import threads
-from mdp.learning.collection.index import Row, Search, append_row, read_index, unfinished, write_index, writing_alone
+from mdp.batch.rows import append_row
+from mdp.learning.collection.index import INDEX, Row, Search, read_index, unfinished, write_index
 from mdp.learning.collection.models import coarser, model_files, oriented, other_sides, read_model
 from mdp.learning.collection.task import Settings, run
 from mdp.learning.summary import main as summarize
@@ -19,17 +19,11 @@ from tests import shapes
 from tests.mdp.learning.records import write_record
 
 
-@pytest.fixture
-def _all_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads, "THREADS", threads.THREADS)  # put back at the end
-
-
 def _npz(path: Path, mesh: Mesh) -> Path:
     np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
     return path
 
 
-@pytest.mark.usefixtures("_all_cores")
 def test_a_search_gives_its_record_and_its_line(tmp_path: Path) -> None:
     path = _npz(tmp_path / "ball.npz", shapes.ball())
     result = run(Search("ball", 0, "paper"), path, Settings(beam_width=3))
@@ -39,10 +33,8 @@ def test_a_search_gives_its_record_and_its_line(tmp_path: Path) -> None:
     assert row.outcome == pytest.approx(least, abs=1e-6)
     assert (row.lists, row.mean_list_length) == (lists, round(rows / lists, 2))
     assert (row.settings, row.late, row.excluded) == ("B=3", 0, "")
-    assert threads.THREADS == 1
 
 
-@pytest.mark.usefixtures("_all_cores")
 @pytest.mark.parametrize(
     ("terms", "reason"), [("ours", "no risky face"), ("paper", "nothing feasible")], ids=lambda value: str(value)
 )
@@ -59,7 +51,6 @@ def test_a_collection_searches_by_the_profiles_and_settings_that_it_is_given() -
     assert settings.in_words == "B=3 machine=fractal5pro search.seam_mm=1.5"
 
 
-@pytest.mark.usefixtures("_all_cores")
 def test_a_search_that_the_clock_ended_is_told_apart(tmp_path: Path) -> None:
     path = _npz(tmp_path / "ball.npz", shapes.ball())
     assert run(Search("ball", 0, "paper"), path, Settings(1, None, 0.0)).row.late == 1
@@ -95,22 +86,12 @@ def test_models_whose_records_would_have_one_name_are_refused(tmp_path: Path) ->
         model_files(tmp_path)
 
 
-def test_an_index_keeps_the_last_line_of_a_search_and_drops_one_cut_off(tmp_path: Path) -> None:
+def test_an_index_keeps_the_last_line_of_a_search(tmp_path: Path) -> None:
     row = Row("a", 0, "paper", "B=50", excluded="failed: once")
     write_index(tmp_path, [row])
-    append_row(tmp_path, replace(row, excluded="", outcome=0.25))
-    with (tmp_path / "index.csv").open("a") as file:
-        file.write("b,0,pap")
+    append_row(tmp_path / INDEX, replace(row, excluded="", outcome=0.25))
     (read,) = read_index(tmp_path)
     assert (read.excluded, read.outcome) == ("", 0.25)
-
-
-def test_two_collections_do_not_write_into_one_folder(tmp_path: Path) -> None:
-    message = "another collection writes into it; wait for it or take another"
-    with writing_alone(tmp_path), pytest.raises(LearningError, match=message), writing_alone(tmp_path):
-        pass
-    with writing_alone(tmp_path):
-        pass
 
 
 def test_what_failed_or_lost_its_record_is_done_again(tmp_path: Path) -> None:

@@ -1,0 +1,178 @@
+"""Pool: many calls worked off at a time, in processes of this machine or on the workers of a dask scheduler.
+
+Either way a call runs in a process of its own (mdp.batch.isolation). A dask worker that is lost loses nothing: the scheduler
+hands what it had to others, and gives up what several were lost over.
+"""
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any, Protocol, TypeVar
+
+from mdp.batch.isolation import CallError, Isolation
+from profiles.errors import BatchError
+
+REACHED_WITHIN_S = 10.0  # a scheduler that is there, also by a slow network
+POLL_S = 0.1  # Ctrl-C is answered within that
+CLOSED_WITHIN_S = 1.0  # a scheduler that is gone does not answer the goodbye either
+
+Key = TypeVar("Key")
+Call = tuple[Callable[..., Any], tuple[Any, ...], int, float | None]
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where calls run. scheduler: address of one that is there, None for this machine; count: processes on this machine;
+    retries: how often a call whose process was killed is tried again; limit_s: how long a call may take; folders: that workers
+    must see."""
+
+    scheduler: str | None
+    count: int
+    retries: int
+    limit_s: float | None = None
+    folders: tuple[Path, ...] = ()
+
+
+class Pool(Protocol):
+    """Futures of calls, as concurrent.futures and dask have them; lost: what to raise when no more of them will have a result."""
+
+    def submit(self, call: Call, number: int) -> Any: ...
+    def is_there(self) -> bool: ...
+    def lost(self) -> BatchError: ...
+
+
+@contextmanager
+def connected(workers: Workers) -> Iterator["Queue"]:
+    """What works calls off; processes of our own are gone at the end, whatever ends it.
+
+    Raises BatchError when the scheduler cannot be reached, or where its workers cannot work.
+    """
+    with _on_cores(workers.count) if workers.scheduler is None else _on_cluster(workers.scheduler, workers.folders) as pool:
+        yield Queue(pool, workers)
+
+
+class Queue:
+    """Calls and their results, in the order in which these come."""
+
+    def __init__(self, pool: Pool, workers: Workers) -> None:
+        self._pool, self._workers = pool, workers
+
+    def completed(
+        self, task: Callable[..., Any], calls: Mapping[Key, tuple[Any, ...]], on_wait: Callable[[], None]
+    ) -> Iterator[tuple[Key, Any]]:
+        """The key and the result of every call as it is done, the first calls first; a CallError where a call failed for good.
+
+        on_wait: called some times a second. Raises BatchError when the scheduler is lost.
+        """
+        done: SimpleQueue[Any] = SimpleQueue()
+        futures: dict[Any, Key] = {}
+        for number, (key, arguments) in enumerate(calls.items()):
+            future = self._pool.submit((task, arguments, self._workers.retries, self._workers.limit_s), number)
+            futures[future] = key
+            future.add_done_callback(done.put)
+        while futures:
+            on_wait()
+            try:
+                future = done.get(timeout=POLL_S)
+            except Empty:
+                if not self._pool.is_there():
+                    raise self._pool.lost() from None
+                continue
+            yield futures.pop(future), self._outcome(future)
+
+    def _outcome(self, future: Any) -> Any:
+        """What a call returned, or the CallError that it came to."""
+        if future.cancelled():
+            raise self._pool.lost()
+        try:
+            return future.result()
+        except CallError as error:
+            return error
+        except Exception as error:  # noqa: BLE001 - whatever a cluster says of what it could not do
+            if not self._pool.is_there():
+                raise self._pool.lost() from None
+            return CallError(f"its workers were lost ({type(error).__name__})")
+
+
+class _Cores:
+    def __init__(self, executor: ThreadPoolExecutor, isolation: Isolation) -> None:
+        self._executor, self._isolation = executor, isolation
+
+    def submit(self, call: Call, number: int) -> Any:
+        return self._executor.submit(self._isolation.call, *call)
+
+    def is_there(self) -> bool:
+        return True
+
+    def lost(self) -> BatchError:
+        return BatchError("the work was stopped")
+
+
+@contextmanager
+def _on_cores(count: int) -> Iterator[_Cores]:
+    isolation, executor = Isolation(), ThreadPoolExecutor(count, thread_name_prefix="batch")
+    try:
+        yield _Cores(executor, isolation)
+    finally:
+        isolation.end()
+        executor.shutdown(cancel_futures=True)
+
+
+_on_worker = Isolation()  # of all threads of a dask worker
+
+
+def call_on_worker(*call: Any) -> Any:
+    """In a dask worker: what a call returns."""
+    return _on_worker.call(*call)
+
+
+class _Cluster:
+    def __init__(self, client: Any, address: str) -> None:
+        self._client, self._address = client, address
+
+    def submit(self, call: Call, number: int) -> Any:
+        return self._client.submit(call_on_worker, *call, pure=False, priority=-number)
+
+    def is_there(self) -> bool:
+        return bool(self._client.status == "running")
+
+    def lost(self) -> BatchError:
+        return BatchError(f"scheduler {self._address}: is gone; started again, the work goes on where it stopped")
+
+
+@contextmanager
+def _on_cluster(address: str, folders: tuple[Path, ...]) -> Iterator[_Cluster]:
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise BatchError("a scheduler needs dask, which is not installed: pip install 'tiltprint[batch]'") from None
+    for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
+        if name.startswith(("distributed", "tornado", "asyncio")):  # what goes wrong is told in our own words
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        client = Client(address, timeout=REACHED_WITHIN_S)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise BatchError(f"scheduler {address}: cannot be reached ({error})") from None
+    try:
+        for worker, missing in client.run(folders_missing, folders, on_error="return").items():
+            if missing:
+                raise BatchError(f"worker {worker} of scheduler {address} cannot work: {_in_words(missing)}")
+        yield _Cluster(client, address)
+    finally:
+        with suppress(Exception):  # what does not answer any more need not be told
+            client.close(timeout=CLOSED_WITHIN_S)
+
+
+def folders_missing(folders: tuple[Path, ...]) -> list[str]:
+    """The folders that this machine does not see."""
+    return [str(folder) for folder in folders if not folder.is_dir()]
+
+
+def _in_words(missing: Any) -> str:
+    if isinstance(missing, ModuleNotFoundError):
+        return f"tiltprint is not installed there ({missing})"
+    return f"it does not see {', '.join(missing)}" if isinstance(missing, list) else str(missing)

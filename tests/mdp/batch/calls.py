@@ -1,0 +1,56 @@
+"""Calls that work, fail, die or last, for workers to import."""
+
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+
+def greet(name: str) -> str:
+    return f"hello {name}"
+
+
+def process() -> int:
+    return os.getpid()
+
+
+def refuse(note: Path) -> None:
+    _note(note)
+    raise ValueError("not this one")
+
+
+def unspeakable() -> Any:
+    return lambda: None
+
+
+def die(note: Path, times: int) -> str:
+    """Kill its process the first so many times."""
+    _note(note)
+    if note.read_text().count("begun") <= times:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "alive"
+
+
+def sleep(note: Path) -> None:
+    note.with_suffix(".pid").write_text(str(os.getpid()))
+    _note(note)
+    time.sleep(60.0)
+
+
+def noise() -> str:
+    print("what a call prints")  # noqa: T201 - goes nowhere
+    os.write(1, b"and what a library prints")
+    return "quiet"
+
+
+def begin(note: Path) -> str:
+    """What a note says, as soon as it does."""
+    while not (note.exists() and note.read_text()):
+        time.sleep(0.02)
+    return note.read_text()
+
+
+def _note(note: Path) -> None:
+    with note.open("a") as file:
+        file.write("begun ")
