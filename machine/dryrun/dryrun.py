@@ -15,6 +15,7 @@ from machine.dryrun.balance.interfaces import InterfaceBalance
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
+from machine.gcode.lines import Lines
 from machine.kinematics.table import workpiece_path
 from machine.planning.limits import axis_limits
 from machine.planning.timing import move_times
@@ -79,7 +80,7 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
 
     known: the findings of an earlier dry run of these very lines with this very profile, which are not looked for again.
     """
-    machine, text = profile.machine, lines if isinstance(lines, Sequence) else list(lines)
+    machine, text = profile.machine, Lines.of(lines)
     program = parse_gcode(text, machine)
     _refuse_far_places(program)
     rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)

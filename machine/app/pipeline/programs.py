@@ -13,6 +13,7 @@ from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.findings import Finding
+from machine.gcode.lines import Lines
 from machine.program import Program
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import GcodeError, MoveError
@@ -52,9 +53,9 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     return LoadedProgram(request.name, Program(lines, dry_run(lines, profile), None), profile, source, known)
 
 
-def read_gcode_lines(path: Path) -> tuple[str, ...]:
+def read_gcode_lines(path: Path) -> Lines:
     """The lines of a G-code file. Raises GcodeError when it cannot be read, is no text or is empty."""
-    lines = tuple(GcodeFile(path))
+    lines = GcodeFile(path).lines()
     if not any(line.strip() for line in lines):
         raise GcodeError(f"G-code file {path} is empty")
     return lines
