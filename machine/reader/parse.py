@@ -12,7 +12,7 @@ from machine.reader.parsed import ParsedProgram
 from machine.reader.plain_moves import Text, letters_of, read_plain_moves
 from machine.reader.remarks import remark
 from machine.reader.state import Reader, Words, reader_of
-from machine.reader.table import parsed_program
+from machine.reader.table import Table
 from profiles.errors import GcodeError
 from profiles.machine import Machine
 
@@ -28,7 +28,7 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     macros that are not known are counted in `ignored`: code -> (first line, how often).
     """
     reader, lines = reader_of(machine), Lines.of(lines)
-    text, letters, at = Text(lines.content, lines.start), letters_of(reader), 0
+    table, text, letters, at = Table(reader, len(lines)), Text(lines.content, lines.start), letters_of(reader), 0
     while at < len(lines):
         line = lines[at]
         after = read_plain_moves(reader, text, letters, at) if line[:2] in ("G1", "G0") else at
@@ -36,9 +36,10 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
             reader.number = after = at + 1
             _line(reader, line)
         at = after
+        table.take_some()
     if reader.turning:
         flush(reader)
-    return parsed_program(reader)
+    return table.program()
 
 
 def _line(reader: Reader, line: str) -> None:

@@ -10,6 +10,7 @@ from machine.gcode.part_totals import PartTotals
 from mdp.mesh import Floats
 from mdp.pose import Pose
 
+Indices32 = NDArray[np.int32]
 OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
 
 
@@ -49,7 +50,7 @@ class ParsedProgram:
     """A G-code text as arrays with one row per move (n rows).
 
     line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row
-    before where G28 or G92 set a position. e_mm: filament pushed by the move. filament_mm: running sum of e_mm. feed:
+    before where G28 or G92 set a position. e_mm: filament pushed by the move. feed:
     F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
     type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
     acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
@@ -57,16 +58,15 @@ class ParsedProgram:
     does; part_totals: what comments tell of the parts' beads.
     """
 
-    line: NDArray[np.int64]
+    line: Indices32
     start: Floats
     end: Floats
     e_mm: Floats
-    filament_mm: Floats
     feed: Floats
     kind: NDArray[np.int8]
-    part: NDArray[np.int64]
-    layer: NDArray[np.int64]
-    type: NDArray[np.int64]
+    part: Indices32
+    layer: Indices32
+    type: Indices32
     types: tuple[str, ...]
     width_mm: Floats
     height_mm: Floats
@@ -79,9 +79,15 @@ class ParsedProgram:
     announced: int
     part_totals: tuple[PartTotals, ...]
 
+    @property
+    def filament_mm(self) -> Floats:
+        """(n,) running sum of e_mm."""
+        pushed: Floats = np.cumsum(self.e_mm)
+        return pushed
+
     def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
         """(m,) a number for the layer of each row, another in each part."""
-        keys: NDArray[np.int64] = self.part[rows] * (int(self.layer.max(initial=0)) + 1) + self.layer[rows]
+        keys: NDArray[np.int64] = self.part[rows].astype(np.int64) * (int(self.layer.max(initial=0)) + 1) + self.layer[rows]
         return keys
 
     def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
