@@ -1,5 +1,6 @@
 """Parsed: what a G-code text holds, as arrays with one row per move."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -10,6 +11,7 @@ from machine.gcode.part_totals import PartTotals
 from mdp.mesh import Floats
 from mdp.pose import Pose
 
+AT_ONCE = 16_384  # rows
 Indices32 = NDArray[np.int32]
 OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
 
@@ -85,6 +87,14 @@ class ParsedProgram:
         pushed: Floats = np.cumsum(self.e_mm)
         return pushed
 
+    @property
+    def way_mm(self) -> Floats:
+        """(n,) how far X Y Z go in each move."""
+        way_mm = np.empty(len(self.line))
+        for some in pieces(len(way_mm)):
+            way_mm[some] = np.linalg.norm(self.end[some, :3] - self.start[some, :3], axis=1)
+        return way_mm
+
     def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
         """(m,) a number for the layer of each row, another in each part."""
         keys: NDArray[np.int64] = self.part[rows].astype(np.int64) * (int(self.layer.max(initial=0)) + 1) + self.layer[rows]
@@ -94,6 +104,11 @@ class ParsedProgram:
         """(n,) which rows belong to these ;TYPE: names."""
         marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.type]
         return marked
+
+
+def pieces(count: int) -> Iterator[slice]:
+    """So many rows some at a time, where what is worked out of each takes many times what comes of it."""
+    return (slice(begin, min(begin + AT_ONCE, count)) for begin in range(0, count, AT_ONCE))
 
 
 @dataclass(frozen=True, eq=False)

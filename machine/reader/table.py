@@ -84,10 +84,12 @@ class Table:
     def _place(self, rows: _Rows) -> None:
         """Starts and ends of further rows."""
         begin, end = self._count, self._count + len(rows.read)
+        if begin == end:
+            return
         if not begin:
-            self._places[:1] = rows.start[:1]
-        before = np.concatenate([self._places[begin : begin + 1], rows.end[:-1]])
-        if not len(self._starts) and not np.array_equal(rows.start, before[: len(rows.start)]):
+            self._places[0] = rows.start[0]
+        before = np.vstack([self._places[begin], rows.end[:-1]])
+        if not len(self._starts) and not np.array_equal(rows.start, before):
             self._starts = np.empty((len(self._places) - 1, E_AXIS))
             self._starts[:begin] = self._places[:begin]
         if len(self._starts):
