@@ -19,7 +19,9 @@ TURNS = ["G28", "M83", "G1 X20 Y5 Z5 F600", "G43.4", *(f"G1 A{k} C{2 * k} E{k % 
 
 def same(a: ParsedProgram, b: ParsedProgram) -> bool:
     columns = [field.name for field in fields(a) if isinstance(getattr(a, field.name), np.ndarray)]
-    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in columns) and a.events == b.events
+    return a.events == b.events and all(
+        len(a.line) == len(b.line) and np.allclose(getattr(a, name), getattr(b, name), rtol=0.0, atol=1e-9) for name in columns
+    )
 
 
 def machine(name: str) -> Machine:
