@@ -7,7 +7,7 @@ import numpy as np
 
 from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
 from machine.reader.levels import fan_shares, temperatures
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -160,13 +160,13 @@ def _without_fan(part: int, profile: Profile) -> int:
 def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
     """Plastic per second at the asked speed, against what the hot end melts."""
     material = profile.material
-    rows = program.kind == MoveKind.EXTRUDE
-    length = program.way_mm + ROUNDING_MM
-    area = pi * material.diameter_mm**2 / 4.0
-    flow = program.e_mm * area / length * program.feed / 60.0
+    area, flow = pi * material.diameter_mm**2 / 4.0, np.zeros(len(program.line))
+    for some in pieces(len(flow)):
+        length = np.linalg.norm(program.end[some, :3] - program.start[some, :3], axis=1) + ROUNDING_MM
+        flow[some] = program.e_mm[some] * area / length * program.feed[some] / 60.0
     most = material.volumetric_limit_mm3_s
     message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
-    much = np.flatnonzero(rows & (flow > most * SLACK))
+    much = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (flow > most * SLACK))
     return per_part(program, much, flow[much], message, code="flow", severity="warning")
 
 

@@ -44,9 +44,8 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     sized = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
     rows = deposited.rows[sized]
     length_mm = deposited.length_mm[sized]
-    in_air = (contacts.air_mm[rows] + contacts.beside_mm[rows] > 0.0) & ~program.rows_of_types(*LOOSE)[rows]
-    turned = np.any(program.end[rows[1:], 3:] != program.end[rows[:-1], 3:], axis=1)
-    groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | turned) + 1)
+    in_air = ((contacts.air_mm + contacts.beside_mm > 0.0) & ~program.rows_of_types(*LOOSE))[rows]
+    groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | program.turned_between(rows)) + 1)
     problems, seen = [], set()
     for group in groups:
         part = int(program.part[rows[group[0]]]) if len(group) else 0

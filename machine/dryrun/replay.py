@@ -268,7 +268,7 @@ def _replay_run(
                     (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), way), size, side, row, strokes, about
                 )
                 if support in (0, 3):
-                    span = max(moves.spans[moves.type[row]], moves.told_width[row])
+                    span = moves.spans[moves.remark[row]]
                     most = span if open_mm == 0.0 else min(most, span)
                     pending[at, support // 3] += length / count
                     open_mm += length / count

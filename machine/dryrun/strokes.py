@@ -48,7 +48,7 @@ class Strokes(NamedTuple):
 
 class Moves(NamedTuple):
     """(n, 5) start and end of each row; (n,) whether it lies below the bead that was just laid, and whether it leads to or from a
-    turn of the table, its type and the width told. spans: of each type, how far its beads may span over what is sparse below.
+    turn of the table, its remarks. spans: of each of those, how far beads may span over what is sparse below them.
 
     rows, width, height: (m,) of the beads. Apart from Strokes, which the innermost functions take: each array more there slows
     all of it down.
@@ -58,8 +58,7 @@ class Moves(NamedTuple):
     end: Floats
     low: NDArray[np.bool_]
     crossing: NDArray[np.bool_]
-    type: Indices32
-    told_width: Floats
+    remark: Indices32
     spans: Floats
     rows: NDArray[np.int64]
     width: Floats
@@ -101,7 +100,7 @@ def strokes_of(program: ParsedProgram, extruded: NDArray[np.bool_]) -> Strokes:
     begins = np.ones(len(extruded), dtype=np.bool_)
     begins[1:] = ~(np.all(program.start[1:] == program.end[:-1], axis=1) & extruded[1:] & extruded[:-1])
     path, way = np.cumsum(begins, dtype=np.int32), program.way_mm
-    stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.type]
+    stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.remarks.type][program.remark]
     return Strokes(path, np.cumsum(way, out=way), stands_off)
 
 
@@ -113,17 +112,19 @@ def moves_of(program: ParsedProgram, deposited: Beads, profile: Profile) -> Move
     low[_below_last_bead(program, others[across > ACROSS_MM], deposited.rows)] = True
     crossing[_ways_to_turns(program, others[across > WAY_MM], deposited.rows)] = True
     spans, beads = _spans(program, profile), (deposited.rows, deposited.width_mm, deposited.height_mm)
-    return Moves(program.start, program.end, low, crossing, program.type, program.width_mm, spans, *beads)
+    return Moves(program.start, program.end, low, crossing, program.remark, spans, *beads)
 
 
 def _spans(program: ParsedProgram, profile: Profile) -> Floats:
-    """Of each type how far a bead may span: what fills, over sparse infill's cells; support, over its own lines; any, its width:
-    walls, too, bridge slots and teeth narrower than themselves.
+    """How far a bead may span that some remarks are of: what fills, over sparse infill's cells; support, over its own lines; any,
+    its width: walls, too, bridge slots and teeth narrower than themselves.
     """
     process = profile.process
     infill_mm, support_mm = infill_cell_mm(process), support_cell_mm(process)
     of_type = {**dict.fromkeys(FILLING, infill_mm), Kind.INFILL.value: ZIGZAG * infill_mm, **dict.fromkeys(SUPPORT, support_mm)}
-    return np.array([of_type.get(name, 0.0) for name in program.types])
+    of_types = np.array([of_type.get(name, 0.0) for name in program.types])
+    spans: Floats = np.maximum(of_types[program.remarks.type], program.remarks.width_mm)
+    return spans
 
 
 def _below_last_bead(program: ParsedProgram, rows: NDArray[np.int64], beads: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -29,7 +29,7 @@ class Lines(Sequence[str]):
         while some := [_bytes(line) for line in islice(left, AT_ONCE)]:
             sizes.append(np.fromiter(map(len, some), dtype=np.int64, count=len(some)) + 1)
             content += b"\n".join((*some, b""))
-        return cls(np.frombuffer(content, dtype=np.uint8), np.cumsum(np.concatenate(sizes)))
+        return cls(_exact(content), np.cumsum(np.concatenate(sizes)))
 
     @classmethod
     def of_text(cls, pieces: Iterable[str]) -> "Lines":
@@ -42,7 +42,7 @@ class Lines(Sequence[str]):
         if content and content[-1] != NEWLINE:
             content.append(NEWLINE)
             ends.append(np.array([len(content)]))
-        return cls(np.frombuffer(content, dtype=np.uint8), np.concatenate(ends))
+        return cls(_exact(content), np.concatenate(ends))
 
     def __len__(self) -> int:
         return len(self.start) - 1
@@ -69,6 +69,11 @@ class Lines(Sequence[str]):
         return isinstance(other, Sequence) and len(self) == len(other) and all(a == b for a, b in zip(self, other, strict=True))
 
     __hash__ = None  # type: ignore[assignment]
+
+
+def _exact(content: bytearray) -> NDArray[np.uint8]:
+    """The bytes without the room to grow that they have had."""
+    return np.array(content, dtype=np.uint8)
 
 
 def _bytes(text: str) -> bytes:

@@ -9,17 +9,15 @@ from numpy.typing import NDArray
 from machine.gcode.modes import E_AXIS
 from machine.kinematics.coordinates import axis_positions
 from machine.planning.timing import axis_speeds, lengths
-from machine.reader.parsed import Event, MoveKind, ParsedProgram
+from machine.reader.parsed import Event, MoveKind, ParsedProgram, Remarks
 from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, FOLLOWED, HEIGHT, LAYER, LINE, PART, ROW, TYPE, WIDTH, Reader
 from mdp.mesh import Floats
 
 E_BEFORE, E_AFTER = BEFORE + E_AXIS, AFTER + E_AXIS
 AT_ONCE = 16_384  # rows
-TOLD = ((LINE, "line"), (PART, "part"), (LAYER, "layer"), (TYPE, "type"))
-SIZED = ((WIDTH, "width_mm"), (HEIGHT, "height_mm"), (ACCELERATION, "acceleration"))
+TOLD = (PART, LAYER, TYPE, WIDTH, HEIGHT, ACCELERATION)  # as in Remarks
 COLUMNS: dict[str, type[np.generic]] = {
-    **{name: np.int32 for _, name in TOLD}, **{name: np.float64 for _, name in SIZED},
-    "e_mm": np.float64, "feed": np.float64, "kind": np.int8,
+    "line": np.int32, "e_mm": np.float64, "feed": np.float64, "kind": np.int8, "remark": np.int32,
 }  # fmt: skip
 STILL = 1e-9
 SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded places, lets the head leave its place by less
@@ -57,6 +55,7 @@ class Table:
         self._reader, self._count, self._events = reader, 0, list[Event]()
         self._places, self._starts = np.empty((room + 1, E_AXIS)), np.empty((0, E_AXIS))
         self._columns = {name: np.empty(room, kind) for name, kind in COLUMNS.items()}
+        self._remarks = [np.empty((0, len(TOLD)))]
 
     def take_some(self) -> None:
         """Take the rows once there are many, after a bead: no turn goes on there."""
@@ -76,9 +75,9 @@ class Table:
         self._events += [replace(event, row=begin + event.row) for event in rows.events]
         self._make_room(end)
         self._place(rows)
-        told = {name: rows.read[:, column] for column, name in (*TOLD, *SIZED)}
-        for name, values in (told | {"e_mm": rows.e_mm, "feed": rows.feed, "kind": _kinds(rows.change())}).items():
-            self._columns[name][begin:end] = values
+        values = {"line": rows.read[:, LINE], "e_mm": rows.e_mm, "feed": rows.feed, "kind": _kinds(rows.change())}
+        for name, column in (values | {"remark": self._remark(rows.read[:, TOLD])}).items():
+            self._columns[name][begin:end] = column
         self._count = end
 
     def _place(self, rows: _Rows) -> None:
@@ -96,6 +95,14 @@ class Table:
             self._starts[begin:end] = rows.start
         self._places[begin + 1 : end + 1] = rows.end
 
+    def _remark(self, told: Floats) -> NDArray[np.int64]:
+        """(k,) which remarks hold for some rows, whose own they are; those that follow each other often have the same."""
+        new = np.ones(len(told), dtype=np.bool_)
+        new[1:] = (told[1:] != told[:-1]).any(axis=1)
+        known = sum(map(len, self._remarks))
+        self._remarks.append(told[new])
+        return np.cumsum(new) + (known - 1)
+
     def _make_room(self, count: int) -> None:
         if count < len(self._places):
             return
@@ -106,11 +113,12 @@ class Table:
     def program(self) -> ParsedProgram:
         """All that was read."""
         self._take()
-        reader, count = self._reader, self._count
+        reader, count, told = self._reader, self._count, np.concatenate(self._remarks).T
         return ParsedProgram(
             **{name: column[:count] for name, column in self._columns.items()},
             start=(self._starts if len(self._starts) else self._places)[:count], end=self._places[1 : count + 1],
-            types=tuple(reader.types), events=tuple(self._events), ignored=reader.ignored,
+            remarks=Remarks(*told[:3].astype(np.int32), *told[3:]), types=tuple(reader.types),
+            events=tuple(self._events), ignored=reader.ignored,
             layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
             announced=reader.announced, part_totals=tuple(reader.part_totals),
         )  # fmt: skip

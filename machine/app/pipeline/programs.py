@@ -8,7 +8,6 @@ from machine.app.embedded_profile import in_words, read_embedded_profile
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import refuse_cuts
 from machine.app.pipeline.memory import return_large_arrays
-from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
@@ -39,6 +38,8 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     """The program of a model or of a G-code file. Raises GcodeError for a file that cannot be read."""
     return_large_arrays()
     if not request.is_gcode:
+        from machine.app.pipeline.pipeline import build, decompose_model  # a G-code file needs no search and no slicer
+
         decomposed = decompose_model(request, to_build=True)
         program = build(decomposed.decomposition, decomposed.profile, stops=request.stops)
         return LoadedProgram(request.name, program, decomposed.profile)
