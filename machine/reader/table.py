@@ -55,7 +55,7 @@ class Table:
         self._reader, self._count, self._events = reader, 0, list[Event]()
         self._places, self._starts = np.empty((room + 1, E_AXIS)), np.empty((0, E_AXIS))
         self._columns = {name: np.empty(room, kind) for name, kind in COLUMNS.items()}
-        self._remarks = [np.empty((0, len(TOLD)))]
+        self._remarks, self._told = [np.empty((0, len(TOLD)))], np.full((1, len(TOLD)), np.nan)
 
     def take_some(self) -> None:
         """Take the rows once there are many, after a bead: no turn goes on there."""
@@ -96,11 +96,13 @@ class Table:
         self._places[begin + 1 : end + 1] = rows.end
 
     def _remark(self, told: Floats) -> NDArray[np.int64]:
-        """(k,) which remarks hold for some rows, whose own they are; those that follow each other often have the same."""
-        new = np.ones(len(told), dtype=np.bool_)
-        new[1:] = (told[1:] != told[:-1]).any(axis=1)
+        """(k,) which remarks hold for some rows, given what has been told of each: those that follow each other often have the
+        same.
+        """
+        new = (told != np.vstack([self._told, told[:-1]])[: len(told)]).any(axis=1)
         known = sum(map(len, self._remarks))
         self._remarks.append(told[new])
+        self._told = told[-1:] if len(told) else self._told
         return np.cumsum(new) + (known - 1)
 
     def _make_room(self, count: int) -> None:

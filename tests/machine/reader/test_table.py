@@ -7,7 +7,7 @@ import pytest
 
 from machine.reader import table
 from machine.reader.parse import parse_gcode
-from machine.reader.parsed import ParsedProgram
+from machine.reader.parsed import ParsedProgram, Remarks
 from profiles.machine import Machine
 from profiles.profile import load
 from tests.machine.dryrun.bent import bent
@@ -18,7 +18,7 @@ TURNS = ["G28", "M83", "G1 X20 Y5 Z5 F600", "G43.4", *(f"G1 A{k} C{2 * k} E{k % 
 
 
 def same(a: ParsedProgram, b: ParsedProgram) -> bool:
-    columns = [field.name for field in fields(a) if isinstance(getattr(a, field.name), np.ndarray)]
+    columns = [field.name for field in fields(a) if isinstance(getattr(a, field.name), np.ndarray | Remarks)]
     return a.events == b.events and all(
         len(a.line) == len(b.line) and np.allclose(getattr(a, name), getattr(b, name), rtol=0.0, atol=1e-9) for name in columns
     )
