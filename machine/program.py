@@ -1,6 +1,6 @@
 """Program: the G-code of a print with its dry run, and the parts it was made of; what ways to print a model come to."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from machine.dryrun.dryrun import DryRun
@@ -14,7 +14,7 @@ from slicer.paths import SlicedPart
 class Program:
     """The G-code of a print, its dry run, and its parts where it was made from a model."""
 
-    lines: tuple[str, ...]
+    lines: Sequence[str]
     run: DryRun
     decomposition: Decomposition | None
     sliced: tuple[SlicedPart, ...] = ()

@@ -6,6 +6,7 @@ Processes are forked, which takes milliseconds; a fresh interpreter would spend 
 usually takes (measured: tools/RESULTS.md), so systems without fork slice part after part.
 """
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Sequence
@@ -130,6 +131,7 @@ def _slice_side_by_side(
     """The highest parts first, so that no long one is left for the end."""
     context = get_context("fork")
     counts: Any = RawArray("i", len(planned))
+    gc.freeze()  # a search for garbage would write on all memory, of which each process would have its own then
     pool = ProcessPoolExecutor(processes, context, _inherit, (planned, counts, os.getpid()))
     try:
         order = sorted(range(len(planned)), key=lambda k: (-expected[k], k))
@@ -147,6 +149,7 @@ def _slice_side_by_side(
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+        gc.unfreeze()
 
 
 def _result(future: "Future[SlicedPart]") -> SlicedPart | None:

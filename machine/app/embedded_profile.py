@@ -39,10 +39,11 @@ def _with_parts(profile: Profile, tables: Any) -> Profile:
 
 def _tables(lines: Sequence[str]) -> dict[str, Any]:
     """Section -> nested table of the values as they were written; {} where that is no TOML."""
-    comments = [line.rstrip() for line in lines]
-    if CONFIG_BEGIN not in comments or CONFIG_END not in comments:
+    at = {mark: next((k for k, line in enumerate(lines) if line.rstrip() == mark), None) for mark in (CONFIG_BEGIN, CONFIG_END)}
+    begin, end = at[CONFIG_BEGIN], at[CONFIG_END]
+    if begin is None or end is None:
         return {}
-    settings = comments[comments.index(CONFIG_BEGIN) + 1 : comments.index(CONFIG_END)]
+    settings = [line.rstrip() for line in lines[begin + 1 : end]]
     try:
         whole: dict[str, Any] = _with_lists(read_toml("\n".join(map(_as_toml, settings))))
     except ValueError:

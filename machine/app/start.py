@@ -1,6 +1,7 @@
 """Start: what the command `tiltprint` runs; it knows Ctrl-C before the command line is loaded."""
 
 import gc
+import os
 import sys
 
 SELDOM = (100_000, 20, 50)  # what is allocated between two looks for garbage in circles, of which there is little
@@ -9,6 +10,7 @@ SELDOM = (100_000, 20, 50)  # what is allocated between two looks for garbage in
 def main() -> int:
     """Load the command line and run it; returns the exit code."""
     gc.set_threshold(*SELDOM)
+    os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # what is hardly written to takes no memory
     try:
         from machine.app.cli import main as run
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import MOST, Finding, at_row, cut_short
 from machine.kinematics.collision import Printed, Reach, gaps_of, hull, refined_gap, solids, sweep_gaps, swept, swing_mm
 from machine.planning.limits import axis_limits
-from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
+from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pieces, pose_runs
 from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -23,6 +23,7 @@ AT_ONCE = 20_000  # moves times directions fill memory
 CONFIRMED = 200
 ROUNDING_MM = 2e-3  # three coordinates rounded to a thousandth
 MOST_TURNS = 2000
+Solid = tuple[str, Reach]
 
 
 def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
@@ -38,18 +39,27 @@ def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
     for pose_run in pose_runs(program):
         if len(problems) >= MOST:
             return [*problems, cut_short(program, int(pose_run.rows[0]), "straight moves")]
-        tried = np.array([rotation(machine, pose_run.pose) @ UP, UP])
-        least = swept(program.start[pose_run.rows, :3], program.end[pose_run.rows, :3], tried)
-        for solid in solids(machine, pose_run.pose):
-            reach = solid[1](tried)
-            for body in bodies(machine):
-                close = gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM
-                if close.any():
-                    problems += _body(program, PoseRun(pose_run.rows[close], pose_run.pose), body, solid, machine)
+        for body, solid, rows in _close(program, pose_run, machine):
+            problems += _body(program, PoseRun(rows, pose_run.pose), body, solid, machine)
     return problems
 
 
-def _body(program: ParsedProgram, run: PoseRun, body: Body, solid: tuple[str, Reach], machine: Machine) -> list[Finding]:
+def _close(program: ParsedProgram, run: PoseRun, machine: Machine) -> Iterator[tuple[Body, Solid, NDArray[np.int64]]]:
+    """The bodies and the solids that two directions do not part in one pose, and during which moves."""
+    tried = np.array([rotation(machine, run.pose) @ UP, UP])
+    meetings = [(body, solid, solid[1](tried)) for solid in solids(machine, run.pose) for body in bodies(machine)]
+    close: list[list[NDArray[np.int64]]] = [[] for _ in meetings]
+    for some in pieces(len(run.rows)):
+        rows = run.rows[some]
+        least = swept(program.start[rows, :3], program.end[rows, :3], tried)
+        for (body, _, reach), own in zip(meetings, close, strict=True):
+            own.append(rows[gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM])
+    for (body, solid, _), own in zip(meetings, close, strict=True):
+        if any(map(len, own)):
+            yield body, solid, np.concatenate(own)
+
+
+def _body(program: ParsedProgram, run: PoseRun, body: Body, solid: Solid, machine: Machine) -> list[Finding]:
     """One body and one solid in one pose: the moves that two directions left open, by all directions and a search."""
     rows, pose = run.rows, run.pose
     start, end = program.start[rows, :3], program.end[rows, :3]
@@ -86,7 +96,6 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
     problems = []
     purge = program.rows_of_types(Kind.PURGE.value)[deposited_row]
     counted = ~(purge & (deposited[:, :, 2].max(axis=1, initial=0.0) <= machine.clearance_mm))
-    deposited, deposited_row = deposited[counted], deposited_row[counted]
     printed, done = hull(np.zeros((0, 3)), 0.0), 0
     rows = np.flatnonzero(program.kind == MoveKind.ROTATE)
     if len(rows) > MOST_TURNS:
@@ -97,10 +106,11 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
         if len(problems) >= MOST:
             return [*problems, cut_short(program, int(row), "turns")]
         before = int(np.searchsorted(deposited_row, row))
-        if before > done:
-            new = deposited[done:before].reshape(-1, 3)
-            bead = 0.5 * float(program.width_mm[deposited_row[done:before]].max())
-            printed, done = hull(np.vstack([printed.points_mm, new]), max(bead, printed.bead_mm)), before
+        for some in pieces(before - done):
+            new = np.arange(done, before)[some][counted[done:before][some]]
+            bead = 0.5 * float(program.width_mm[deposited_row[new]].max(initial=0.0))
+            printed = hull(np.vstack([printed.points_mm, deposited[new].reshape(-1, 3)]), max(bead, printed.bead_mm))
+        done = before
         problems += _turn(program, int(row), printed, machine)
     return problems
 

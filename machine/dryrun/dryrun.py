@@ -15,11 +15,11 @@ from machine.dryrun.balance.interfaces import InterfaceBalance
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
+from machine.gcode.lines import Lines
 from machine.kinematics.table import workpiece_path
 from machine.planning.limits import axis_limits
-from machine.planning.timing import move_times
 from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.kernels.threads import ahead
 from mdp.mesh import Floats
 from profiles.errors import GcodeError
@@ -27,7 +27,6 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import Kind
 
-AT_ONCE = 50_000  # rows
 MOST_MM = 10_000.0  # five times what the largest printers reach
 
 
@@ -79,13 +78,12 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
 
     known: the findings of an earlier dry run of these very lines with this very profile, which are not looked for again.
     """
-    machine, text = profile.machine, lines if isinstance(lines, Sequence) else list(lines)
+    machine, text = profile.machine, Lines.of(lines)
     program = parse_gcode(text, machine)
     _refuse_far_places(program)
     rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
     segments = _segments(program, rows, machine)
     area = pi * profile.material.diameter_mm**2 / 4.0
-    stop = motion.standstills(program)
     contacts = None
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
@@ -94,7 +92,7 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
         balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
         known = _findings(text, program, Laid(deposited, replayed, balances), profile)
         contacts = replayed.result()
-    times_s = move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration)
+    times_s = motion.times_s(program, machine)
     dwells = [(event.line, event.value) for event in program.events if event.code == "G4"]
     return DryRun(
         program=program,
@@ -121,8 +119,7 @@ class Laid(NamedTuple):
 def _segments(program: ParsedProgram, rows: NDArray[np.int64], machine: Machine) -> Floats:
     """(m, 2, 3) ends of rows in the workpiece frame; some at a time, for what it takes to turn them is ten times as much."""
     segments = np.empty((len(rows), 2, 3))
-    for begin in range(0, len(rows), AT_ONCE):
-        some = slice(begin, begin + AT_ONCE)
+    for some in pieces(len(rows)):
         for side, places in enumerate((program.start, program.end)):
             segments[some, side] = workpiece_path(machine, places[rows[some]])
     return segments
@@ -173,7 +170,7 @@ def summary(run: DryRun) -> dict[str, Any]:
         "time_s": run.time_s,
         "filament_mm": float(np.max(program.filament_mm, initial=0.0)),
         "extruded_mm3": float(run.segment_mm3.sum()),
-        "travel_mm": float(np.linalg.norm((program.end - program.start)[travels, :3], axis=1).sum()),
+        "travel_mm": float(program.way_mm[travels].sum()),
         "layers": program.layers,
         "parts": len(program.parts),
         "reorientations": int((program.kind == MoveKind.ROTATE).sum()),

@@ -56,8 +56,8 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
 def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
     """(m,) which beads are of a layer that climbs, as a vase does: its first and last turns get less and less plastic."""
     rows = deposited.rows
-    _, group = np.unique(program.layer_keys(rows), return_inverse=True)
-    low, high = np.full(len(rows), np.inf), np.full(len(rows), -np.inf)
+    group = program.layer_keys(rows)
+    low, high = np.full(int(group.max()) + 1, np.inf), np.full(int(group.max()) + 1, -np.inf)
     np.minimum.at(low, group, program.end[rows, 2])
     np.maximum.at(high, group, program.end[rows, 2])
     climbs: NDArray[np.bool_] = (high - low)[group] > CLIMBING * deposited.height_mm

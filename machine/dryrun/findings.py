@@ -73,15 +73,15 @@ def by_part(
 
 
 def per_part(
-    program: ParsedProgram, marked: NDArray[np.bool_], badness: Floats, message: str, *, code: str, severity: Severity = "error"
+    program: ParsedProgram, rows: NDArray[np.int64], badness: Floats, message: str, *, code: str, severity: Severity = "error"
 ) -> Iterator[Finding]:
-    """One finding for every part that has rows marked: the first marked row's place.
+    """One finding for every part that some rows are of, at its first one; badness: (m,) of each.
 
     message takes {value} (the badness of the worst row of that part, as %.3f) and {count}.
     """
-    for mine in by_part(program, np.flatnonzero(marked)):
+    for mine in by_part(program, np.arange(len(rows)), rows):
         worst = f"{float(badness[mine].max()):.3f}".rstrip("0").rstrip(".")
-        yield at_row(program, int(mine[0]), severity, code, message.format(value=worst, count=len(mine)))
+        yield at_row(program, int(rows[mine[0]]), severity, code, message.format(value=worst, count=len(mine)))
 
 
 def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:

@@ -7,7 +7,7 @@ import numpy as np
 
 from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
 from machine.reader.levels import fan_shares, temperatures
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -60,14 +60,14 @@ def _cold(program: ParsedProgram) -> Iterable[Finding]:
     for event in heating:
         warm = event.value >= MELTING_C and (warm or event.code == "M109")
         hot[event.row :] = warm
-    rows = (program.e_mm > 1e-9) & ~hot
-    if not rows.any():
+    rows = np.flatnonzero((program.e_mm > 1e-9) & ~hot)
+    if not len(rows):
         return []
-    first = int(np.argmax(rows))
+    first = int(rows[0])
     waited_row = max((event.row for event in heating if event.row <= first), default=0)
     severity, unless = unless_own(program, waited_row, first)
     message = f"{{count}} moves push filament through a nozzle that is not hot: M109 S must come first and stay on{unless}"
-    return per_part(program, rows, program.e_mm, message, code="cold-extrusion", severity=severity)
+    return per_part(program, rows, program.e_mm[rows], message, code="cold-extrusion", severity=severity)
 
 
 def _left_on(program: ParsedProgram) -> Iterator[Finding]:
@@ -95,8 +95,8 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
         hotter = max(profile.of_part(part).process.interface_temperature_add_c for part in (0, *program.parts))
         least, most = min(own_c) - 0.5, min(max(own_c) + hotter, machine.nozzle_limit_c) + 0.5
     message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
-    cool, hot = beads & (wanted < least), beads & (wanted > most)
-    return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted, message, code="temperature")]
+    cool, hot = (np.flatnonzero(beads & wrong) for wrong in (wanted < least, wanted > most))
+    return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted[rows], message, code="temperature")]
 
 
 def _bed_off(program: ParsedProgram) -> list[Finding]:
@@ -121,7 +121,7 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Findin
         return
     fan = fan_shares(program, profile.machine)
     layer = program.layer_keys()
-    length = np.linalg.norm((program.end - program.start)[:, :3], axis=1)
+    length = program.way_mm
     seconds = np.bincount(layer[beads], weights=(length / np.maximum(program.feed, 1e-9))[beads] * 60.0)
     blown = np.bincount(layer[beads], weights=(length * (fan > 0.0))[beads])
     at, first = np.unique(layer[beads], return_index=True)
@@ -160,13 +160,14 @@ def _without_fan(part: int, profile: Profile) -> int:
 def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
     """Plastic per second at the asked speed, against what the hot end melts."""
     material = profile.material
-    rows = program.kind == MoveKind.EXTRUDE
-    length = np.linalg.norm(program.end[:, :3] - program.start[:, :3], axis=1) + ROUNDING_MM
-    area = pi * material.diameter_mm**2 / 4.0
-    flow = program.e_mm * area / length * program.feed / 60.0
+    area, flow = pi * material.diameter_mm**2 / 4.0, np.zeros(len(program.line))
+    for some in pieces(len(flow)):
+        length = np.linalg.norm(program.end[some, :3] - program.start[some, :3], axis=1) + ROUNDING_MM
+        flow[some] = program.e_mm[some] * area / length * program.feed[some] / 60.0
     most = material.volumetric_limit_mm3_s
     message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
-    return per_part(program, rows & (flow > most * SLACK), flow, message, code="flow", severity="warning")
+    much = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (flow > most * SLACK))
+    return per_part(program, much, flow[much], message, code="flow", severity="warning")
 
 
 def _profile(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:

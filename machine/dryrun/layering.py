@@ -43,8 +43,9 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     """
     sized = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
     rows = deposited.rows[sized]
-    turned = np.any(program.end[rows[1:], 3:] != program.end[rows[:-1], 3:], axis=1)
-    groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | turned) + 1)
+    length_mm = deposited.length_mm[sized]
+    in_air = ((contacts.air_mm + contacts.beside_mm > 0.0) & ~program.rows_of_types(*LOOSE))[rows]
+    groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | program.turned_between(rows)) + 1)
     problems, seen = [], set()
     for group in groups:
         part = int(program.part[rows[group[0]]]) if len(group) else 0
@@ -52,10 +53,9 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             continue
         mine = rows[group]
         gap = _gaps(program, mine)
-        laid_mm = np.bincount(program.layer[mine], weights=deposited.length_mm[sized][group])[program.layer[mine]]
+        laid_mm = np.bincount(program.layer[mine], weights=length_mm[group])[program.layer[mine]]
         height_mm = program.height_mm[mine]
-        in_air = (contacts.air_mm + contacts.beside_mm > 0.0) & ~program.rows_of_types(*LOOSE)
-        hangs = (gap < SEEN_SHARE * height_mm) | in_air[mine]
+        hangs = (gap < SEEN_SHARE * height_mm) | in_air[group]
         high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * height_mm)) & (laid_mm > CRUMB_MM) & hangs)
         if len(high):
             seen.add(part)
@@ -110,7 +110,7 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
     counted = ~program.rows_of_types(*LOOSE)[rows] & ~low & ~_begins(program, rows)
     rows, length = rows[counted], deposited.length_mm[counted]
     group = program.layer_keys(rows)
-    loose = np.bincount(group, weights=(contacts.air_mm + contacts.beside_mm)[rows])
+    loose = np.bincount(group, weights=contacts.air_mm[rows] + contacts.beside_mm[rows])
     air = np.bincount(group, weights=contacts.air_mm[rows])
     whole = np.bincount(group, weights=length)
     bad = np.flatnonzero((loose > FLOATING_SHARE * whole) & (whole > LEAST_MM) & (air > 0.0))

@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_own
 from machine.firmware import dialect_of
 from machine.planning.limits import ROUNDING, axis_limits
-from machine.planning.timing import axis_speeds, lengths
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.planning.timing import axis_speeds, lengths, move_times
+from machine.reader.parsed import AT_ONCE, MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
 STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
 SLACK = 1.001
+ROUNDING_MM_S = 1.0 / 60.0  # F is written as a whole number
+STILL = 3  # the measure of what does not move
 WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
 LEVEL_DEG = 0.01
 TURNED_DEG = 1e-3
@@ -37,14 +39,37 @@ def _outside(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
         values = program.end[:, axis]
         unit = "mm" if axis < 3 else "deg"
         allowed = f"allowed is {least:g} to {most:g} {unit} (moves: {{count}})"
-        above, below = values > most + ROUNDING, values < least - ROUNDING
-        yield from per_part(program, above, values, f"{letter} goes to {{value}} {unit}, {allowed}", code="axis-limit")
-        yield from per_part(program, below, -values, f"{letter} goes to -{{value}} {unit}, {allowed}", code="axis-limit")
+        above, below = np.flatnonzero(values > most + ROUNDING), np.flatnonzero(values < least - ROUNDING)
+        yield from per_part(program, above, values[above], f"{letter} goes to {{value}} {unit}, {allowed}", code="axis-limit")
+        yield from per_part(program, below, -values[below], f"{letter} goes to -{{value}} {unit}, {allowed}", code="axis-limit")
 
 
-def deltas(program: ParsedProgram) -> Floats:
+def deltas(program: ParsedProgram, rows: slice = slice(None)) -> Floats:
     """(n, 6) changes of X Y Z tilt turn E."""
-    return np.column_stack([program.end - program.start, program.e_mm])
+    return np.column_stack([program.end[rows] - program.start[rows], program.e_mm[rows]])
+
+
+def times_s(program: ParsedProgram, machine: Machine) -> Floats:
+    """(n,) seconds of each row, some at a time: where the machine stands still in between neither knows of the other."""
+    stop, seconds, begin = standstills(program), np.empty(len(program.line)), 0
+    while begin < len(seconds):
+        some = _until_standstill(program, begin)
+        told = (program.feed[some] / 60.0, stop[some], machine, program.acceleration[some])
+        seconds[some], begin = move_times(deltas(program, some), *told), some.stop
+    return seconds
+
+
+def _until_standstill(program: ParsedProgram, begin: int) -> slice:
+    """Many rows, with the last of which a run of moves ends that F measures alike; such runs begin and end at a standstill."""
+    count, last = AT_ONCE, len(program.line)
+    while begin + count < last:
+        _, measure = lengths(deltas(program, slice(begin, begin + count)))
+        moving = np.flatnonzero(measure < STILL)
+        ends = moving[1:][np.diff(measure[moving]) != 0]
+        if len(ends):
+            return slice(begin, begin + int(ends[-1]))
+        count *= 2
+    return slice(begin, last)
 
 
 def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
@@ -55,17 +80,21 @@ def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
 
 
 def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
-    change = deltas(program)
-    length, _ = lengths(change)
-    way, pace = np.maximum(length, 1e-9), program.feed / 60.0
     names = [*axis_limits(machine), "E"]
-    for axis, (letter, most) in enumerate(zip(names, axis_speeds(machine), strict=True)):
+    most, asked, rows = axis_speeds(machine), [np.empty((0, len(names)))], [np.empty(0, dtype=np.int64)]
+    for some in pieces(len(program.line)):
+        change = deltas(program, some)
+        way = np.maximum(lengths(change)[0], 1e-9)
+        speed = np.maximum(np.abs(change) - WRITTEN, 0.0) / way[:, None] * (program.feed[some] / 60.0)[:, None]
+        fast = np.flatnonzero((speed > most * SLACK + ROUNDING_MM_S).any(axis=1))
+        asked.append(speed[fast])
+        rows.append(fast + some.start)
+    speeds, fast = np.concatenate(asked), np.concatenate(rows)
+    for axis, letter in enumerate(names):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
-        rounding = length * 0.0 + 1.0 / 60.0  # F is written as a whole number
-        message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most:g} {unit} (moves: {{count}})"
-        speed = np.maximum(np.abs(change[:, axis]) - WRITTEN[axis], 0.0) / way * pace
-        fast = speed > most * SLACK + rounding
-        yield from per_part(program, fast, speed, message, code="axis-speed", severity="warning")
+        message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most[axis]:g} {unit} (moves: {{count}})"
+        too_fast = speeds[:, axis] > most[axis] * SLACK + ROUNDING_MM_S
+        yield from per_part(program, fast[too_fast], speeds[too_fast, axis], message, code="axis-speed", severity="warning")
 
 
 def _homing(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
@@ -86,10 +115,9 @@ def _homing(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
 def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
     """The first move of a linear axis that has been neither homed nor given a position."""
     events = sorted((e for e in program.events if e.code in ("G28", "G92")), key=lambda e: e.row)
-    change = np.abs(program.end - program.start) > 1e-9
     for axis, letter in enumerate("XYZ"):
-        moved = np.flatnonzero(change[:, axis])
-        first = int(moved[0]) if len(moved) else len(change)
+        moved = np.flatnonzero(np.abs(program.end[:, axis] - program.start[:, axis]) > 1e-9)
+        first = int(moved[0]) if len(moved) else len(program.line)
         homed = [
             e for e in events if e.row <= first and (letter in e.letters or (e.code == "G28" and not set(e.letters) & set("XYZ")))
         ]
@@ -100,10 +128,10 @@ def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
 
 
 def _turning_strokes(program: ParsedProgram, machine: Machine) -> Iterable[Finding]:
-    rows = (program.kind == MoveKind.ROTATE) & (program.e_mm > 1e-9)
+    rows = np.flatnonzero((program.kind == MoveKind.ROTATE) & (program.e_mm > 1e-9))
     letters = f"{machine.tilt.letter} or {machine.turn.letter}"
     message = f"{letters} turns while {{value}} mm of filament are extruded (moves: {{count}})"
-    return per_part(program, rows, program.e_mm, message, code="turning-stroke")
+    return per_part(program, rows, program.e_mm[rows], message, code="turning-stroke")
 
 
 def _following_switches(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:

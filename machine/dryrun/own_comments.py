@@ -117,15 +117,21 @@ def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals
     if abs(pushed - totals.filament_mm) > max(FILAMENT_MM, FILAMENT_SHARE * totals.filament_mm):
         message = f"part {totals.part} pushes {pushed:.2f} mm of filament, the file tells of {totals.filament_mm:.2f} mm"
         yield at_row(program, int(rows[0]), "error", "contents", message)
-    ends = np.stack([program.start[rows, :3], program.end[rows, :3]])
-    bounds = np.stack([ends.min(axis=(0, 1)), ends.max(axis=(0, 1))])
+    bounds = np.transpose([_extent(program, rows, axis) for axis in range(3)])
     apart = bounds - totals.bounds_mm
     if np.abs(apart).max() <= PLACE_MM:
         return
     side, axis = (int(v) for v in np.unravel_index(np.abs(apart).argmax(), apart.shape))
-    extreme = np.abs(ends[:, :, axis] - bounds[side, axis]).min(axis=0).argmin()
+    ends = np.stack([program.start[rows, axis], program.end[rows, axis]])
+    extreme = np.abs(ends - bounds[side, axis]).min(axis=0).argmin()
     shifted = bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)  # both sides are moved alike
     moved = f"lies {abs(apart[side, axis]):.2f} mm aside" if shifted else "reaches"
     laid, recorded = (f"{'XYZ'[axis]}{corners[side, axis]:.3f}" for corners in (bounds, totals.bounds_mm))
     message = f"part {totals.part} {moved} to {laid}, the file tells of {recorded} ({PLACE_MM:g} mm are allowed)"
     yield at_row(program, int(rows[0] if shifted else rows[extreme]), "error", "contents", message)
+
+
+def _extent(program: ParsedProgram, rows: NDArray[np.int64], axis: int) -> tuple[float, float]:
+    """The least and the greatest position of an axis at the ends of some rows."""
+    ends = [side[rows, axis] for side in (program.start, program.end)]
+    return min(float(values.min()) for values in ends), max(float(values.max()) for values in ends)

@@ -33,7 +33,8 @@ def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> It
     length = np.zeros(len(program.line))
     length[deposited.rows] = deposited.length_mm
     deep = "the head runs {value} mm deep into earlier plastic (moves: {count})"
-    yield from per_part(program, contacts.depth_mm > 0.0, contacts.depth_mm, deep, code="contact")
+    into = np.flatnonzero(contacts.depth_mm > 0.0)
+    yield from per_part(program, into, contacts.depth_mm[into], deep, code="contact")
     yield from _too_low(program, contacts)
     yield from _in_air(program, length, contacts)
     yield from _in_plastic(program, length, contacts)
@@ -120,11 +121,8 @@ def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64],
     ends, edge = over_edge_mm(segments[:, :, :2], profile.machine.table)
     over = ends.max(axis=1, initial=-np.inf)
     beyond = lowest & ~program.rows_of_types(PURGE)[rows] & (over > ROUNDING_MM)
-    marked, badness = np.zeros(len(program.line), dtype=np.bool_), np.zeros(len(program.line))
-    marked[rows[beyond]] = True
-    badness[rows] = over
     message = f"the first layer reaches {{value}} mm over the plate's edge, {edge} (moves: {{count}})"
-    return per_part(program, marked, badness, message, code="off-plate")
+    return per_part(program, rows[beyond], over[beyond], message, code="off-plate")
 
 
 def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.height_field import NOTHING, Field, Head, depth_of, empty_field, lay_bead
-from machine.dryrun.strokes import Beads, Moves, Strokes, moves_of, strokes_of
+from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
-from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
-from mdp.kernels.arrays import table
+from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pieces, pose_runs
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -50,13 +49,14 @@ class Contacts(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What the rows of one pose meet: rows from `first` on are its own, support keeps `gap` away, the plate is a x + b y + c;
-    head: what may run into all of that.
+    """What the rows of one pose meet: rows from `first` on are its own, and beads from `first_bead` on; support keeps `gap` away,
+    the plate is a x + b y + c; head: what may run into all of that.
     """
 
     field: Field
     head: Head
     first: int
+    first_bead: int
     gap: float
     plate: Floats
 
@@ -68,21 +68,21 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     if not len(deposited.rows):
         return contacts
     extruded = program.kind == MoveKind.EXTRUDE
-    strokes, head = strokes_of(program, deposited, extruded), head_of(machine)
-    moves = moves_of(program, extruded, strokes.half, profile)
-    ups, turned = np.zeros((len(deposited.rows), 3)), 0
+    strokes, moves, head = strokes_of(program, extruded), moves_of(program, deposited, profile), head_of(machine)
+    laid_in, ups, turned = np.zeros(len(deposited.rows), dtype=np.int32), np.zeros((0, 3)), 0
     process = profile.process
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
-    for run in pose_runs(program):
-        before, after = np.searchsorted(deposited.rows, (run.rows[0], run.rows[-1] + 1))
-        ups[before:after] = rotation(machine, run.pose)[2]
+    for number, run in enumerate(pose_runs(program)):
+        before, after = (int(at) for at in np.searchsorted(deposited.rows, (run.rows[0], run.rows[-1] + 1)))
+        laid_in[before:after], ups = number, np.vstack([ups, rotation(machine, run.pose)[2]])
         turned += before
         if turned > MOST_TURNED:
             return contacts._replace(untested_row=int(run.rows[0]))
-        field = _field(deposited, (int(before), int(after)), run, ups, machine)
-        if field is not None:
-            plate = _plate(machine, run.pose)
-            _replay_run(run.rows, moves, strokes, Surroundings(field, head, int(run.rows[0]), gap, plate), contacts)
+        if after:
+            field = _field(deposited, (before, after), run, (ups, laid_in), machine)
+            about = Surroundings(field, head, int(run.rows[0]), before, gap, _plate(machine, run.pose))
+            _replay_run(run.rows, moves, strokes, about, contacts, np.zeros((len(run.rows), 2)))
+            del field, about  # before there is another one
     return contacts
 
 
@@ -92,29 +92,33 @@ def head_of(machine: Machine) -> Head:
     return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes)
 
 
-def _field(deposited: Beads, laid: tuple[int, int], run: PoseRun, ups: Floats, machine: Machine) -> Field | None:
-    """The field of a run at one pose with all earlier plastic in it; None where nothing was or will be laid. laid: how many beads
-    are before the run and after it.
+def _field(
+    deposited: Beads, laid: tuple[int, int], run: PoseRun, directions: tuple[Floats, NDArray[np.int32]], machine: Machine
+) -> Field:
+    """The field of a run at one pose with all earlier plastic in it. laid: how many beads are before the run and after it.
+    directions: those in which runs print, and the run of each bead.
     """
     before, after = laid
-    if after == 0:
-        return None
-    ends = machine_points(machine, run.pose, deposited.segments_mm[:after].reshape(-1, 3)).reshape(-1, 2, 3)
-    low, high = (
-        edge - 3.0 * sign for edge, sign in ((ends[:, :, :2].min(axis=(0, 1)), 1), (ends[:, :, :2].max(axis=(0, 1)), -1))
-    )
-    field = empty_field(low, high)
-    if before:
-        now, width, height = rotation(machine, run.pose)[2], deposited.width_mm[:before], deposited.height_mm[:before]
-        along = ups[:before] @ now
-        across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
-        middle = rotation(machine, run.pose) @ (ups[:before] * (0.5 * height)[:, None]).T
-        earlier = ends[:before] - middle.T[:, None, :]
-        earlier[:, :, 2] += (0.5 * np.abs(along) * height + 0.5 * across * width)[:, None]
-        _lay_beads(
-            earlier, np.minimum(0.5 * width, 0.5 * width * along**2 + 0.5 * height * across), deposited.rows[:before], field
-        )
+    least, most = np.full(2, np.inf), np.full(2, -np.inf)
+    for some in pieces(after):
+        places = machine_points(machine, run.pose, deposited.segments_mm[some].reshape(-1, 3))[:, :2]
+        least, most = np.minimum(least, places.min(axis=0)), np.maximum(most, places.max(axis=0))
+    field = empty_field(least - 3.0, most + 3.0)
+    for some in pieces(before):
+        _lay_turned(deposited, some, run.pose, directions[0][directions[1][some]], machine, field)
     return field
+
+
+def _lay_turned(deposited: Beads, some: slice, pose: Pose, ups: Floats, machine: Machine, field: Field) -> None:
+    """Lay some earlier beads, printed along (k, 3) ups, into the field of a pose."""
+    turn, width, height = rotation(machine, pose), deposited.width_mm[some], deposited.height_mm[some]
+    ends = machine_points(machine, pose, deposited.segments_mm[some].reshape(-1, 3)).reshape(-1, 2, 3)
+    along = ups @ turn[2]
+    across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
+    middle = turn @ (ups * (0.5 * height)[:, None]).T
+    ends -= middle.T[:, None, :]
+    ends[:, :, 2] += (0.5 * np.abs(along) * height + 0.5 * across * width)[:, None]
+    _lay_beads(ends, np.minimum(0.5 * width, 0.5 * width * along**2 + 0.5 * height * across), deposited.rows[some], field)
 
 
 def _plate(machine: Machine, pose: Pose) -> Floats:
@@ -134,14 +138,21 @@ def _lay_beads(ends: Floats, half: Floats, rows: NDArray[np.int64], field: Field
 
 
 @borrower
-def _under(place: tuple[float, float, float, float], row: int, strict: bool, strokes: Strokes, about: Surroundings) -> int:
+def _under(
+    place: tuple[float, float, float, float],
+    size: tuple[float, float],
+    row: int,
+    strict: bool,
+    strokes: Strokes,
+    about: Surroundings,
+) -> int:
     """Under a place of a bead: 0 nothing, 1 plastic that carries it, 2 plastic where the bead itself should lie.
 
-    place: x, y, z of the bead's top, and how far along all moves it is. strict: only what reaches into the bead's own layer
-    carries it (what lies beside it).
+    place: x, y, z of the bead's top, and how far along all moves it is. size: half its width, and its height. strict: only what
+    reaches into the bead's own layer carries it (what lies beside it).
     """
     x, y, z, at = place
-    field, half, height = about.field, strokes.half[row], strokes.height[row]
+    field, (half, height) = about.field, size
     i, j = int(np.floor((x - field.origin[0]) / field.cell)), int(np.floor((y - field.origin[1]) / field.cell))
     if i < 0 or j < 0 or i >= field.shape[0] or j >= field.shape[1]:
         return 0
@@ -165,15 +176,20 @@ def _under(place: tuple[float, float, float, float], row: int, strict: bool, str
 
 @borrower
 def _classify_support(
-    place: tuple[float, float, float, float], side: tuple[float, float], row: int, strokes: Strokes, about: Surroundings
+    place: tuple[float, float, float, float],
+    size: tuple[float, float],
+    side: tuple[float, float],
+    row: int,
+    strokes: Strokes,
+    about: Surroundings,
 ) -> int:
     """0: a bead hangs in air, 1: lies on something, 2: overlaps others, 3: only has a neighbour; side: unit vector across."""
     x, y, z, at = place
-    half, height, plate = strokes.half[row], strokes.height[row], about.plate
+    (half, height), plate = size, about.plate
     overlapping, bearing = 0, 0
     for k in range(-1, 2):
         off = 2.0 * INNER * half * k
-        under = _under((x + off * side[0], y + off * side[1], z, at), row, False, strokes, about)
+        under = _under((x + off * side[0], y + off * side[1], z, at), size, row, False, strokes, about)
         overlapping += (2 if k == 0 else 1) if under == 2 else 0
         bearing += 1 if under == 1 else 0
     if overlapping > 2:
@@ -184,7 +200,7 @@ def _classify_support(
         return 3
     off = half + 0.75 * about.field.cell + 0.1 * height
     for k in range(-1, 2, 2):
-        if _under((x + k * off * side[0], y + k * off * side[1], z, at), row, True, strokes, about) > 0:
+        if _under((x + k * off * side[0], y + k * off * side[1], z, at), size, row, True, strokes, about) > 0:
             return 3
     return 0
 
@@ -202,26 +218,40 @@ def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: F
     """
     first, last, over_mm = stretch
     for at in range(first, last + 1):
-        if over_mm > 0.0:
-            contacts.air_mm[rows[at]] += pending[at, 0]
-            contacts.beside_mm[rows[at]] += pending[at, 1]
-        pending[at, 0] = pending[at, 1] = 0.0
+        for k in range(2):
+            mm = pending[at, k]
+            if mm == 0.0:  # what is not written takes no memory
+                continue
+            pending[at, k] = 0.0
+            if over_mm > 0.0:
+                if k == 0:
+                    contacts.air_mm[rows[at]] += mm
+                else:
+                    contacts.beside_mm[rows[at]] += mm
 
 
 @kernel
-def _replay_run(rows: NDArray[np.int64], moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts) -> None:
-    """Try each row of a run against the field, then lay it."""
-    pending, first, open_mm, most, held = table(len(rows), 2), 0, 0.0, 0.0, FREE_END
+def _replay_run(
+    rows: NDArray[np.int64], moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats
+) -> None:
+    """Try each row of a run against the field, then lay it; pending: (n, 2) zeros."""
+    first, open_mm, most, held = 0, 0.0, 0.0, FREE_END
+    bead = about.first_bead
     for at in range(len(rows)):
         row = rows[at]
         a, b = moves.start[row], moves.end[row]
-        extruded = strokes.height[row] > 0.0
-        contacts.depth_mm[row] = depth_of(a, b, moves.slack[row], about.field, about.head)
-        if moves.lower[row] > 0.0:
-            down = np.array([0.0, 0.0, moves.lower[row]])
+        extruded = bead < len(moves.rows) and moves.rows[bead] == row
+        slack = moves.width[bead] if extruded else LEVEL_SLACK_MM if moves.low[row] else SLACK_MM
+        depth = depth_of(a, b, slack, about.field, about.head)
+        if depth > 0.0:
+            contacts.depth_mm[row] = depth
+        if moves.crossing[row]:
+            down = np.array([0.0, 0.0, CROSSING_MM])
             contacts.close_mm[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, about.head)
         if not extruded:
             continue
+        size = (0.5 * moves.width[bead], moves.height[bead])
+        bead += 1
         if at and strokes.path[row] != strokes.path[rows[at - 1]]:
             _settle((first, at, open_mm - _free_mm(most, held)), rows, pending, contacts)
             first, open_mm, held = at, 0.0, FREE_END
@@ -235,15 +265,17 @@ def _replay_run(rows: NDArray[np.int64], moves: Moves, strokes: Strokes, about: 
                 t = (k + 0.5) / count
                 way = strokes.way[row] - (1.0 - t) * length
                 support = _classify_support(
-                    (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), way), side, row, strokes, about
+                    (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), way), size, side, row, strokes, about
                 )
                 if support in (0, 3):
-                    most = moves.span[row] if open_mm == 0.0 else min(most, moves.span[row])
+                    span = moves.spans[moves.remark[row]]
+                    most = span if open_mm == 0.0 else min(most, span)
                     pending[at, support // 3] += length / count
                     open_mm += length / count
                 else:
                     _settle((first, at, open_mm - held * most), rows, pending, contacts)
                     first, open_mm, held = at, 0.0, 1.0
-                    contacts.overlapping_mm[row] += length / count if support == 2 else 0.0
-        lay_bead(a, b, strokes.half[row], row, about.field)
+                    if support == 2:
+                        contacts.overlapping_mm[row] += length / count
+        lay_bead(a, b, size[0], row, about.field)
     _settle((first, len(rows) - 1, open_mm - _free_mm(most, held)), rows, pending, contacts)

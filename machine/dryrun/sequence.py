@@ -39,7 +39,7 @@ def _layers(program: ParsedProgram) -> Iterator[Finding]:
     """In every part the first layer that lies lower than the one before it."""
     rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value))
     z, height = program.end[rows, 2], program.height_mm[rows]
-    same = (np.diff(program.part[rows]) == 0) & np.all(program.end[rows[1:], 3:] == program.end[rows[:-1], 3:], axis=1)
+    same = (np.diff(program.part[rows]) == 0) & ~program.turned_between(rows)
     lower = np.flatnonzero(same & (np.diff(program.layer[rows]) != 0) & (np.diff(z) < -0.25 * height[1:] - SLACK_MM))
     for mine in by_part(program, lower + 1, rows):
         k = int(mine[0]) - 1

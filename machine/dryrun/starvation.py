@@ -18,7 +18,7 @@ from machine.dryrun.motion import deltas, standstills
 from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
 from machine.planning.timing import TINY, Blocks, block_time, blocks_of, corner_speed
-from machine.reader.parsed import ParsedProgram
+from machine.reader.parsed import Indices32, ParsedProgram
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
@@ -94,7 +94,7 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
     return Feeding(whole[0], whole[1], float(time_s))
 
 
-def _bytes(lines: Sequence[str], at: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:
     """(m,) bytes on the wire of the line of each block, which stands in text line `at`, and of the lines since the block before.
 
     A further block of the same line (an arc's) has no bytes.

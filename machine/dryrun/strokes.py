@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.fill.infill import infill_cell_mm
@@ -37,106 +37,114 @@ class Beads:
 
 
 class Strokes(NamedTuple):
-    """(n,) of each row: half its bead's width and its height (0: no bead), the path it belongs to, how far along all moves it
-    ends, and whether it is support, which stands off by a gap.
+    """(n,) of each row: the path it belongs to, how far along all moves it ends, and whether it is support, which stands off by a
+    gap.
     """
 
-    half: Floats
-    height: Floats
     path: NDArray[np.int32]
     way: Floats
     stands_off: NDArray[np.bool_]
 
 
 class Moves(NamedTuple):
-    """(n, 5) start and end of each row; (n,) how deep the head may dip during it, by how much lower it is tried too, and how far
-    its bead may span over what is sparse below it.
+    """(n, 5) start and end of each row; (n,) whether it lies below the bead that was just laid, and whether it leads to or from a
+    turn of the table, its remarks. spans: of each of those, how far beads may span over what is sparse below them.
 
-    Apart from Strokes, which the innermost functions take: each array more there slows all of it down.
+    rows, width, height: (m,) of the beads. Apart from Strokes, which the innermost functions take: each array more there slows
+    all of it down.
     """
 
     start: Floats
     end: Floats
-    slack: Floats
-    lower: Floats
-    span: Floats
+    low: NDArray[np.bool_]
+    crossing: NDArray[np.bool_]
+    remark: Indices32
+    spans: Floats
+    rows: NDArray[np.int64]
+    width: Floats
+    height: Floats
 
 
 def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
     """Widths and heights as the program's comments tell, else by its layers or the profile's, and the filament pushed."""
-    height_mm = program.height_mm[rows]
-    first_mm, layer_mm = _layers_mm(segments[:, :, 2], bool((height_mm > 0).any()), profile)
-    usual = np.where(np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
-    height = np.where(height_mm > 0, height_mm, usual)
-    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
-    area = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
-    by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
-    width = np.where(program.width_mm[rows] > 0, program.width_mm[rows], by_flow)
-    return Beads(segments, rows, width, height, length)
+    first_mm, layer_mm = _layers_mm(segments, bool((program.height_mm[rows] > 0).any()), profile)
+    width_mm, height_mm, length_mm = np.empty((3, len(rows)))
+    for some in pieces(len(rows)):
+        ends, told_mm, of_width_mm = segments[some], program.height_mm[rows[some]], program.width_mm[rows[some]]
+        usual = np.where(np.maximum(ends[:, 0, 2], ends[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
+        height = np.where(told_mm > 0, told_mm, usual)
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        area = program.e_mm[rows[some]] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
+        by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
+        width_mm[some], height_mm[some], length_mm[some] = np.where(of_width_mm > 0, of_width_mm, by_flow), height, length
+    return Beads(segments, rows, width_mm, height_mm, length_mm)
 
 
-def _layers_mm(z_mm: Floats, has_heights: bool, profile: Profile) -> tuple[float, float]:
+def _layers_mm(segments: Floats, has_heights: bool, profile: Profile) -> tuple[float, float]:
     """Heights of the first layer and of others for beads that tell none: the profile's, and in a file that tells none at all
-    those of its own level beads; z_mm: (m, 2) of the beads' ends.
+    those of its own level beads.
     """
     process, most = profile.process, profile.machine.head.nozzle_mm  # a higher step is no layer's
     first, usual = process.first_layer_height_mm, process.layer_height_mm
-    levels = np.unique(np.round(z_mm[z_mm[:, 0] == z_mm[:, 1], 1], 3))
-    if has_heights or len(levels) < FEWEST_LEVELS:
+    if has_heights:
+        return first, usual
+    levels = np.unique(np.round(segments[segments[:, 0, 2] == segments[:, 1, 2], 1, 2], 3))
+    if len(levels) < FEWEST_LEVELS:
         return first, usual
     step = float(np.median(np.diff(levels)))
     return (float(levels[0]) if 0.0 < levels[0] <= most else first), (step if step <= most else usual)
 
 
-def strokes_of(program: ParsedProgram, deposited: Beads, extruded: NDArray[np.bool_]) -> Strokes:
+def strokes_of(program: ParsedProgram, extruded: NDArray[np.bool_]) -> Strokes:
     """The strokes of a program."""
-    half, height = np.zeros(len(extruded)), np.zeros(len(extruded))
-    half[deposited.rows], height[deposited.rows] = 0.5 * deposited.width_mm, deposited.height_mm
     begins = np.ones(len(extruded), dtype=np.bool_)
     begins[1:] = ~(np.all(program.start[1:] == program.end[:-1], axis=1) & extruded[1:] & extruded[:-1])
-    path = np.cumsum(begins).astype(np.int32)
-    way = np.cumsum(np.linalg.norm((program.end - program.start)[:, :3], axis=1))
-    stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.type]
-    return Strokes(half, height, path, way, stands_off)
+    path, way = np.cumsum(begins, dtype=np.int32), program.way_mm
+    stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.remarks.type][program.remark]
+    return Strokes(path, np.cumsum(way, out=way), stands_off)
 
 
-def moves_of(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats, profile: Profile) -> Moves:
-    """The moves of a program; half: (n,) of its strokes."""
-    across = np.hypot(*(program.end - program.start)[:, :2].T)
-    slack, lower = _slacks(program, extruded, half, across), _ways_to_turns(program, extruded, across)
-    return Moves(program.start, program.end, slack, lower, _spans(program, profile))
+def moves_of(program: ParsedProgram, deposited: Beads, profile: Profile) -> Moves:
+    """The moves of a program."""
+    others = np.flatnonzero(program.kind != MoveKind.EXTRUDE)
+    across = np.hypot(*(program.end[others] - program.start[others])[:, :2].T)
+    low, crossing = np.zeros((2, len(program.line)), dtype=np.bool_)
+    low[_below_last_bead(program, others[across > ACROSS_MM], deposited.rows)] = True
+    crossing[_ways_to_turns(program, others[across > WAY_MM], deposited.rows)] = True
+    spans, beads = _spans(program, profile), (deposited.rows, deposited.width_mm, deposited.height_mm)
+    return Moves(program.start, program.end, low, crossing, program.remark, spans, *beads)
 
 
 def _spans(program: ParsedProgram, profile: Profile) -> Floats:
-    """(n,) how far each bead may span: what fills, over sparse infill's cells; support, over its own lines; any, its width."""
+    """How far a bead may span that some remarks are of: what fills, over sparse infill's cells; support, over its own lines; any,
+    its width: walls, too, bridge slots and teeth narrower than themselves.
+    """
     process = profile.process
     infill_mm, support_mm = infill_cell_mm(process), support_cell_mm(process)
     of_type = {**dict.fromkeys(FILLING, infill_mm), Kind.INFILL.value: ZIGZAG * infill_mm, **dict.fromkeys(SUPPORT, support_mm)}
-    spans: Floats = np.array([of_type.get(name, 0.0) for name in program.types])[program.type]
-    return np.maximum(spans, program.width_mm)  # walls too: they bridge slots and teeth narrower than themselves
+    of_types = np.array([of_type.get(name, 0.0) for name in program.types])
+    spans: Floats = np.maximum(of_types[program.remarks.type], program.remarks.width_mm)
+    return spans
 
 
-def _slacks(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats, across: Floats) -> Floats:
-    """(n,) how deep the head may dip: a stroke by its bead's width, a travel below the last bead of its pose next to nothing."""
-    rows = np.flatnonzero(~extruded & (across > ACROSS_MM))
-    last = np.maximum.accumulate(np.where(extruded, np.arange(len(extruded)), -1))[rows]
+def _below_last_bead(program: ParsedProgram, rows: NDArray[np.int64], beads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of some travels that go below the last bead, laid at their own pose."""
+    after = np.searchsorted(beads, rows)
+    rows, last = rows[after > 0], beads[after[after > 0] - 1]
     height = np.maximum(program.start[last, 2], program.end[last, 2])
-    same_pose = (last >= 0) & (program.end[rows, 3] == program.end[last, 3]) & (program.end[rows, 4] == program.end[last, 4])
-    low = same_pose & (np.minimum(program.start[rows, 2], program.end[rows, 2]) < height - LEVEL_SLACK_MM)
-    slack = np.where(extruded, 2.0 * half, SLACK_MM)
-    slack[rows[low]] = LEVEL_SLACK_MM
-    return slack
+    same_pose = (program.end[rows, 3] == program.end[last, 3]) & (program.end[rows, 4] == program.end[last, 4])
+    below: NDArray[np.int64] = rows[
+        same_pose & (np.minimum(program.start[rows, 2], program.end[rows, 2]) < height - LEVEL_SLACK_MM)
+    ]
+    return below
 
 
-def _ways_to_turns(program: ParsedProgram, extruded: NDArray[np.bool_], across: Floats) -> Floats:
-    """(n,) CROSSING_MM for travels between the last bead before a turn of the table and the first one after it, else 0."""
-    lower, strokes = np.zeros(len(extruded)), np.flatnonzero(extruded)
-    if not (program.kind == MoveKind.ROTATE).any():
-        return lower
-    turns = np.cumsum(program.kind == MoveKind.ROTATE)
-    rows = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0.0) & (across > WAY_MM))
-    after = np.searchsorted(strokes, rows)
-    within = (after > 0) & (after < len(strokes))
+def _ways_to_turns(program: ParsedProgram, rows: NDArray[np.int64], beads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of some rows that travel between the last bead before a turn of the table and the first one after it."""
+    turns = np.flatnonzero(program.kind == MoveKind.ROTATE)
+    rows = rows[(program.kind[rows] == MoveKind.TRAVEL) & (program.e_mm[rows] >= 0.0)]
+    after = np.searchsorted(beads, rows)
+    within = (after > 0) & (after < len(beads))
     rows, after = rows[within], after[within]
-    lower[rows[turns[strokes[after]] > turns[strokes[after - 1]]]] = CROSSING_MM
-    return lower
+    next_turn, last_turn = (np.searchsorted(turns, beads[at]) for at in (after, after - 1))
+    return rows[next_turn > last_turn]

@@ -1,11 +1,14 @@
-"""G-code file: a program that is read line by line, as often as wanted, and never held whole."""
+"""G-code file: a program that is read line by line, as often as wanted, or held as its lines."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import file_digest
 from pathlib import Path
 
+from machine.gcode.lines import Lines
 from profiles.errors import GcodeError, reason
+
+PIECE = 1 << 18  # characters
 
 
 class GcodeFile:
@@ -18,6 +21,11 @@ class GcodeFile:
         with self._refusing(), self.path.open(encoding="utf-8-sig") as file:
             for line in file:
                 yield line.rstrip("\n")
+
+    def lines(self) -> Lines:
+        """All lines at once; raises GcodeError."""
+        with self._refusing(), self.path.open(encoding="utf-8-sig") as file:
+            return Lines.of_text(iter(lambda: file.read(PIECE), ""))
 
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the file's bytes; raises GcodeError."""

@@ -3,15 +3,16 @@
 import re
 from collections.abc import Iterable
 
+from machine.gcode.lines import Lines
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, PAREN, quote, read_words, unframe
 from machine.reader.codes import dispatch
 from machine.reader.macros import macro
 from machine.reader.motion import flush
 from machine.reader.parsed import ParsedProgram
-from machine.reader.plain_moves import letters_of, read_plain_moves, text_of
+from machine.reader.plain_moves import Text, letters_of, read_plain_moves
 from machine.reader.remarks import remark
 from machine.reader.state import Reader, Words, reader_of
-from machine.reader.table import parsed_program
+from machine.reader.table import Table
 from profiles.errors import GcodeError
 from profiles.machine import Machine
 
@@ -26,18 +27,19 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     Raises GcodeError, with the line, for what is not G-code and for motion codes that are not supported; M codes and
     macros that are not known are counted in `ignored`: code -> (first line, how often).
     """
-    reader, lines = reader_of(machine), tuple(lines)
-    text, letters, at = text_of(lines), letters_of(reader), 0
+    reader, lines = reader_of(machine), Lines.of(lines)
+    table, text, letters, at = Table(reader, len(lines)), Text(lines.content, lines.start), letters_of(reader), 0
     while at < len(lines):
-        after = read_plain_moves(reader, text, letters, at) if lines[at][:2] in ("G1", "G0") else at
+        line = lines[at]
+        after = read_plain_moves(reader, text, letters, at) if line[:2] in ("G1", "G0") else at
         if after == at:
             reader.number = after = at + 1
-            _line(reader, lines[at])
+            _line(reader, line)
         at = after
+        table.take_some()
     if reader.turning:
         flush(reader)
-    del text
-    return parsed_program(reader)
+    return table.program()
 
 
 def _line(reader: Reader, line: str) -> None:

@@ -1,7 +1,9 @@
 """Parsed: what a G-code text holds, as arrays with one row per move."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,8 @@ from machine.gcode.part_totals import PartTotals
 from mdp.mesh import Floats
 from mdp.pose import Pose
 
+AT_ONCE = 16_384  # rows
+Indices32 = NDArray[np.int32]
 OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
 
 
@@ -44,33 +48,38 @@ class Unheld:
     reason: str
 
 
+class Remarks(NamedTuple):
+    """What comments and M204 tell of the rows that follow, (k,) each: part, layer, type, width and height of a bead, mm/s2."""
+
+    part: Indices32
+    layer: Indices32
+    type: Indices32
+    width_mm: Floats
+    height_mm: Floats
+    acceleration: Floats
+
+
 @dataclass(frozen=True, eq=False)
 class ParsedProgram:
     """A G-code text as arrays with one row per move (n rows).
 
     line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row
-    before where G28 or G92 set a position. e_mm: filament pushed by the move. filament_mm: running sum of e_mm. feed:
-    F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
-    type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
-    acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
-    in order. unsupported: the places that no support could be given. announced: how many parts `;PART:1 of 3` tells, 0 where none
-    does; part_totals: what comments tell of the parts' beads.
+    before where G28 or G92 set a position. e_mm: filament pushed by the move. feed: F in
+    units per minute. kind: MoveKind. remark: which of remarks holds for the row. types: the ;TYPE: names. layers: number of layer
+    changes. parts: numbers of the parts in order. unsupported: the places that no
+    support could be given. announced: how many parts `;PART:1 of 3` tells, 0 where none does; part_totals: what comments tell of
+    the parts' beads.
     """
 
-    line: NDArray[np.int64]
+    line: Indices32
     start: Floats
     end: Floats
     e_mm: Floats
-    filament_mm: Floats
     feed: Floats
     kind: NDArray[np.int8]
-    part: NDArray[np.int64]
-    layer: NDArray[np.int64]
-    type: NDArray[np.int64]
+    remark: Indices32
+    remarks: Remarks
     types: tuple[str, ...]
-    width_mm: Floats
-    height_mm: Floats
-    acceleration: Floats
     events: tuple[Event, ...]
     ignored: dict[str, tuple[int, int]]
     layers: int
@@ -79,15 +88,71 @@ class ParsedProgram:
     announced: int
     part_totals: tuple[PartTotals, ...]
 
+    @property
+    def part(self) -> Indices32:
+        """(n,) from ;PART: comments, 0 before the first."""
+        return self.remarks.part[self.remark]
+
+    @property
+    def layer(self) -> Indices32:
+        """(n,) from ;LAYER_CHANGE comments, counted in each part, 0 before the first."""
+        return self.remarks.layer[self.remark]
+
+    @property
+    def type(self) -> Indices32:
+        """(n,) index into types."""
+        return self.remarks.type[self.remark]
+
+    @property
+    def width_mm(self) -> Floats:
+        """(n,) from ;WIDTH:, 0 when not told."""
+        return self.remarks.width_mm[self.remark]
+
+    @property
+    def height_mm(self) -> Floats:
+        """(n,) from ;HEIGHT:, 0 when not told."""
+        return self.remarks.height_mm[self.remark]
+
+    @property
+    def acceleration(self) -> Floats:
+        """(n,) mm/s2 told by M204, inf where the axes decide."""
+        return self.remarks.acceleration[self.remark]
+
+    @property
+    def filament_mm(self) -> Floats:
+        """(n,) running sum of e_mm."""
+        pushed: Floats = np.cumsum(self.e_mm)
+        return pushed
+
+    @property
+    def way_mm(self) -> Floats:
+        """(n,) how far X Y Z go in each move."""
+        way_mm = np.empty(len(self.line))
+        for some in pieces(len(way_mm)):
+            way_mm[some] = np.linalg.norm(self.end[some, :3] - self.start[some, :3], axis=1)
+        return way_mm
+
+    def turned_between(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(m - 1,) whether the table stands otherwise after the one than after the other of each two of (m,) rows."""
+        tilt_deg, turn_deg = self.end[rows, 3], self.end[rows, 4]
+        turned: NDArray[np.bool_] = (tilt_deg[1:] != tilt_deg[:-1]) | (turn_deg[1:] != turn_deg[:-1])
+        return turned
+
     def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
         """(m,) a number for the layer of each row, another in each part."""
-        keys: NDArray[np.int64] = self.part[rows] * (int(self.layer.max(initial=0)) + 1) + self.layer[rows]
+        part, layer = self.remarks.part.astype(np.int64), self.remarks.layer
+        keys: NDArray[np.int64] = (part * (int(layer.max(initial=0)) + 1) + layer)[self.remark[rows]]
         return keys
 
     def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
         """(n,) which rows belong to these ;TYPE: names."""
-        marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.type]
-        return marked
+        marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.remarks.type]
+        return marked[self.remark]
+
+
+def pieces(count: int) -> Iterator[slice]:
+    """So many rows some at a time, where what is worked out of each takes many times what comes of it."""
+    return (slice(begin, min(begin + AT_ONCE, count)) for begin in range(0, count, AT_ONCE))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ They are 98 lines in a hundred of a program. What is not usual ends the run, and
 the machine's axes and F, a feed that is not above 0, a number of more digits than one division reads exactly, comments.
 """
 
-from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -25,7 +24,7 @@ MOST_AT_ONCE = 4096  # lines
 
 
 class Text(NamedTuple):
-    """Lines as bytes, one for each character; line k is text[start[k]:start[k + 1]]."""
+    """Lines as bytes; line k is text[start[k]:start[k + 1]], with its end."""
 
     text: Bytes
     start: NDArray[np.int64]
@@ -45,13 +44,6 @@ class Meaning(NamedTuple):
     feed_share: float
     rapid: bool
     travelling: float
-
-
-def text_of(lines: Sequence[str]) -> Text:
-    """The lines for the kernel; a character that is not ASCII becomes a question mark, which is in no plain move."""
-    start = np.zeros(len(lines) + 1, dtype=np.int64)
-    np.cumsum(np.fromiter(map(len, lines), dtype=np.int64, count=len(lines)), out=start[1:])
-    return Text(np.frombuffer("".join(lines).encode("ascii", "replace"), dtype=np.uint8), start)
 
 
 def letters_of(reader: Reader) -> NDArray[np.int8]:

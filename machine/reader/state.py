@@ -1,4 +1,4 @@
-"""State: what the firmware knows while a text is read, and the rows and events read so far."""
+"""State: what the firmware knows while a text is read, and the rows and events read of late."""
 
 from array import array
 from collections.abc import Mapping
@@ -58,6 +58,7 @@ class Reader:
     announced: int = 0
     part_totals: list[PartTotals] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
+    taken: int = 0  # rows that were here before
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
     unsupported: list[Unheld] = field(default_factory=list)
@@ -73,7 +74,7 @@ class Reader:
 
     def note(self, code: str, value: float, letters: str) -> None:
         """Put an event on record, before the next row."""
-        self.events.append(Event(self.number, code, value, letters, len(self.rows) // ROW))
+        self.events.append(Event(self.number, code, value, letters, self.taken + len(self.rows) // ROW))
 
     def ignore(self, code: str) -> None:
         """Count what is not understood and does not move."""

@@ -1,6 +1,7 @@
 """Table: the rows of a reader as arrays in axis positions, feeds in the terms of the timeline."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +9,16 @@ from numpy.typing import NDArray
 from machine.gcode.modes import E_AXIS
 from machine.kinematics.coordinates import axis_positions
 from machine.planning.timing import axis_speeds, lengths
-from machine.reader.parsed import Event, MoveKind, ParsedProgram
+from machine.reader.parsed import Event, MoveKind, ParsedProgram, Remarks
 from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, FOLLOWED, HEIGHT, LAYER, LINE, PART, ROW, TYPE, WIDTH, Reader
 from mdp.mesh import Floats
 
+E_BEFORE, E_AFTER = BEFORE + E_AXIS, AFTER + E_AXIS
+AT_ONCE = 16_384  # rows
+TOLD = (PART, LAYER, TYPE, WIDTH, HEIGHT, ACCELERATION)  # as in Remarks
+COLUMNS: dict[str, type[np.generic]] = {
+    "line": np.int32, "e_mm": np.float64, "feed": np.float64, "kind": np.int8, "remark": np.int32,
+}  # fmt: skip
 STILL = 1e-9
 SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded places, lets the head leave its place by less
 
@@ -29,7 +36,7 @@ class _Rows:
     @property
     def e_mm(self) -> Floats:
         """(n,) filament pushed."""
-        pushed: Floats = self.read[:, AFTER + E_AXIS] - self.read[:, BEFORE + E_AXIS]
+        pushed: Floats = self.read[:, E_AFTER] - self.read[:, E_BEFORE]
         return pushed
 
     def change(self) -> Floats:
@@ -37,11 +44,99 @@ class _Rows:
         return np.column_stack([self.end - self.start, self.e_mm])
 
 
-def parsed_program(reader: Reader) -> ParsedProgram:
-    """All that was read."""
-    read = np.asarray(reader.rows, dtype=np.float64).reshape(-1, ROW)  # no copy: a long program has 100 MB of rows
+class Table:
+    """The rows of a reader as they come, in columns: what the reader has of a row takes twice as much.
+
+    There is room for a row a line; arcs, which have several, make more. Where every row begins at the end of the one before it,
+    as nearly always, starts and ends are the same places.
+    """
+
+    def __init__(self, reader: Reader, room: int) -> None:
+        self._reader, self._count, self._events = reader, 0, list[Event]()
+        self._places, self._starts = np.empty((room + 1, E_AXIS)), np.empty((0, E_AXIS))
+        self._columns = {name: np.empty(room, kind) for name, kind in COLUMNS.items()}
+        self._remarks, self._told = [np.empty((0, len(TOLD)))], np.full((1, len(TOLD)), np.nan)
+
+    def take_some(self) -> None:
+        """Take the rows once there are many, after a bead: no turn goes on there."""
+        rows = self._reader.rows
+        if len(rows) >= AT_ONCE * ROW and not self._reader.turning and rows[E_BEFORE - ROW] != rows[E_AFTER - ROW]:
+            self._take()
+
+    def _take(self) -> None:
+        """Take all rows that the reader has now from it."""
+        reader = self._reader
+        read = np.array(reader.rows, dtype=np.float64).reshape(-1, ROW)
+        events = [replace(event, row=event.row - reader.taken) for event in reader.events]
+        reader.taken += len(read)
+        del reader.rows[:], reader.events[:]
+        rows = _in_axis_positions(read, tuple(events), reader)
+        begin, end = self._count, self._count + len(rows.read)
+        self._events += [replace(event, row=begin + event.row) for event in rows.events]
+        self._make_room(end)
+        self._place(rows)
+        values = {"line": rows.read[:, LINE], "e_mm": rows.e_mm, "feed": rows.feed, "kind": _kinds(rows.change())}
+        for name, column in (values | {"remark": self._remark(rows.read[:, TOLD])}).items():
+            self._columns[name][begin:end] = column
+        self._count = end
+
+    def _place(self, rows: _Rows) -> None:
+        """Starts and ends of further rows."""
+        begin, end = self._count, self._count + len(rows.read)
+        if begin == end:
+            return
+        if not begin:
+            self._places[0] = rows.start[0]
+        before = np.vstack([self._places[begin], rows.end[:-1]])
+        if not len(self._starts) and not np.array_equal(rows.start, before):
+            self._starts = np.empty((len(self._places) - 1, E_AXIS))
+            self._starts[:begin] = self._places[:begin]
+        if len(self._starts):
+            self._starts[begin:end] = rows.start
+        self._places[begin + 1 : end + 1] = rows.end
+
+    def _remark(self, told: Floats) -> NDArray[np.int64]:
+        """(k,) which remarks hold for some rows, given what has been told of each: those that follow each other often have the
+        same.
+        """
+        new = (told != np.vstack([self._told, told[:-1]])[: len(told)]).any(axis=1)
+        known = sum(map(len, self._remarks))
+        self._remarks.append(told[new])
+        self._told = told[-1:] if len(told) else self._told
+        return np.cumsum(new) + (known - 1)
+
+    def _make_room(self, count: int) -> None:
+        if count < len(self._places):
+            return
+        self._places = _longer(self._places, 2 * count + 1)
+        self._starts = _longer(self._starts, 2 * count) if len(self._starts) else self._starts
+        self._columns = {name: _longer(column, 2 * count) for name, column in self._columns.items()}
+
+    def program(self) -> ParsedProgram:
+        """All that was read."""
+        self._take()
+        reader, count, told = self._reader, self._count, np.concatenate(self._remarks).T
+        return ParsedProgram(
+            **{name: column[:count] for name, column in self._columns.items()},
+            start=(self._starts if len(self._starts) else self._places)[:count], end=self._places[1 : count + 1],
+            remarks=Remarks(*told[:3].astype(np.int32), *told[3:]), types=tuple(reader.types),
+            events=tuple(self._events), ignored=reader.ignored,
+            layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
+            announced=reader.announced, part_totals=tuple(reader.part_totals),
+        )  # fmt: skip
+
+
+def _longer(column: NDArray[Any], length: int) -> NDArray[Any]:
+    """An array with room for more."""
+    longer = np.empty((length, *column.shape[1:]), column.dtype)
+    longer[: len(column)] = column
+    return longer
+
+
+def _in_axis_positions(read: Floats, events: tuple[Event, ...], reader: Reader) -> _Rows:
+    """Rows that were read, as the machine's axes go."""
     start, end = (read[:, first : first + E_AXIS] for first in (BEFORE, AFTER))
-    rows = _Rows(read, start, end, read[:, FEED], tuple(reader.events))
+    rows = _Rows(read, start, end, read[:, FEED], events)
     asked = _feed_length(rows.change(), reader.dialect.largest_delta)
     followed = np.flatnonzero(read[:, FOLLOWED] > 0)
     if len(followed):
@@ -51,21 +146,7 @@ def parsed_program(reader: Reader) -> ParsedProgram:
         keep = _turn_starts(rows, followed)
     change = rows.change()
     rows = replace(rows, feed=_feeds(rows.feed, asked, change, axis_speeds(reader.machine)))
-    if len(followed):
-        rows = _merge_turns(keep, rows, change)
-        change = rows.change()
-    kind, e_mm = _kinds(change), rows.e_mm
-    del change
-    line, part, layer, kind_of_bead = (rows.read[:, column].astype(np.int64) for column in (LINE, PART, LAYER, TYPE))
-    width, height, acceleration = (rows.read[:, column].copy() for column in (WIDTH, HEIGHT, ACCELERATION))
-    return ParsedProgram(  # columns of their own: one view of the rows would hold all of them
-        line=line, start=rows.start.copy(), end=rows.end.copy(), e_mm=e_mm, filament_mm=np.cumsum(e_mm), feed=rows.feed.copy(),
-        kind=kind, part=part, layer=layer, type=kind_of_bead, types=tuple(reader.types),
-        width_mm=width, height_mm=height, acceleration=acceleration,
-        events=rows.events, ignored=reader.ignored,
-        layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
-        announced=reader.announced, part_totals=tuple(reader.part_totals),
-    )  # fmt: skip
+    return _merge_turns(keep, rows, change) if len(followed) else rows
 
 
 def _kinds(change: Floats) -> NDArray[np.int8]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import Indices32, MoveKind, ParsedProgram
 from machine.view.encoding import Column
 from mdp.mesh import Floats
 
@@ -33,7 +33,7 @@ class Layers:
 def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
     """The layers of a program. layer_height_mm: by how much a helix rises until it is a new layer."""
     commented = program.layers > 0
-    number = program.layer if commented else _by_heights(program, layer_height_mm)
+    number = program.layer.astype(np.int64) if commented else _by_heights(program, layer_height_mm)
     changes = np.ones(len(number), dtype=np.bool_)
     changes[1:] = (np.diff(number) != 0) | (np.diff(program.part) != 0)
     begins = np.flatnonzero(changes)
@@ -86,7 +86,7 @@ def columns(
     }
 
 
-def _ground(part: NDArray[np.int64], top: Floats, height_mm: Floats, layers: Layers) -> Floats:
+def _ground(part: Indices32, top: Floats, height_mm: Floats, layers: Layers) -> Floats:
     """(l,) machine Z at which the part of each layer begins: its first layer's beads less their height."""
     parts, places, back = np.unique(part, return_index=True, return_inverse=True)
     thick = np.array(

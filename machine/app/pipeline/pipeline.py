@@ -13,6 +13,7 @@ from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
 from machine.app.pipeline.given_plan import as_turned, check_parts_named, lays_down, read_given_plan, with_plan_settings
+from machine.app.pipeline.memory import return_unused
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.advice import laid_in_words
@@ -20,6 +21,7 @@ from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
 from machine.gcode.blocks import check_blocks
+from machine.gcode.lines import Lines
 from machine.gcode.writer import write_gcode
 from machine.planning.fit import check_parts, check_standing
 from machine.planning.moves import MachineProgram
@@ -163,6 +165,7 @@ def build(
     check_blocks(profile)
     check_parts(parts, profile)
     compilers.wait_for(compilers.PROGRAM, report)
+    return_unused()  # of the search
     with reporting() if report is None else nullcontext(report) as tell:
 
         def show(slicing: SlicingProgress) -> None:
@@ -176,10 +179,12 @@ def build(
         program = plan(decomposition, sliced, profile, stops)
         for note in (*_too_thin(sliced, profile), *_without_pins(sliced, profile), *_left_out(program, profile)):
             say(f"{decomposition.name}: {note}")
-        lines = tuple(write_gcode(program, profile))
+        lines: Sequence[str] = Lines.of(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
             compilers.wait_for(compilers.PICTURES, tell)
             lines = with_thumbnails(lines, decomposition, profile)
+        del program  # as large as its text, and that tells all of it
+        return_unused()
         tell("dry run")
         run = dry_run(lines, profile)
     return Program(lines, run, _with_own_figures(decomposition, run), sliced)

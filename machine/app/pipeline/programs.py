@@ -8,11 +8,11 @@ from machine.app.embedded_profile import in_words, read_embedded_profile
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import refuse_cuts
 from machine.app.pipeline.memory import return_large_arrays
-from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.findings import Finding
+from machine.gcode.lines import Lines
 from machine.program import Program
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import GcodeError, MoveError
@@ -38,6 +38,8 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     """The program of a model or of a G-code file. Raises GcodeError for a file that cannot be read."""
     return_large_arrays()
     if not request.is_gcode:
+        from machine.app.pipeline.pipeline import build, decompose_model  # a G-code file needs no search and no slicer
+
         decomposed = decompose_model(request, to_build=True)
         program = build(decomposed.decomposition, decomposed.profile, stops=request.stops)
         return LoadedProgram(request.name, program, decomposed.profile)
@@ -52,9 +54,9 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     return LoadedProgram(request.name, Program(lines, dry_run(lines, profile), None), profile, source, known)
 
 
-def read_gcode_lines(path: Path) -> tuple[str, ...]:
+def read_gcode_lines(path: Path) -> Lines:
     """The lines of a G-code file. Raises GcodeError when it cannot be read, is no text or is empty."""
-    lines = tuple(GcodeFile(path))
+    lines = GcodeFile(path).lines()
     if not any(line.strip() for line in lines):
         raise GcodeError(f"G-code file {path} is empty")
     return lines

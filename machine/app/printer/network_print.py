@@ -1,6 +1,6 @@
 """Network print: a program handed over to a print server, started there and followed to its end; one that runs there followed."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -178,7 +178,7 @@ class ReportedProgress:
 class ServerProgress(ReportedProgress):
     """The same of a known program; part and layer are those of the place up to which the server has read the file."""
 
-    def __init__(self, upload: GcodeUpload, lines: tuple[str, ...], remaining_s: Callable[[int], float]) -> None:
+    def __init__(self, upload: GcodeUpload, lines: Sequence[str], remaining_s: Callable[[int], float]) -> None:
         super().__init__()
         self._line_at, self._lines, self._remaining_s = upload.line_at, lines, remaining_s
         self._position = ProgramPosition()

@@ -4,7 +4,7 @@ Whoever asks a person, at the terminal or at a page, is given the question as te
 told where it stands: until the answer is yes, nothing of it moves or heats.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import hypot
@@ -63,7 +63,7 @@ class Resumption:
     profile: Profile
     text: GcodeFile
     point: InterruptedPrint
-    lines: tuple[str, ...]
+    lines: Sequence[str]
 
     @property
     def name(self) -> str:

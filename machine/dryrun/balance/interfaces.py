@@ -13,7 +13,7 @@ import numpy as np
 from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.strokes import Beads
-from machine.reader.parsed import ParsedProgram
+from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose, rotation
 from profiles.profile import Profile
@@ -112,35 +112,36 @@ def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> It
     """The interface of every part that stands on others, in print order."""
     part, layer = program.part[deposited.rows], program.layer[deposited.rows]
     own = ~program.rows_of_types(*NO_PART)[deposited.rows] & (part > 0)
-    filament_mm2 = pi * profile.material.diameter_mm**2 / 4.0
-    mm3, spare_mm3 = program.e_mm[deposited.rows] * filament_mm2, profile.material.prime_extra_mm * filament_mm2
-    ups = _printing_directions(program, deposited, profile)
-    for index in sorted(set(part[own].tolist()))[1:]:
+    for index in np.unique(part[own])[1:].tolist():
         mine = np.flatnonzero(own & (part == index))
         first = mine[layer[mine] == layer[mine].min()]
         turn = rotation(profile.machine, Pose(*program.end[deposited.rows[first[0]], 3:].tolist()))
         earlier = np.flatnonzero(own & (part < index) & (deposited.rows < deposited.rows[first[0]]))
-        yield _interface(program, deposited, (first, earlier), (turn, ups, mm3, spare_mm3))
+        yield _interface(program, deposited, (first, earlier), turn, profile)
 
 
-def _printing_directions(program: ParsedProgram, deposited: Beads, profile: Profile) -> Floats:
-    """(m, 3) direction in which each bead was laid, workpiece frame."""
-    poses, which = np.unique(program.end[deposited.rows, 3:], axis=0, return_inverse=True)
+def _printing_directions(program: ParsedProgram, rows: Indices, profile: Profile) -> Floats:
+    """(k, 3) direction in which the bead of each row was laid, workpiece frame."""
+    if not len(rows):
+        return np.zeros((0, 3))
+    poses, which = np.unique(program.end[rows, 3:], axis=0, return_inverse=True)
     return np.array([rotation(profile.machine, Pose(*pose))[2] for pose in poses.tolist()])[which.ravel()]
 
 
 def _interface(
-    program: ParsedProgram, deposited: Beads, which: tuple[Indices, Indices], given: tuple[Floats, Floats, Floats, float]
+    program: ParsedProgram, deposited: Beads, which: tuple[Indices, Indices], turn: Floats, profile: Profile
 ) -> Interface:
-    """which: beads of the first layer, and of earlier parts; given: turn into the part's frame, ups, plastic of each bead, and
-    how much of it may make up for what has oozed.
-    """
-    (first, earlier), (turn, ups, mm3, spare_mm3) = which, given
-    layer = _bars(deposited, first, turn, ups, mm3)
+    """which: beads of the first layer, and of earlier parts; turn: into the part's frame."""
+    first, earlier = which
+    layer = _bars(program, deposited, first, turn, profile)
+    mm3 = program.e_mm[deposited.rows[first]] * _filament_mm2(profile)
+    spare_mm3 = profile.material.prime_extra_mm * _filament_mm2(profile)
     tip_mm = float(np.median(layer.end[:, 2]))
     lattice = lattice_over(np.concatenate([layer.begin, layer.end])[:, :2], CELL_MM)
-    near = np.abs((deposited.segments_mm[earlier] @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
-    below_mm = tops(_bars(deposited, earlier[near], turn, ups, mm3), lattice)
+    near = np.zeros(len(earlier), np.bool_)
+    for some in pieces(len(earlier)):
+        near[some] = np.abs((deposited.segments_mm[earlier[some]] @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
+    below_mm = tops(_bars(program, deposited, earlier[near], turn, profile), lattice)
     height = float(np.median(deposited.height_mm[first]))
     wide = layer._replace(half=0.5 * deposited.width_mm[first])
     bead = tops(wide, lattice) > NOTHING
@@ -155,7 +156,7 @@ def _interface(
         touching=touching,
         bead=bead,
         room=np.where(touching, room_mm, 0.0) * lattice.column_mm2,
-        plastic=laid(wide, mm3[first] - _run_in(deposited, first, mm3[first], spare_mm3), lattice),
+        plastic=laid(wide, mm3 - _run_in(deposited, first, mm3, spare_mm3), lattice),
         walls=Bars(*(values[program.rows_of_types(*AT_THE_EDGE)[deposited.rows[first]]] for values in wide)),
     )
 
@@ -170,11 +171,17 @@ def _run_in(deposited: Beads, first: Indices, mm3: Floats, spare_mm3: float) -> 
     return np.diff(np.minimum(beyond, spare_mm3), prepend=0.0)
 
 
-def _bars(deposited: Beads, which: Indices, turn: Floats, ups: Floats, mm3: Floats) -> Bars:
+def _filament_mm2(profile: Profile) -> float:
+    return pi * profile.material.diameter_mm**2 / 4.0
+
+
+def _bars(program: ParsedProgram, deposited: Beads, which: Indices, turn: Floats, profile: Profile) -> Bars:
     """Some beads as bars in a turned frame, as wide as their plastic makes them at their height."""
     begin, end = (deposited.segments_mm[which, side] @ turn.T for side in (0, 1))
     height, length = deposited.height_mm[which], np.maximum(deposited.length_mm[which], 1e-9)
-    return Bars(begin, end, ups[which] @ turn.T, 0.5 * mm3[which] / length / height, height)
+    rows = deposited.rows[which]
+    mm3 = program.e_mm[rows] * _filament_mm2(profile)
+    return Bars(begin, end, _printing_directions(program, rows, profile) @ turn.T, 0.5 * mm3 / length / height, height)
 
 
 def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:

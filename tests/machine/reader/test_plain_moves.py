@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from machine.reader.parse import parse_gcode
-from machine.reader.parsed import ParsedProgram
+from machine.reader.parsed import ParsedProgram, Remarks
 from profiles.errors import GcodeError
 from profiles.profile import load
 
@@ -37,7 +37,7 @@ def in_turn(lines: list[str]) -> list[str]:
 def assert_same(first: ParsedProgram, second: ParsedProgram) -> None:
     for field in fields(ParsedProgram):
         a, b = getattr(first, field.name), getattr(second, field.name)
-        assert np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b, field.name
+        assert np.array_equal(a, b) if isinstance(a, np.ndarray | Remarks) else a == b, field.name
 
 
 @given(st.lists(st.one_of(MOVES, MOVES, MOVES, OTHERS), max_size=30))

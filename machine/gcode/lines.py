@@ -1,0 +1,84 @@
+"""Lines: a G-code text as a sequence of its lines that holds their bytes, a third of what strings of their own would take."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+AT_ONCE = 4096  # lines
+NEWLINE = 10
+
+
+class Lines(Sequence[str]):
+    """The lines of a text without their ends; equal to any sequence of the same lines.
+
+    content: UTF-8 with a line end after every line; start: (n + 1,) where each line begins, and where the last one ends.
+    """
+
+    def __init__(self, content: NDArray[np.uint8], start: NDArray[np.int64]) -> None:
+        self.content, self.start = content, start
+
+    @classmethod
+    def of(cls, lines: Iterable[str]) -> "Lines":
+        """Any lines, taken one by one."""
+        if isinstance(lines, Lines):
+            return lines
+        content, sizes, left = bytearray(), [np.zeros(1, dtype=np.int64)], iter(lines)
+        while some := [_bytes(line) for line in islice(left, AT_ONCE)]:
+            sizes.append(np.fromiter(map(len, some), dtype=np.int64, count=len(some)) + 1)
+            content += b"\n".join((*some, b""))
+        return cls(_exact(content), np.cumsum(np.concatenate(sizes)))
+
+    @classmethod
+    def of_text(cls, pieces: Iterable[str]) -> "Lines":
+        """A text that comes in pieces, whose lines end with a line feed."""
+        content, ends = bytearray(), [np.zeros(1, dtype=np.int64)]
+        for piece in pieces:
+            some = _bytes(piece)
+            ends.append(np.flatnonzero(np.frombuffer(some, dtype=np.uint8) == NEWLINE) + len(content) + 1)
+            content += some
+        if content and content[-1] != NEWLINE:
+            content.append(NEWLINE)
+            ends.append(np.array([len(content)]))
+        return cls(_exact(content), np.concatenate(ends))
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    @overload
+    def __getitem__(self, at: int) -> str: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> "Lines": ...
+
+    def __getitem__(self, at: int | slice) -> "str | Lines":
+        if isinstance(at, slice):
+            return Lines.of([self[k] for k in range(*at.indices(len(self)))])
+        k = range(len(self))[at]
+        return _text(self.content[self.start[k] : self.start[k + 1] - 1])
+
+    def __iter__(self) -> Iterator[str]:
+        for first in range(0, len(self), AT_ONCE):
+            last = min(first + AT_ONCE, len(self))
+            some = _text(self.content[self.start[first] : self.start[last] - 1]).split("\n")
+            yield from some if len(some) == last - first else (self[k] for k in range(first, last))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and len(self) == len(other) and all(a == b for a, b in zip(self, other, strict=True))
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _exact(content: bytearray) -> NDArray[np.uint8]:
+    """The bytes without the room to grow that they have had."""
+    return np.array(content, dtype=np.uint8)
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "surrogatepass")
+
+
+def _text(content: NDArray[np.uint8]) -> str:
+    return content.tobytes().decode("utf-8", "surrogatepass")
