@@ -46,11 +46,13 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
         if not len(rows):
             continue
         pushed = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0
-        needed = length[mine] * (_area(program, rows, profile) if known else 1.0)
+        long = length[mine]
+        del mine
+        needed = long * (_area(program, rows, profile) if known else 1.0)
         if known:
             whole_file = _whole_file(program, rows, (pushed, needed), profile)
-            yield from whole_file or _odd(program, rows, length[mine], pushed / needed)
-        yield from _layers(program, rows, (pushed, needed, length[mine]), spare, most)
+            yield from whole_file or _odd(program, rows, long, pushed / needed)
+        yield from _layers(program, rows, (pushed, needed, long), spare, most)
 
 
 def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
@@ -75,15 +77,16 @@ def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Pro
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:
     """(m,) cross-section that the told width and height need, with the factors of the profile and of its parts."""
-    width, height = program.width_mm[rows], program.height_mm[rows]
+    told = program.remarks
+    width, height = told.width_mm, told.height_mm
     area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
-    first = program.layer[rows] == program.layer[rows].min()
-    on_plate = first & (program.part[rows] <= 1)
+    on_plate = (told.layer == program.layer[rows].min()) & (told.part <= 1)
     factor = np.where(on_plate, profile.process.first_layer_flow, 1.0)
-    for part in np.unique(program.part[rows[program.part[rows] > 1]]):
-        on_part = (program.part[rows] == part) & (program.layer[rows] == 1)
+    for part in np.unique(told.part[told.part > 1]):
+        on_part = (told.part == part) & (told.layer == 1)
         factor[on_part] = profile.of_part(int(part)).process.interface_flow
-    return np.asarray(area * factor * profile.material.flow)
+    needed: Floats = (area * factor * profile.material.flow)[program.remark[rows]]
+    return needed
 
 
 def _whole_file(

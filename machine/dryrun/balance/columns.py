@@ -10,6 +10,7 @@ from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats
 
 NOTHING = -1e9
+ROUNDING_MM = 1e-6
 MOST_COLUMNS = 4_000_000
 WINDOW_MM = 1.0
 LEAST_MM2 = 0.5  # of a window: where less of it has room, as on the tip of a corner, a part of one bead decides
@@ -105,7 +106,7 @@ def tops(bars: Bars, lattice: Lattice) -> Floats:
     for i in range(lattice.shape[0]):
         for j in range(lattice.shape[1]):
             top[i, j] = NOTHING
-    for k in range(len(bars.half)):
+    for k in range(len(bars.half) - 1, -1, -1):  # from the last one down: what lies under those before it is not looked at
         a, b, up, half, height = bars.begin[k], bars.end[k], bars.up[k], bars.half[k], bars.height[k]
         length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
         if length <= 0.0:
@@ -114,11 +115,16 @@ def tops(bars: Bars, lattice: Lattice) -> Floats:
         s = (up[1] * d[2] - up[2] * d[1], up[2] * d[0] - up[0] * d[2], up[0] * d[1] - up[1] * d[0])
         slabs = ((d[0], d[1], d[2], 0.0, length), (s[0], s[1], s[2], -half, half), (up[0], up[1], up[2], -height, 0.0))
         reach = [0.5 * (length * abs(d[n]) + height * abs(up[n])) + half * np.sqrt(1.0 - up[n] * up[n]) for n in range(2)]
+        ceiling = max(a[2], b[2]) + half * np.sqrt(max(0.0, 1.0 - up[2] * up[2])) + height * max(0.0, -up[2]) + ROUNDING_MM
+        if abs(d[0] * up[0] + d[1] * up[1] + d[2] * up[2]) > ROUNDING_MM:
+            ceiling = -NOTHING  # its sides are no rectangle
         i0, i1 = _columns(0.5 * (a[0] + b[0] - height * up[0]), reach[0], 0, lattice)
         j0, j1 = _columns(0.5 * (a[1] + b[1] - height * up[1]), reach[1], 1, lattice)
         for i in range(i0, i1 + 1):
             x = lattice.origin[0] + (i + 0.5) * lattice.cell - a[0]
             for j in range(j0, j1 + 1):
+                if top[i, j] >= ceiling:
+                    continue
                 y = lattice.origin[1] + (j + 0.5) * lattice.cell - a[1]
                 highest = max(
                     a[2] + _leaves(x, y, slabs),
@@ -170,7 +176,9 @@ def _leaves(x: float, y: float, slabs: tuple[tuple[float, float, float, float, f
 
 def inside_loops(sides: Floats, lattice: Lattice) -> Mask:
     """Columns whose middle an odd number of loops enclose; sides: (n, 4) x y of the begin and end of each side."""
-    within: Mask = _crossings(sides, lattice)[:, ::-1].cumsum(axis=1)[:, ::-1] % 2.0 > 0.5
+    count = _crossings(sides, lattice)
+    np.cumsum(count[:, ::-1], axis=1, out=count[:, ::-1])
+    within: Mask = np.mod(count, 2.0, out=count) > 0.5
     return within
 
 

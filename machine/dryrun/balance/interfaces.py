@@ -138,16 +138,17 @@ def _interface(
     spare_mm3 = profile.material.prime_extra_mm * _filament_mm2(profile)
     tip_mm = float(np.median(layer.end[:, 2]))
     lattice = lattice_over(np.concatenate([layer.begin, layer.end])[:, :2], CELL_MM)
-    near = np.zeros(len(earlier), np.bool_)
-    for some in pieces(len(earlier)):
-        near[some] = np.abs((deposited.segments_mm[earlier[some]] @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
-    below_mm = tops(_bars(program, deposited, earlier[near], turn, profile), lattice)
-    height = float(np.median(deposited.height_mm[first]))
     wide = layer._replace(half=0.5 * deposited.width_mm[first])
     bead = tops(wide, lattice) > NOTHING
     section = bead | inside_loops(_outer_loops(wide, program, deposited.rows[first]), lattice)
-    room_mm = np.maximum(tip_mm - below_mm, 0.0)
-    touching = room_mm < NEAR * max(height, 0.2)
+    near = np.zeros(len(earlier), np.bool_)
+    for some in pieces(len(earlier)):
+        near[some] = np.abs((deposited.segments_mm[earlier[some]] @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
+    room = tops(_bars(program, deposited, earlier[near], turn, profile), lattice)  # a lattice is large: worked out in its place
+    np.maximum(np.subtract(tip_mm, room, out=room), 0.0, out=room)
+    touching = room < NEAR * max(float(np.median(deposited.height_mm[first])), 0.2)
+    room[~touching] = 0.0
+    room *= lattice.column_mm2
     return Interface(
         part=int(program.part[deposited.rows[first[0]]]),
         row=int(deposited.rows[first[0]]),
@@ -155,7 +156,7 @@ def _interface(
         section=section,
         touching=touching,
         bead=bead,
-        room=np.where(touching, room_mm, 0.0) * lattice.column_mm2,
+        room=room,
         plastic=laid(wide, mm3 - _run_in(deposited, first, mm3, spare_mm3), lattice),
         walls=Bars(*(values[program.rows_of_types(*AT_THE_EDGE)[deposited.rows[first]]] for values in wide)),
     )
