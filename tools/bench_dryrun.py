@@ -27,7 +27,7 @@ from machine.dryrun.strokes import beads_of
 from machine.gcode.writer import write_gcode
 from machine.kinematics.table import workpiece_path
 from machine.planning.plan import plan
-from machine.planning.timing import move_times
+from machine.reader.gcode_file import GcodeFile
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
 from profiles.profile import Profile, load
@@ -80,8 +80,7 @@ def stages(file: Path, profile: Profile) -> None:
     rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
     ends = timed("kinematics", lambda: [workpiece_path(machine, side[rows]) for side in (program.start, program.end)])
     segments = np.stack(ends, axis=1)
-    stop = np.zeros(len(program.line), dtype=np.bool_)
-    timed("timeline", lambda: move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration))
+    timed("timeline", lambda: motion.times_s(program, machine))
     deposited = beads_of(program, segments, rows, profile)
     contacts = timed("plastic under every move", lambda: replay(program, deposited, profile))
     timed("head against table and cradle", lambda: clearance.findings(program, segments, rows, machine))
@@ -107,7 +106,7 @@ def timed(name: str, stage: Callable[[], T]) -> T:
 def whole(file: Path, profile: Profile) -> None:
     """One dry run as a user's: seconds and peak memory of the process."""
     cpu, wall = process_time(), perf_counter()
-    run = dry_run(file.read_text().splitlines(), profile)
+    run = dry_run(GcodeFile(file).lines(), profile)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     errors = len(run.errors)
     summary = f"{len(run.program.line)} moves, {run.time_s / 3600:.1f} h, {errors} errors"

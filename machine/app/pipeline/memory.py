@@ -4,7 +4,7 @@ import ctypes
 import gc
 from contextlib import suppress
 
-MMAP_THRESHOLD, LARGE_BYTES = -3, 1 << 18  # of mallopt in glibc's malloc.h
+MMAP_THRESHOLD, LARGE_BYTES = -3, 1 << 20  # of mallopt in glibc's malloc.h
 
 
 def return_large_arrays() -> None:

@@ -66,6 +66,18 @@ def test_a_slanted_bar_is_left_through_its_top_or_its_side(slant_deg: float) -> 
     assert row[ends] == pytest.approx(-x[ends] * tan(slant), abs=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_uppermost_bar_counts_whichever_is_laid_first(seed: int) -> None:
+    dice = np.random.default_rng(seed)
+    ends = dice.uniform(0.0, 4.0, (2, 20, 3))
+    up = np.cross(ends[1] - ends[0], dice.normal(size=(20, 3)))  # some of them point down
+    bars = Bars(ends[0], ends[1], up / np.linalg.norm(up, axis=1)[:, None], dice.uniform(0.1, 0.5, 20), np.full(20, 0.2))
+    lattice = lattice_over(ends.reshape(-1, 3)[:, :2], 0.1)
+    one_by_one = np.max([tops(Bars(*(values[k : k + 1] for values in bars)), lattice) for k in range(20)], axis=0)
+    assert np.array_equal(tops(bars, lattice), one_by_one)
+    assert np.array_equal(tops(Bars(*(values[::-1].copy() for values in bars)), lattice), one_by_one)
+
+
 def test_loops_enclose_their_area_less_that_of_holes() -> None:
     turn = np.linspace(0.0, 2.0 * pi, 400)
     ring = 5.0 + np.column_stack([np.cos(turn), np.sin(turn)]) * 4.0

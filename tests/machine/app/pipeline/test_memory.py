@@ -4,7 +4,7 @@ import ctypes
 
 import pytest
 
-from machine.app.pipeline.memory import return_large_arrays
+from machine.app.pipeline.memory import return_large_arrays, return_unused
 
 
 def test_glibc_is_told_to_take_arrays_of_a_megabyte_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -18,3 +18,11 @@ def test_glibc_is_told_to_take_arrays_of_a_megabyte_one_by_one(monkeypatch: pyte
 def test_a_system_without_glibc_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
     return_large_arrays()
+    return_unused()
+
+
+def test_glibc_is_told_to_give_back_all_that_lies_unused(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = []
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: type("Library", (), {"malloc_trim": staticmethod(told.append)}))
+    return_unused()
+    assert told == [0]
