@@ -148,8 +148,8 @@ def _stem(name: str) -> str:
 
 def _compile(job: Job) -> None:
     """Compile once what every process of this machine needs."""
-    program = (*compilers.PROGRAM, *(compilers.PICTURES if job.asked.profile.machine.thumbnails_px else ()))
-    compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH, *(program if job.do == "export" else ())))
+    program = compilers.bundles_to_build(job.asked.profile) if job.do == "export" else ()
+    compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH, *program))
 
 
 def summary(rows: Iterable[Row], table: Path) -> str:

@@ -16,6 +16,7 @@ from machine.app.pipeline.precompile import DONE, KERNEL
 from machine.app.terminal.progress import Report, reporting, say
 from mdp.kernels.cache import keep, mark, trouble
 from mdp.kernels.threads import THREADS
+from profiles.profile import Profile
 
 JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = ("judge",), ("sweep", "search"), ("slice", "dry-run"), ("dry-run",), ("draw",)
 LOOK_S = 0.2
@@ -112,6 +113,11 @@ class Compilers:
 def command() -> list[str]:
     """The command of such a process. It imports from where we do: by `-m` it would run what lies in the working folder."""
     return [sys.executable, "-c", COMPILE.format(path=sys.path)]
+
+
+def bundles_to_build(profile: Profile) -> tuple[str, ...]:
+    """What slicing, the dry run and the pictures of a file need."""
+    return (*PROGRAM, *(PICTURES if profile.machine.thumbnails_px else ()))
 
 
 COMPILERS = Compilers()

@@ -78,7 +78,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     read_s = perf_counter() - began
     for repair in repairs:
         say(f"{request.name}: {repair}")
-    compilers.begin((*compilers.JUDGE, *(compilers.PROGRAM if to_build else ()), *compilers.SEARCH))
+    compilers.begin((*compilers.JUDGE, *compilers.SEARCH, *(compilers.bundles_to_build(profile) if to_build else ())))
     compilers.wait_for(compilers.JUDGE)
     orientation = None if given is None or given.orientation is None else np.array(given.orientation)
     if orientation is not None:
