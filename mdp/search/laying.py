@@ -1,11 +1,12 @@
 """Laying: how a model is laid down and into which parts it is cut, chosen together by what both cost with their time.
 
-Orientations that differ by a symmetry only count once. The rest are ranked by a rough guess, the first of them cut by a narrow
-search, and the most promising one by the whole search: that takes as long as three searches at most.
+Orientations that differ by a symmetry only count once. What the first of the rest would cost after a search is forecast from what
+they need support for in one piece and from their bare time. Where that leaves no doubt only one way to lie is searched; else the
+model as it stands, and another way if a narrow search promises more.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, inf
 
@@ -23,24 +24,30 @@ from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 
 RESTING = 20  # orientations that are ranked, those that a symmetry makes alike counted once
-PRICED, SEARCHED = 6, 2  # of them whose bare time is looked at, and that a narrow search cuts
-COARSER = 3  # fewer directions in the narrow search
+PRICED = 3  # of them whose bare time is looked at
 CLEARLY = 0.95  # of the cost: estimates are not good enough to turn a model over for less
 ALIKE = 1.03  # of the cost: nobody cuts a model for less who may lay it down in one piece
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
+# Fitted to whole searches of some 330 orientations of 56 models (tools/RESULTS.md).
+LEFT, STAIRS_LEFT = 0.6, 0.75  # share of what needs support in one piece that cuts leave, and of the stairs
+# Of the cost below which another way to lie is taken: a forecast below the first leaves no doubt, one above the second no hope.
+NO_DOUBT, DOUBT = 0.9, 1.3
+PROMISING = 1.03  # of that cost: narrow searches end higher
+SEARCHED, COARSER = 2, 3  # ways to lie that a narrow search cuts, in so many times fewer directions
 PricingBy = Callable[[Profile], Pricing]
 
 
 @dataclass(frozen=True, eq=False)
 class Lying:
     """A model laid down and cut: turned whole by the orientation, None where it stays as it stands; total_mm2: what it costs
-    with its time; standing: the row that is taken of the model as it stands."""
+    with its time; standing: the row that is taken of the model as it stands, where that was searched; upright: as it stands."""
 
     orientation: Orientation | None
     decomposition: Decomposition
     total_mm2: float
     standing: FrontRow | None
+    upright: Orientation
 
 
 def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[[Mesh], Decomposition]) -> Lying:
@@ -49,48 +56,72 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
 
     search: the whole search of a mesh; pricing: what parts take to print by a profile.
     """
-    worth, upright = Worth.of(profile), search(mesh)
-    best = Lying(None, upright, total_mm2(upright.chosen, worth), upright.chosen)
-    limit_mm2 = min(CLEARLY * best.total_mm2, best.total_mm2 - profile.search.turning_mm2)
-    copy = coarse_copy(mesh, profile, NO_ZONES)
+    worth, copy = Worth.of(profile), coarse_copy(mesh, profile, NO_ZONES)
     looked_at, quick = (mesh, profile) if copy is None else (copy, as_it_is(profile))
-    glimpses = _glimpses(looked_at, quick, pricing)
-    promising = _most_promising(glimpses, quick, limit_mm2)
-    if promising is None and len(upright.parts) > 1:
-        limit_mm2 = ALIKE * best.total_mm2
-        promising = _whole(glimpses, quick, pricing, limit_mm2)
-    if promising is None:
-        return best
-    decomposition = search(promising.mesh if copy is None else standing_still(mesh, promising.orientation.rotation))
-    lying = Lying(promising.orientation, decomposition, total_mm2(decomposition.chosen, worth), upright.chosen)
-    fewer = len(decomposition.parts) < len(upright.parts) or limit_mm2 < best.total_mm2
-    return lying if fewer and lying.total_mm2 < limit_mm2 else best
+    upright, *others = _glimpses(looked_at, quick, pricing)
+    others = sorted((glimpse for glimpse in others if glimpse.bare_mm2 < inf), key=lambda glimpse: glimpse.forecast_mm2)
+
+    def laid(glimpse: _Glimpse, standing: FrontRow | None) -> Lying:
+        turned = glimpse.mesh if copy is None else standing_still(mesh, glimpse.orientation.rotation)
+        decomposition = search(turned)
+        total = total_mm2(decomposition.chosen, worth)
+        return Lying(glimpse.orientation, decomposition, total, standing, upright.orientation)
+
+    limit_mm2 = _limit_mm2(upright.forecast_mm2, profile)
+    lying = laid(others[0], None) if others and others[0].forecast_mm2 < NO_DOUBT * limit_mm2 else None
+    if lying is not None and lying.total_mm2 < limit_mm2:
+        return lying
+    found = search(mesh)
+    best = Lying(None, found, total_mm2(found.chosen, worth), found.chosen, upright.orientation)
+    if lying is not None:
+        lying = replace(lying, standing=found.chosen)
+    else:
+        near = [glimpse for glimpse in others if glimpse.forecast_mm2 < DOUBT * limit_mm2]
+        likely = _most_promising(near, quick, PROMISING * _limit_mm2(best.total_mm2, profile))
+        if likely is None and len(found.parts) > 1:
+            likely = _whole(others, quick, pricing, ALIKE * best.total_mm2)
+        lying = None if likely is None else laid(likely, found.chosen)
+    return lying if lying is not None and _is_better(lying, best, profile) else best
+
+
+def _is_better(lying: Lying, standing: Lying, profile: Profile) -> bool:
+    """Whether a model is to lie so instead of as it stands."""
+    whole = len(lying.decomposition.parts) == 1 < len(standing.decomposition.parts)
+    alike = whole and lying.total_mm2 < ALIKE * standing.total_mm2
+    return alike or lying.total_mm2 < _limit_mm2(standing.total_mm2, profile)
+
+
+def _limit_mm2(standing_mm2: float, profile: Profile) -> float:
+    """What another way to lie must cost less than, by what it costs as the model stands."""
+    return min(CLEARLY * standing_mm2, standing_mm2 - profile.search.turning_mm2)
 
 
 @dataclass(frozen=True, eq=False)
 class _Glimpse:
-    """A model in some orientation: what its time and filament cost without any support, hardly any decomposition less, and what
-    it costs in one piece, roughly."""
+    """A model in some orientation: what its time and filament cost without any support, hardly any decomposition less, what it
+    costs in one piece, and after a search, roughly."""
 
     orientation: Orientation
     mesh: Mesh
     bare_mm2: float
     whole_mm2: float
+    forecast_mm2: float
 
 
 def _glimpses(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[_Glimpse]:
-    """The first orientations in which a model can be printed, the one that costs least in one piece first."""
-    worth, stair_mm2 = Worth.of(profile), weight_of_stairs(profile)
-    scar_mm2, glimpses = _scar_mm2(worth), []
-    orientations = distinct_orientations(mesh, profile)[:PRICED]
-    meshes = [standing_still(mesh, orientation.rotation) for orientation in orientations]
+    """A model as it stands, then in the first other orientations; infinite where it cannot be printed so."""
+    worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
+    upright, others = measure_upright(mesh, profile.process.self_supporting_angle_deg), distinct_orientations(mesh, profile)
+    orientations = [upright, *others[:PRICED]]
+    meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation in orientations[1:])]
     prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
+    glimpses = []
     for orientation, turned, bare in zip(orientations, meshes, prices, strict=True):
-        if bare is not None:
-            bare_mm2 = worth.of_print(bare.time_s, bare.filament_mm)
-            whole_mm2 = bare_mm2 + scar_mm2 * orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2
-            glimpses.append(_Glimpse(orientation, turned, bare_mm2, whole_mm2))
-    return sorted(glimpses, key=lambda glimpse: glimpse.whole_mm2)
+        bare_mm2 = inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm)
+        scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
+        whole_mm2, forecast_mm2 = bare_mm2 + scars_mm2 + stairs_mm2, bare_mm2 + LEFT * scars_mm2 + STAIRS_LEFT * stairs_mm2
+        glimpses.append(_Glimpse(orientation, turned, bare_mm2, whole_mm2, forecast_mm2))
+    return glimpses
 
 
 def _scar_mm2(worth: Worth) -> float:
@@ -99,18 +130,10 @@ def _scar_mm2(worth: Worth) -> float:
 
 
 def _most_promising(glimpses: Sequence[_Glimpse], profile: Profile, limit_mm2: float) -> _Glimpse | None:
-    """The one that is likely to cost least when it is cut; None where none is likely to cost less than the limit."""
-    if not glimpses:
-        return None
-    (best, *others), chosen = glimpses, None
-    if best.whole_mm2 < limit_mm2:
-        chosen, limit_mm2 = best, best.whole_mm2
-    others = [glimpse for glimpse in others if glimpse.bare_mm2 < limit_mm2]
-    if chosen is not None and not others:
-        return chosen  # in one piece already it costs less than the others may
-    quick = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER))
+    """The one that costs least after a narrow search; None where none costs less than the limit."""
+    quick, chosen = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
     more_mm2 = _scar_mm2(Worth.of(profile)) - 1.0
-    for glimpse in [best, *others][:SEARCHED]:
+    for glimpse in [glimpse for glimpse in glimpses if glimpse.bare_mm2 < limit_mm2][:SEARCHED]:
         rows = decompose(glimpse.mesh, "", quick).front
         cost_mm2 = glimpse.bare_mm2 + min(row.cost_mm2 + more_mm2 * row.support_area_mm2 for row in rows)
         if cost_mm2 < limit_mm2:
@@ -119,13 +142,13 @@ def _most_promising(glimpses: Sequence[_Glimpse], profile: Profile, limit_mm2: f
 
 
 def _whole(glimpses: Sequence[_Glimpse], profile: Profile, pricing: PricingBy, limit_mm2: float) -> _Glimpse | None:
-    """The first of the best that costs less than the limit in one piece."""
-    for glimpse in glimpses[:SEARCHED]:
-        problem = Problem(glimpse.mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
-        row = price_row(front_row(problem.root), (one_piece(glimpse.mesh, profile.machine),), pricing(profile))
-        if row.time_s is not None and total_mm2(row, Worth.of(profile)) < limit_mm2:
-            return glimpse
-    return None
+    """The one that costs least in one piece, where that is less than the limit."""
+    glimpse = min(glimpses, key=lambda glimpse: glimpse.whole_mm2, default=None)
+    if glimpse is None or glimpse.whole_mm2 > DOUBT * limit_mm2:
+        return None
+    problem = Problem(glimpse.mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
+    row = price_row(front_row(problem.root), (one_piece(glimpse.mesh, profile.machine),), pricing(profile))
+    return glimpse if row.time_s is not None and total_mm2(row, Worth.of(profile)) < limit_mm2 else None
 
 
 def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:

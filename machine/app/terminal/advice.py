@@ -30,14 +30,15 @@ def laid_in_words(lying: Lying, otherwise: str) -> tuple[str, ...]:
         return ()
     side, turns = side_in_words(orientation), in_words(orientation)
     where, better = f"{side} ({turns})" if side else turns, ""
-    if standing is not None and laid is not None:
-        was, now = (f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm2 of scars{_taking(row)}" for row in (standing, laid))
-        better = f": {now}, as it stands {was}"
+    if laid is not None:
+        was = f"{lying.upright.risky_mm2:.0f} mm2 hang over" if standing is None else _with_scars(standing)
+        better = f": {_with_scars(laid)}, as it stands {was}"
     return (f"it is laid down {where}{better}; {otherwise}",)
 
 
-def _taking(row: FrontRow) -> str:
-    return "" if row.time_s is None else f" in {minutes(row.time_s)}"
+def _with_scars(row: FrontRow) -> str:
+    taking = "" if row.time_s is None else f" in {minutes(row.time_s)}"
+    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm2 of scars{taking}"
 
 
 def in_parts(count: int) -> str:

@@ -1,12 +1,12 @@
 """Orientation and parts are chosen together, by what both cost with their time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 import pytest
 
-from mdp.decomposition import Part
+from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import measure_upright, side_in_words, standing_still
 from mdp.mesh import Mesh
 from mdp.pose import about
@@ -55,10 +55,9 @@ def test_laid_down_it_costs_no_more_than_as_it_stands(mesh: Mesh) -> None:
 
 
 def test_a_model_stays_where_turning_it_saves_less_than_is_asked_for() -> None:
-    standing = laid_down(tee())
-    assert standing.standing is not None
-    saved_mm2 = total_mm2(standing.standing, Worth.of(PROFILE)) - standing.total_mm2
-    for turning_mm2, turned in ((saved_mm2 - 1.0, True), (saved_mm2 + 1.0, False)):
+    standing = decompose(tee(), "mesh", PROFILE, price=by_height(PROFILE))
+    saved_mm2 = total_mm2(standing.chosen, Worth.of(PROFILE)) - laid_down(tee()).total_mm2
+    for turning_mm2, turned in ((0.3 * saved_mm2, True), (saved_mm2 + 1.0, False)):
         profile = load(settings=["search.directions=20", "search.polish=false", f"search.turning_mm2={turning_mm2}"])
         search = partial(decompose, name="mesh", profile=profile, price=by_height(profile))
         assert (lay_down(tee(), profile, by_height, search).orientation is not None) == turned
@@ -76,6 +75,33 @@ def test_of_two_ways_to_lie_that_need_no_support_the_one_without_stairs_is_taken
     assert measure_upright(leaning_plate(), 45.0).stairs_mm2 == pytest.approx(
         2.0 * (40 * 30 * np.cos(np.radians(30.0)) + 4 * 30 * np.sin(np.radians(30.0)))
     )
+
+
+def searches(mesh: Mesh, price_by: Callable[[Profile], Pricing]) -> tuple[Lying, int]:
+    """How a mesh is laid down, and how many searches that took."""
+    searched: list[Mesh] = []
+
+    def search(mesh: Mesh) -> Decomposition:
+        searched.append(mesh)
+        return decompose(mesh, "mesh", PROFILE, price=price_by(PROFILE))
+
+    return lay_down(mesh, PROFILE, price_by, search), len(searched)
+
+
+def test_what_can_be_told_without_a_search_is_not_searched() -> None:
+    lying, count = searches(tee(), by_height)
+    assert (lying.orientation is None, lying.standing, count) == (False, None, 1)
+    lying, count = searches(box(40, 30, 10), by_height)
+    assert (lying.orientation, count) == (None, 1)
+
+
+def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
+    def surprised(profile: Profile) -> Pricing:
+        bare = profile.process.support == "none"  # a forecast's
+        return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) > 39 else None
+
+    lying, count = searches(tee(), surprised)
+    assert (lying.orientation, count) == (None, 2)
 
 
 def on_a_small_plate(profile: Profile) -> Pricing:
