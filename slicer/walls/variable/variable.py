@@ -86,7 +86,8 @@ def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
     lines += [_dash(*dot, rule) for dot in _dots(skeleton, counts)]
     borders = edges(polygons) if any(line.level == 0 for line in lines) else np.zeros((0, 4))
     clipped = (_clipped(line, borders, rule) for line in lines)
-    return walls + [_simplified(line) for line in clipped if len(line.points) > 1]
+    walls += [_simplified(line) for line in clipped if len(line.points) > 1]
+    return [wall for wall in walls if length_mm(wall.course.points) > 0.0]  # points may fall on each other when they are smoothed
 
 
 def _loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> list[Wall]:

@@ -1,6 +1,7 @@
 """Variable walls fill a place with as many beads as fit, within the nozzle's range, and stay inside it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import manifold3d as m3
@@ -251,3 +252,13 @@ def test_two_corners_that_all_but_meet_throw_no_wall_out_of_a_plate(x: float, as
     points = ribs.feet + ribs.ways * ribs.depth[:, None]
     assert (points.min(axis=0) >= 0.0).all()
     assert (points.max(axis=0) <= (10.0, 5.0)).all()
+
+
+def test_a_wall_whose_points_fall_on_each_other_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fallen(line: Wall, *_: object) -> Wall:
+        return replace(line, points=line.points[[0, 0]], widths=line.widths[[0, 0]])
+
+    fin, rule = Polygons.square((8.0, 0.5)), bead_rule(2, profile().process, 0.2, 0.4)
+    assert [wall.closed for wall in variable_walls(fin, rule)] == [False]
+    monkeypatch.setattr("slicer.walls.variable.variable._clipped", fallen)
+    assert variable_walls(fin, rule) == []
