@@ -29,7 +29,7 @@ def side_by_side(pieces: Sequence[Callable[[], Result]]) -> list[Result]:
         return [piece() for piece in pieces]
     with _numbers(len(pieces)) as numbers, _copies(copies, pieces, numbers) as answers:
         known = _work(pieces, numbers)
-        for answer in answers:
+        for answer in answers:  # one whose process could not be had is at its end
             with suppress(EOFError, pickle.UnpicklingError), open(answer, "rb", closefd=False) as pipe:  # killed from outside
                 known |= pickle.load(pipe)
     return [known[k] if k in known else piece() for k, piece in enumerate(pieces)]
@@ -68,7 +68,11 @@ def _copies(count: int, pieces: Sequence[Callable[[], Result]], numbers: int) ->
         for _ in range(count):
             answer, end = os.pipe()
             answers.append(answer)
-            copy = os.fork()
+            try:
+                copy = os.fork()
+            except OSError:  # no memory or no number for another process: those that are there do the work
+                os.close(end)
+                break
             if copy == 0:
                 _answer(pieces, numbers, end, parent)
             copies.append(copy)

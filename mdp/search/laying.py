@@ -29,7 +29,7 @@ CLEARLY = 0.95  # of the cost: estimates are not good enough to turn a model ove
 ALIKE = 1.03  # of the cost: nobody cuts a model for less who may lay it down in one piece
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
-# Fitted to whole searches of some 330 orientations of 56 models (tools/RESULTS.md).
+# Fitted to whole searches of 429 orientations of 66 models (tools/RESULTS.md).
 LEFT, STAIRS_LEFT = 0.6, 0.75  # share of what needs support in one piece that cuts leave, and of the stairs
 # Of the cost below which another way to lie is taken: a forecast below the first leaves no doubt, one above the second no hope.
 NO_DOUBT, DOUBT = 0.9, 1.3

@@ -62,6 +62,14 @@ def test_what_a_killed_process_leaves_undone_is_done_here() -> None:
     assert side_by_side([partial(killed_elsewhere, k) for k in range(20)]) == [k * k for k in range(20)]
 
 
+def test_where_no_process_can_be_had_this_one_does_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse() -> int:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(os, "fork", refuse)
+    assert side_by_side([os.getpid, os.getpid]) == [HERE, HERE]
+
+
 def test_one_core_forks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "THREADS", 1)
     assert side_by_side([os.getpid, os.getpid]) == [HERE, HERE]
