@@ -87,6 +87,7 @@ def resting_orientations(mesh: Mesh, angle_deg: float) -> list[Orientation]:
     return sorted((orientation for orientation in _on_facets(mesh, angle_deg) if orientation.stable), key=_rank)
 
 
+@cached_with_mesh
 def measure_upright(mesh: Mesh, angle_deg: float) -> Orientation:
     """The model as it stands."""
     return _measure(mesh, angle_deg, UP[None])[0]
