@@ -58,10 +58,10 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
     """
     worth, copy = Worth.of(profile), coarse_copy(mesh, profile, NO_ZONES)
     looked_at, quick = (mesh, profile) if copy is None else (copy, as_it_is(profile))
-    upright, *others = _glimpses(looked_at, quick, pricing)
+    upright, *others = glimpses_of(looked_at, quick, pricing)
     others = sorted((glimpse for glimpse in others if glimpse.bare_mm2 < inf), key=lambda glimpse: glimpse.forecast_mm2)
 
-    def laid(glimpse: _Glimpse, standing: FrontRow | None) -> Lying:
+    def laid(glimpse: Glimpse, standing: FrontRow | None) -> Lying:
         turned = glimpse.mesh if copy is None else standing_still(mesh, glimpse.orientation.rotation)
         decomposition = search(turned)
         total = total_mm2(decomposition.chosen, worth)
@@ -97,7 +97,7 @@ def _limit_mm2(standing_mm2: float, profile: Profile) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Glimpse:
+class Glimpse:
     """A model in some orientation: what its time and filament cost without any support, hardly any decomposition less, what it
     costs in one piece, and after a search, roughly."""
 
@@ -108,7 +108,7 @@ class _Glimpse:
     forecast_mm2: float
 
 
-def _glimpses(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[_Glimpse]:
+def glimpses_of(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[Glimpse]:
     """A model as it stands, then in the first other orientations; infinite where it cannot be printed so."""
     worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
     upright, others = measure_upright(mesh, profile.process.self_supporting_angle_deg), distinct_orientations(mesh, profile)
@@ -120,7 +120,7 @@ def _glimpses(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[_Glimpse
         bare_mm2 = inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm)
         scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
         whole_mm2, forecast_mm2 = bare_mm2 + scars_mm2 + stairs_mm2, bare_mm2 + LEFT * scars_mm2 + STAIRS_LEFT * stairs_mm2
-        glimpses.append(_Glimpse(orientation, turned, bare_mm2, whole_mm2, forecast_mm2))
+        glimpses.append(Glimpse(orientation, turned, bare_mm2, whole_mm2, forecast_mm2))
     return glimpses
 
 
@@ -129,7 +129,7 @@ def _scar_mm2(worth: Worth) -> float:
     return 1.0 + worth.second_mm2 * SUPPORT_S_MM2
 
 
-def _most_promising(glimpses: Sequence[_Glimpse], profile: Profile, limit_mm2: float) -> _Glimpse | None:
+def _most_promising(glimpses: Sequence[Glimpse], profile: Profile, limit_mm2: float) -> Glimpse | None:
     """The one that costs least after a narrow search; None where none costs less than the limit."""
     quick, chosen = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
     more_mm2 = _scar_mm2(Worth.of(profile)) - 1.0
@@ -141,7 +141,7 @@ def _most_promising(glimpses: Sequence[_Glimpse], profile: Profile, limit_mm2: f
     return chosen
 
 
-def _whole(glimpses: Sequence[_Glimpse], profile: Profile, pricing: PricingBy, limit_mm2: float) -> _Glimpse | None:
+def _whole(glimpses: Sequence[Glimpse], profile: Profile, pricing: PricingBy, limit_mm2: float) -> Glimpse | None:
     """The one that costs least in one piece, where that is less than the limit."""
     glimpse = min(glimpses, key=lambda glimpse: glimpse.whole_mm2, default=None)
     if glimpse is None or glimpse.whole_mm2 > DOUBT * limit_mm2:
