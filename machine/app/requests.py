@@ -1,5 +1,6 @@
 """Requests: what a person asks a command for, as values: the command line makes them, the commands take them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -176,6 +177,20 @@ class CalibrationRequest:
     save: str | None = None
     replace: bool = False
     force: bool = False
+
+
+@dataclass(frozen=True)
+class ImportRequest:
+    """Another slicer's settings to read. presets: of a bundle, by process, material and printer, empty: its only or its active
+    one; name: of both profiles, empty: as there; out: folder for their files, None: the user's own; replace: write over files.
+    """
+
+    file: Path
+    presets: Mapping[str, str]
+    name: str = ""
+    out: Path | None = None
+    replace: bool = False
+    json: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import CalibrationRequest, CouponRequest, Given
+from machine.app.requests import CalibrationRequest, CouponRequest, Given, ImportRequest
 from machine.app.terminal.option_groups import with_option_groups
 from machine.app.terminal.options import Force, HtmlFile, MachineName, ModelProfileOptions, Settings, machine_profile
 
@@ -134,6 +134,27 @@ def profiles_save(
     from machine.app.commands.profiles import save
 
     return save(name, settings or [], out)
+
+
+@profiles_app.command("import")
+def profiles_import(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="config.ini, bundle or G-code of PrusaSlicer; JSON of OrcaSlicer; .curaprofile")
+    ],
+    *,
+    process: Annotated[str, typer.Option("--process-preset", metavar="NAME", help="of a bundle's print presets")] = "",
+    material: Annotated[str, typer.Option("--material-preset", metavar="NAME", help="of a bundle's filament presets")] = "",
+    printer: Annotated[str, typer.Option("--printer-preset", metavar="NAME", help="of a bundle's printers, for its nozzle")] = "",
+    name: Annotated[str, typer.Option("--name", metavar="NAME", help="of both profiles; else as there")] = "",
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FOLDER", help="where to; else your own profiles")] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
+    json: Annotated[bool, typer.Option("--json", help="what became of every setting as JSON")] = False,
+) -> int:
+    """Another slicer's settings as a material and a process of yours, with what was taken, worked out and left."""
+    from machine.app.commands.profiles_import import import_profiles
+
+    presets = {"process": process, "material": material, "printer": printer}
+    return import_profiles(ImportRequest(file, presets, name, out, replace, json))
 
 
 @profiles_app.command("check")

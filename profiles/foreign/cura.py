@@ -1,0 +1,147 @@
+"""Cura's .curaprofile: a zip of ini files, one of the print and one an extruder, with what differs from a printer's definition.
+
+What the user has not changed stands in Cura's own definitions, not in the file; values that are formulas (`=...`) are Cura's to
+work out (Cura, plugins/CuraProfileReader). Names: Cura, resources/definitions/fdmprinter.def.json.
+"""
+
+import configparser
+from collections.abc import Mapping
+from pathlib import Path
+from zipfile import BadZipFile, ZipFile
+
+from profiles.errors import ProfileError, reason
+from profiles.foreign.config import NUMBER, Config, Entry
+
+PROGRAM = "Cura"
+MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
+PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
+KEYS = {
+    "layer_height_0": "first_layer_height",
+    "line_width": "extrusion_width",
+    "wall_line_width_x": "perimeter_extrusion_width",
+    "wall_line_width_0": "external_perimeter_extrusion_width",
+    "infill_line_width": "infill_extrusion_width",
+    "skin_line_width": "solid_infill_extrusion_width",
+    "roofing_line_width": "top_infill_extrusion_width",
+    "support_line_width": "support_material_extrusion_width",
+    "wall_line_count": "perimeters",
+    "top_layers": "top_solid_layers",
+    "bottom_layers": "bottom_solid_layers",
+    "top_thickness": "top_solid_min_thickness",
+    "bottom_thickness": "bottom_solid_min_thickness",
+    "infill_sparse_density": "fill_density",
+    "infill_pattern": "fill_pattern",
+    "min_infill_area": "solid_infill_below_area",
+    "z_seam_type": "seam_position",
+    "inset_direction": "external_perimeters_first",
+    "outer_inset_first": "external_perimeters_first",
+    "magic_spiralize": "spiral_vase",
+    "ironing_enabled": "ironing",
+    "ironing_line_spacing": "ironing_spacing",
+    "speed_ironing": "ironing_speed",
+    "speed_wall_x": "perimeter_speed",
+    "speed_wall_0": "external_perimeter_speed",
+    "speed_topbottom": "solid_infill_speed",
+    "speed_roofing": "top_solid_infill_speed",
+    "speed_infill": "infill_speed",
+    "speed_support": "support_material_speed",
+    "speed_support_interface": "support_material_interface_speed",
+    "speed_layer_0": "first_layer_speed",
+    "speed_travel": "travel_speed",
+    "bridge_skin_speed": "bridge_speed",
+    "acceleration_print": "default_acceleration",
+    "acceleration_wall_0": "external_perimeter_acceleration",
+    "acceleration_infill": "infill_acceleration",
+    "acceleration_travel": "travel_acceleration",
+    "acceleration_layer_0": "first_layer_acceleration",
+    "support_top_distance": "support_material_contact_distance",
+    "support_bottom_distance": "support_material_bottom_contact_distance",
+    "support_xy_distance": "support_material_xy_spacing",
+    "support_structure": "support_material_style",
+    "support_enable": "support_material",
+    "support_type": "support_material_buildplate_only",
+    "brim_gap": "brim_separation",
+    "skirt_line_count": "skirts",
+    "skirt_gap": "skirt_distance",
+    "material_print_temperature": "temperature",
+    "material_print_temperature_layer_0": "first_layer_temperature",
+    "material_bed_temperature": "bed_temperature",
+    "material_flow": "extrusion_multiplier",
+    "cool_fan_speed_max": "max_fan_speed",
+    "cool_fan_speed_min": "min_fan_speed",
+    "cool_min_layer_time_fan_speed_max": "fan_below_layer_time",
+    "cool_min_layer_time": "slowdown_below_layer_time",
+    "cool_min_speed": "min_print_speed",
+    "cool_fan_full_layer": "full_fan_speed_layer",
+    "retraction_amount": "retract_length",
+    "retraction_speed": "retract_speed",
+    "retraction_min_travel": "retract_before_travel",
+    "retraction_hop": "retract_lift",
+    "xy_offset": "xy_contour_compensation",
+    "hole_xy_offset": "xy_hole_compensation",
+    "machine_nozzle_size": "nozzle_diameter",
+}
+WORDS = {
+    "fill_pattern": {
+        "lines": "rectilinear",
+        "zigzag": "rectilinear",
+        "trihexagon": "stars",
+        "cubicsubdiv": "adaptivecubic",
+        "tetrahedral": "tetrahedral",
+        "concentric": "concentric",
+    },
+    "seam_position": {"back": "rear", "shortest": "nearest", "sharpest_corner": "aligned", "random": "random"},
+    "external_perimeters_first": {"outside_in": "1", "inside_out": "0"},
+    "support_material_style": {"normal": "grid", "tree": "organic"},
+    "support_material_buildplate_only": {"buildplate": "1", "everywhere": "0"},
+}
+
+
+def read_profile(file: Path) -> Config:
+    """What a .curaprofile says. Raises ProfileError."""
+    values, name = _values(file)
+    entries, formulas = dict[str, Entry](), list[str]()
+    for own, text in values.items():
+        if text.startswith("="):
+            formulas.append(own)
+        else:
+            key = KEYS.get(own, own)
+            entries[key] = Entry(own, _said(key, text))
+    if NUMBER.fullmatch(values.get("support_angle", "")):  # Cura's is from the vertical
+        entries["support_material_threshold"] = Entry("support_angle", f"{90.0 - float(values['support_angle']):g}")
+    if "min_fan_speed" in entries:
+        entries["fan_always_on"] = Entry(entries["min_fan_speed"].name, "1")
+    return Config(PROGRAM, entries, tuple(f"{own} (a formula)" for own in formulas), name, name)
+
+
+def _values(file: Path) -> tuple[Mapping[str, str], str]:
+    """The settings of all ini files of a profile, an extruder's over the print's, and its name."""
+    values, name = dict[str, str](), file.stem
+    try:
+        with ZipFile(file) as archive:
+            members = sorted(archive.infolist(), key=lambda member: "extruder" in member.filename)
+            for member in members:
+                if member.file_size > MOST_BYTES:
+                    raise ProfileError(
+                        f"profile {file}: {member.filename} has {member.file_size} bytes, {MOST_BYTES} are allowed"
+                    )
+                parser = configparser.ConfigParser(interpolation=None)
+                parser.read_string(archive.read(member).decode("utf-8-sig"))
+                name = parser.get("general", "name", fallback=name)
+                own = dict(parser["values"]) if parser.has_section("values") else {}
+                first = parser.get("metadata", "position", fallback="0") in ("", "0")
+                values |= own if first else {}
+    except OSError as error:
+        raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
+    except (BadZipFile, configparser.Error, UnicodeDecodeError, NotImplementedError, RuntimeError) as error:
+        raise ProfileError(f"profile {file}: is no profile of Cura ({str(error).splitlines()[0]})") from None
+    return values, name
+
+
+def _said(key: str, text: str) -> str:
+    """A value as PrusaSlicer would say it."""
+    if key in PERCENT and not text.endswith("%"):
+        return f"{text}%"
+    if key == "extrusion_multiplier" and NUMBER.fullmatch(text):
+        return f"{float(text) / 100.0:g}"
+    return WORDS.get(key, {}).get(text, text)

@@ -1,0 +1,145 @@
+"""Imported: a configuration of another slicer as settings of our material and process, row by row, with what was left and why."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from profiles.errors import ProfileError
+from profiles.foreign import material_rules, process_rules
+from profiles.foreign.config import Config
+from profiles.foreign.conversion import Convert, Left, Value
+from profiles.process import WIDTHS
+from profiles.profile import load_one
+from profiles.toml_text import value_text
+
+PROCESS_BASE = "standard"
+KINDS = ("process", "material")
+RULES = {"process": process_rules.RULES, "material": material_rules.RULES}
+CONDITIONS = frozenset(  # read beside others, and told with them
+    {
+        *("extrusion_width", "nozzle_diameter", "filament_type", "fan_always_on", "cooling", "brim_type", "thick_bridges"),
+        *("wipe_distance", "enable_pressure_advance", "enable_dynamic_overhang_speeds", "enable_overhang_speed", "curr_bed_type"),
+    }
+)
+SPARE = frozenset(f"process.{key}" for key in WIDTHS) - {"process.line_width_mm"}  # widths that may be those of all lines
+
+
+@dataclass(frozen=True)
+class Row:
+    """A setting of theirs and what it became. key: ours; value: ours, as TOML has it, empty where it is left; how: what was
+    worked out, or why it is left."""
+
+    name: str
+    text: str
+    key: str
+    value: str
+    how: str = ""
+
+    @property
+    def taken(self) -> bool:
+        """Whether it is in the profile."""
+        return bool(self.value)
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A profile to be: kind, name, the shipped one it inherits from, and the rows of its settings."""
+
+    kind: str
+    name: str
+    base: str
+    rows: tuple[Row, ...]
+
+    @property
+    def settings(self) -> list[str]:
+        """What differs, as --set takes it."""
+        return [f'{self.kind}.name="{_quoted(self.name)}"', *(f"{row.key}={row.value}" for row in self.rows if row.taken)]
+
+
+def imported(config: Config, kind: str, name: str = "") -> Imported:
+    """The material or the process of a configuration. name: what to call it; else as there, else after the program."""
+    base = PROCESS_BASE if kind == "process" else material_rules.base_of(config)[0]
+    own_name = name or (config.process if kind == "process" else config.material) or f"{config.program} {kind}"
+    return _sound(Imported(kind, own_name, base, tuple(_rows(config, kind, base))))
+
+
+def _sound(profile: Imported) -> Imported:
+    """The profile without widths that do not go with its layers; ProfileError where it cannot be one even so."""
+    try:
+        load_one(profile.base, profile.settings, profile.kind)
+    except ProfileError as error:
+        said = str(error)
+        wide = [row for row in profile.rows if row.taken and row.key in SPARE and row.key.split(".")[1] in said]
+        if not wide:
+            raise ProfileError(f"{profile.kind} {profile.name!r}: {said}") from None
+        rows = (replace(row, value="", how=_about(row, said)) if row in wide else row for row in profile.rows)
+        return _sound(replace(profile, rows=tuple(rows)))
+    return profile
+
+
+def _about(row: Row, said: str) -> str:
+    """The sentence that names a row's key."""
+    return next(line for line in said.replace("; ", "\n").splitlines() if row.key.split(".")[1] in line)
+
+
+def unused(config: Config) -> list[str]:
+    """Names of theirs that no rule reads: what there is nothing like here, and what belongs to the machine."""
+    read = {source for kind in KINDS for _, source, _ in RULES[kind]} | CONDITIONS
+    return sorted({entry.name for key, entry in config.entries.items() if key not in read} | set(config.unknown))
+
+
+def stay(profile: Imported) -> list[str]:
+    """Our keys that nothing of theirs has touched."""
+    from profiles.wording import keys
+
+    taken = {row.key for row in profile.rows if row.taken}
+    model = load_one(profile.base, kind=profile.kind)[profile.kind]
+    return [key for key, _ in keys(type(model), f"{profile.kind}.") if key not in taken and not key.endswith(".name")]
+
+
+def _rows(config: Config, kind: str, base: str) -> Iterator[Row]:
+    """One row a rule whose setting the file has; of several for one key the first that gives a value is taken."""
+    done: set[str] = set()
+    for key, source, convert in _present(config, kind):
+        entry = config.entries[source]
+        converted = Left(f"{key} has another's") if key in done else convert(config, source)
+        if isinstance(converted, Value):
+            text = _text(converted.value, base, kind, key)
+            refused = _refusal(base, kind, key, text)
+            if refused:
+                converted = Left(refused)
+            else:
+                done.add(key)
+                yield Row(entry.name, entry.text, key, text, converted.how)
+                continue
+        yield Row(entry.name, entry.text, key, "", converted.reason)
+
+
+def _present(config: Config, kind: str) -> Iterable[tuple[str, str, Convert]]:
+    return (rule for rule in RULES[kind] if config.text(rule[1]) is not None)
+
+
+def _text(value: float | bool | str | None, base: str, kind: str, key: str) -> str:
+    """A value as TOML has it; whole numbers where the key takes whole ones."""
+    is_whole = isinstance(value, float) and value.is_integer() and not isinstance(value, bool)
+    if is_whole and isinstance(_default(base, kind, key), int):
+        return value_text(int(value))  # type: ignore[arg-type]
+    return value_text(value)
+
+
+def _default(base: str, kind: str, key: str) -> object:
+    default: object = getattr(load_one(base, kind=kind)[kind], key.split(".")[1], None)
+    return default
+
+
+def _refusal(base: str, kind: str, key: str, text: str) -> str:
+    """What a profile says against a value; empty where it takes it."""
+    try:
+        load_one(base, [f"{key}={text}"], kind)
+    except ProfileError as error:
+        alone = [line for line in str(error).splitlines() if key.split(".")[1] in line]
+        return " ".join(alone) if any(f"{key} is" in line and "must be" in line for line in alone) else ""
+    return ""
+
+
+def _quoted(text: str) -> str:
+    return text.replace("\\", "\\\\").replace('"', '\\"')

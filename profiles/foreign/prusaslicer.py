@@ -1,0 +1,102 @@
+"""PrusaSlicer's and SuperSlicer's files: config.ini, bundles of presets that inherit, and what stands at the end of G-code.
+
+A bundle's sections are [print:NAME], [filament:NAME], [printer:NAME]; `inherits = A; B` takes A, then B over it, and names in
+asterisks are parts that no one chooses (PrusaSlicer, src/libslic3r/PresetBundle.cpp).
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+
+from profiles.errors import ProfileError
+from profiles.foreign.config import Config, Entry
+
+KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # of a bundle's sections, and the options' names
+SECTION = re.compile(r"\[(.+)\]")
+SHOWN = 8  # presets that a sentence names
+
+Presets = dict[str, dict[str, dict[str, str]]]  # kind, name, key
+
+
+def read_settings(lines: list[str], program: str, chosen: Mapping[str, str]) -> Config:
+    """A config.ini, or the one preset of each kind that is chosen of a bundle. Raises ProfileError."""
+    presets = _sections(lines)
+    if not any(presets[kind] for kind in KINDS):
+        plain = presets[""].get("", {})
+        return _config(program, plain, plain.get("print_settings_id", ""), plain.get("filament_settings_id", ""))
+    names = {kind: _chosen(presets, kind, chosen.get(option, "")) for kind, option in KINDS.items()}
+    values: dict[str, str] = {}
+    for kind in ("printer", "filament", "print"):
+        values |= _inherited(presets[kind], names[kind], ()) if names[kind] else {}
+    return _config(program, values, names["print"], names["filament"])
+
+
+def gcode_settings(text: str) -> dict[str, str]:
+    """The settings at the end of a G-code file: `; key = value`; empty where it has none."""
+    found: dict[str, str] = {}
+    for line in text.splitlines():
+        match = re.fullmatch(r";\s*([A-Za-z0-9_]+)\s*=\s*(.*)", line)
+        if match:
+            found[match[1]] = match[2].strip()
+    return found
+
+
+def of_gcode(settings: Mapping[str, str]) -> Config:
+    """The settings of a G-code file that PrusaSlicer or SuperSlicer wrote."""
+    return _config(
+        "PrusaSlicer", settings, settings.get("print_settings_id", ""), settings.get("filament_settings_id", "").strip('"')
+    )
+
+
+def _sections(lines: list[str]) -> Presets:
+    presets: Presets = {kind: {} for kind in ("", "presets", *KINDS)}
+    here = presets[""].setdefault("", {})
+    for line in lines:
+        section, (key, equals, value) = SECTION.fullmatch(line.strip()), line.partition("=")
+        if section:
+            kind, _, name = section[1].partition(":")
+            here = presets.setdefault(kind, {}).setdefault(name.strip(), {})
+        elif equals and not line.lstrip().startswith(("#", ";")):
+            here[key.strip()] = value.strip()
+    return presets
+
+
+def _chosen(presets: Presets, kind: str, asked: str) -> str:
+    """The preset of a kind that is asked for, that the bundle calls active, or that is its only one."""
+    names = [name for name in presets[kind] if not name.startswith("*")]
+    if asked:
+        if asked not in presets[kind]:
+            raise ProfileError(f"{KINDS[kind]} preset {asked!r}: the file has no such one; {_told(names, asked)}")
+        return asked
+    active = presets["presets"].get("", {}).get(kind, "").split(";")[0].strip()
+    if active in presets[kind]:
+        return active
+    if len(names) > 1 and kind != "printer":
+        raise ProfileError(f"--{KINDS[kind]}-preset is missing: the file has {len(names)}; {_told(names, '')}")
+    return names[0] if len(names) == 1 else ""
+
+
+def _told(names: list[str], asked: str) -> str:
+    """A few of the names, those that share a word with what was asked for first."""
+    words = [word for word in re.split(r"\W+", asked.lower()) if word]
+    near = sorted(names, key=lambda name: -sum(word in name.lower() for word in words))
+    return f"among them {', '.join(repr(name) for name in near[:SHOWN])}" if names else "it has none of this kind"
+
+
+def _inherited(presets: Mapping[str, Mapping[str, str]], name: str, below: tuple[str, ...]) -> dict[str, str]:
+    """A preset's settings with those that it inherits."""
+    if name in below:
+        raise ProfileError(f"preset {name!r} inherits itself")
+    if name not in presets:
+        raise ProfileError(f"preset {below[-1]!r} inherits {name!r}, which the file does not have")
+    values: dict[str, str] = {}
+    for parent in _parents(presets[name].get("inherits", "")):
+        values |= _inherited(presets, parent, (*below, name))
+    return values | {key: value for key, value in presets[name].items() if key != "inherits"}
+
+
+def _parents(text: str) -> Iterator[str]:
+    yield from (name.strip().strip('"') for name in text.split(";") if name.strip())
+
+
+def _config(program: str, values: Mapping[str, str], process: str, material: str) -> Config:
+    return Config(program, {key: Entry(key, value) for key, value in values.items()}, (), process, material)

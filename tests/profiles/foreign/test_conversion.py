@@ -1,0 +1,117 @@
+"""What numbers of other slicers mean here."""
+
+import pytest
+
+from profiles.errors import ProfileError
+from profiles.foreign.config import Config, Entry
+from profiles.foreign.imported import imported, stay, unused
+from profiles.foreign.process_rules import RULES
+from profiles.profile import load_one
+
+
+def config(**values: str) -> Config:
+    return Config("PrusaSlicer", {key: Entry(key, text) for key, text in values.items()})
+
+
+def taken(kind: str = "process", **values: str) -> dict[str, str]:
+    rows = imported(config(**values), kind).rows
+    return {row.key.split(".")[1]: row.value for row in rows if row.taken}
+
+
+@pytest.mark.parametrize(
+    ("values", "key", "value"),
+    [
+        ({"external_perimeter_extrusion_width": "180%", "layer_height": "0.25"}, "outer_wall_line_width_mm", "0.45"),
+        ({"perimeter_extrusion_width": "0", "extrusion_width": "0.5"}, "line_width_mm", "0.5"),
+        ({"perimeter_extrusion_width": "0", "extrusion_width": "0", "nozzle_diameter": "0.4"}, "line_width_mm", "0.45"),
+        ({"top_infill_extrusion_width": "0", "nozzle_diameter": "0.4"}, "top_skin_line_width_mm", "0.4"),
+        ({"first_layer_extrusion_width": "200%", "first_layer_height": "0.3"}, "first_layer_line_width_mm", "0.6"),
+        ({"external_perimeter_speed": "50%", "perimeter_speed": "72"}, "outer_wall_speed_mm_s", "36.0"),
+        ({"top_solid_infill_speed": "50%", "solid_infill_speed": "60%", "infill_speed": "90"}, "top_skin_speed_mm_s", "27.0"),
+        ({"support_material_threshold": "30"}, "self_supporting_angle_deg", "60.0"),
+        ({"xy_size_compensation": "-0.1"}, "hole_compensation_mm", "0.1"),
+        (
+            {"support_material_contact_distance": "0.15", "support_material_bottom_contact_distance": "0"},
+            "support_bottom_gap_mm",
+            "0.15",
+        ),
+        ({"overhang_speed_0": "40%", "external_perimeter_speed": "50"}, "overhang_25_speed_mm_s", "20.0"),
+        ({"perimeters": "2"}, "walls", "2"),
+        ({"cooling": "0", "slowdown_below_layer_time": "15"}, "least_layer_time_s", "0.0"),
+    ],
+)
+def test_a_print_setting_becomes_ours(values: dict[str, str], key: str, value: str) -> None:
+    assert taken(**values)[key] == value
+
+
+@pytest.mark.parametrize(
+    ("values", "key", "value"),
+    [
+        ({"max_fan_speed": "80"}, "fan", "0.8"),
+        ({"min_fan_speed": "35", "fan_always_on": "0"}, "fan_least", "0.0"),
+        ({"retract_length": "2", "filament_retract_length": "0.6"}, "retract_mm", "0.6"),
+        ({"retract_length": "2", "filament_retract_length": "nil"}, "retract_mm", "2.0"),
+        ({"temperature": "215,220"}, "nozzle_c", "215.0"),
+        ({"start_filament_gcode": r'"M900 K0.05 ; PLA\nG92 E0"'}, "pressure_advance", "0.05"),
+        ({"wipe": "0"}, "wipe_mm", "0.0"),
+    ],
+)
+def test_a_filament_setting_becomes_ours(values: dict[str, str], key: str, value: str) -> None:
+    assert taken("material", **values)[key] == value
+
+
+@pytest.mark.parametrize(
+    ("values", "why"),
+    [
+        ({"perimeter_speed": "0"}, "as fast as the plastic melts"),
+        ({"default_acceleration": "0"}, "the firmware's own"),
+        ({"fill_pattern": "hilbertcurve"}, "there is no such one"),
+        ({"external_perimeter_speed": "50%"}, "perimeter_speed, which the file does not tell"),
+        ({"layer_height": "9"}, "a number from"),
+        ({"layer_height": "thin"}, "is no number"),
+    ],
+)
+def test_what_cannot_be_said_here_is_left_with_the_reason(values: dict[str, str], why: str) -> None:
+    (row,) = (row for row in imported(config(**values), "process").rows if row.name == next(iter(values)))
+    assert not row.taken
+    assert why in row.how
+
+
+def test_pressure_advance_on_a_condition_is_left_to_the_person() -> None:
+    block = '"{if nozzle_diameter[0]==0.4}M900 K0.05{endif}"'
+    (row,) = imported(config(start_filament_gcode=block), "material").rows
+    assert "on a condition" in row.how
+
+
+def test_a_filament_s_kind_chooses_the_material_below_it() -> None:
+    bases = {
+        kind: imported(config(filament_type=kind, temperature="240"), "material").base for kind in ("PETG", "ASA", "TPU", "WOOD")
+    }
+    assert bases == {"PETG": "petg", "ASA": "abs", "TPU": "tpu", "WOOD": "pla"}
+
+
+def test_every_key_that_a_rule_fills_is_one_of_ours() -> None:
+    ours = {f"process.{name}" for name in type(load_one("standard")["process"]).model_fields}
+    assert {key for key, _, _ in RULES if key} <= ours
+
+
+def test_nothing_of_theirs_and_nothing_of_ours_is_passed_over_in_silence() -> None:
+    theirs = config(layer_height="0.2", wipe_tower="1")
+    profile = imported(theirs, "process")
+    assert unused(theirs) == ["wipe_tower"]
+    assert "process.layer_height_mm" not in stay(profile)
+    assert "process.walls" in stay(profile)
+
+
+def test_a_width_that_does_not_go_with_its_layers_is_left_with_the_reason() -> None:
+    theirs = config(
+        layer_height="0.35", first_layer_height="0.3", perimeter_extrusion_width="0.45", support_material_extrusion_width="0.37"
+    )
+    (row,) = (row for row in imported(theirs, "process").rows if row.name == "support_material_extrusion_width")
+    assert not row.taken
+    assert row.how == "process.layer_height_mm is 0.35 mm: at most 0.9 of support_line_width_mm (0.333 mm) is allowed"
+
+
+def test_layers_that_are_too_high_for_all_lines_are_refused() -> None:
+    with pytest.raises(ProfileError, match=r"process 'PrusaSlicer process': .*at most 0.9 of line_width_mm"):
+        imported(config(layer_height="0.4", perimeter_extrusion_width="0.4"), "process")
