@@ -3,8 +3,8 @@
     python tools/one_folder.py -o dist/tiltprint-linux [--wheel FILE.whl]
 
 Copies the Python that runs this script, without what no program needs, installs the wheel (built first where none is given) and
-its libraries into it, and lays the system's libraries that its modules are linked to beside it. `tiltprint` in the folder starts the
-program; the folder may be moved. LICENSES has the licence texts of all that is bundled. It runs where the C library is as new
+its libraries into it, and lays the system's libraries that its modules are linked to beside it. `tiltprint` in the folder starts
+the program; the folder may be moved. LICENSES has the licence texts of all that is bundled. It runs where the C library is as new
 as here, or newer. The program starts interpreters of its own (the workbench's workers, prints, compilers), so it is a Python
 in a folder and not a program that PyInstaller or Briefcase freeze: those have no interpreter to start.
 """
