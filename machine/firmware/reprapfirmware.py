@@ -53,7 +53,7 @@ SIMULATED = SimulationRules(
     unhomed="Error: G0/G1: insufficient axes homed",
     kill=("Error: Emergency Stop! Reset the controller to continue.",),
     position=position_report,
-    lacks=frozenset({"M154", "M155", "M113", "M876", "M900"}),
+    lacks=frozenset({"M503", "M154", "M155", "M113", "M876", "M900"}),
 )
 
 REPRAPFIRMWARE = Firmware(

@@ -1,0 +1,80 @@
+"""Settings queries: what a printer at a port or behind a print server tells of its settings, as the text that is read from.
+
+Only questions are asked: nothing moves, nothing heats. A printer that prints is left alone.
+"""
+
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack
+from math import inf
+from time import monotonic
+
+from machine.app.printer.compatibility import identify_printer
+from machine.app.printer.server_checks import check_idle
+from machine.app.requests import SIMULATED
+from machine.detect.found import ConfigText
+from machine.firmware import identify
+from machine.link.port import Port, open_port
+from machine.network.address import is_server_address
+from machine.network.servers import open_server
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import PrinterError, RemoteProtocolError, SilenceError
+from profiles.machine import Machine
+
+ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
+OK = re.compile(r"ok\b.*")
+PRINTS_FROM_CARD = "SD printing byte"  # M27 of Marlin, sd/cardreader.cpp
+QUESTIONS = {
+    "Marlin": ("M115", "M503", "M203", "M211"),
+}
+OTHERWISE = {
+    "Klipper": "Klipper tells its settings over the network, to --port moonraker:HOST, and in its file printer.cfg",
+}
+
+
+def text_of_port(port: str, baud: int, simulated: Machine) -> ConfigText:
+    """What answers at a port; simulated: the machine behind the port sim. Raises PrinterError."""
+    if is_server_address(port):
+        return _text_of_server(port)
+    with ExitStack() as stack:
+        path = stack.enter_context(SimulatedPrinter(simulated, inf)).path if port == SIMULATED else port
+        wire = stack.enter_context(open_port(path, baud))
+        return ConfigText(port, _conversation(wire, baud))
+
+
+def _conversation(wire: Port, baud: int) -> str:
+    answer = identify_printer(wire, baud)
+    firmware = identify(answer.words)
+    name = firmware.name if firmware is not None else ""
+    if name not in QUESTIONS:
+        known = ", ".join(QUESTIONS)
+        raise RemoteProtocolError(
+            OTHERWISE.get(name)
+            or f"the printer at {wire.name} is {answer.firmware or 'of no firmware that it names'}, whose "
+            f"settings are not known how to ask for: {known} tell theirs over a port"
+        )
+    if any(PRINTS_FROM_CARD in line for line in _ask(wire, "M27")):
+        raise PrinterError(f"the printer at {wire.name} is printing from its card: ask it when that is done")
+    return "\n".join(line for question in QUESTIONS[name] for line in _ask(wire, question))
+
+
+def _ask(wire: Port, question: str) -> Iterator[str]:
+    """The lines of an answer until its ok. Raises SilenceError."""
+    wire.write(f"{question}\n".encode("ascii"))
+    half, end_s = b"", monotonic() + ANSWER_S
+    while monotonic() < end_s:
+        *lines, half = (half + wire.read()).replace(b"\r", b"\n").split(b"\n")
+        for line in lines:
+            text = line.decode("ascii", "replace").strip()
+            if OK.fullmatch(text):
+                return
+            if text:
+                yield text
+    raise SilenceError(f"the printer at {wire.name} does not answer {question} within {ANSWER_S:g} s: try it again")
+
+
+def _text_of_server(port: str) -> ConfigText:
+    with open_server(port) as server:
+        server.greet()
+        check_idle(server.name, server.status())
+        return ConfigText(port, server.settings())

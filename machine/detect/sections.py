@@ -1,0 +1,61 @@
+"""Sections: configurations of [name] and key = value, as Klipper and LinuxCNC write them."""
+
+import configparser
+import re
+from collections.abc import Iterator, Mapping
+from math import isfinite
+
+from machine.detect.found import ConfigText
+from profiles.errors import ProfileError
+
+Sections = dict[str, dict[str, str]]
+MOST_INCLUDED = 100  # files; more is one that names itself
+NOTHING = re.compile(r"(?!)")
+
+
+def read_sections(config: ConfigText, include: re.Pattern[str] = NOTHING) -> Sections:
+    """The sections of a text, later ones over earlier ones; keys in small letters, comments from # on or from a ; behind a blank.
+
+    include: a line that names other files by its first group: they are read in its place. Raises ProfileError.
+    """
+    parser = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#"), allow_no_value=False)
+    for name, text in _pieces(config, include, [0]):
+        try:
+            parser.read_string(text, name)
+        except configparser.MissingSectionHeaderError as error:
+            raise ProfileError(f"{name}: {error.line.strip()[:60]!r} stands in no section") from None
+        except configparser.ParsingError as error:
+            _, line = error.errors[0]
+            raise ProfileError(f"{name}: {line[:60]} is neither a section nor a setting: is the file cut off?") from None
+    return {title: dict(parser.items(title)) for title in parser.sections()}
+
+
+def _pieces(config: ConfigText, include: re.Pattern[str], count: list[int]) -> Iterator[tuple[str, str]]:
+    """Names and texts in the order in which they count. count: of files so far."""
+    count[0] += 1
+    if count[0] > MOST_INCLUDED:
+        raise ProfileError(f"{config.name}: more than {MOST_INCLUDED} files are included: does one name itself?")
+    lines: list[str] = []
+    for line in config.text.splitlines():
+        if (named := include.match(line)) is None:
+            lines.append(line.partition("#")[0])
+            continue
+        yield config.name, "\n".join(lines)
+        lines.clear()
+        for other in config.beside(named[1].strip()):
+            yield from _pieces(other, include, count)
+    yield config.name, "\n".join(lines)
+
+
+def number(section: Mapping[str, str], key: str, name: str) -> float | None:
+    """The number of a key, None where it is not there. name: of section and file, for the message. Raises ProfileError."""
+    text = section.get(key)
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        raise ProfileError(f"{name}: {key} is {text[:40]!r}, which is no number") from None
+    if not isfinite(value):
+        raise ProfileError(f"{name}: {key} is {text[:40]!r}: a finite number is expected")
+    return value
