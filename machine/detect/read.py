@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from machine.detect import klipper, marlin
+from machine.detect import grblhal, klipper, linuxcnc, marlin, reprapfirmware
 from machine.detect.found import ConfigText, Found
 from profiles.errors import ProfileError
 
@@ -17,7 +17,10 @@ class Reader(NamedTuple):
 
 
 READERS: Mapping[str, Reader] = {
+    "LinuxCNC": Reader(linuxcnc.recognise, linuxcnc.read, "LinuxCNC's .ini"),
     "Klipper": Reader(klipper.recognise, klipper.read, "Klipper's printer.cfg"),
+    "RepRapFirmware": Reader(reprapfirmware.recognise, reprapfirmware.read, "RepRapFirmware's config.g"),
+    "grblHAL": Reader(grblhal.recognise, grblhal.read, "a dump of grblHAL's $$"),
     "Marlin": Reader(marlin.recognise, marlin.read, "a log of Marlin's M503"),
 }
 

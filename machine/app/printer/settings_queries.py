@@ -24,8 +24,14 @@ from profiles.machine import Machine
 ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
 OK = re.compile(r"ok\b.*")
 PRINTS_FROM_CARD = "SD printing byte"  # M27 of Marlin, sd/cardreader.cpp
+CUT = re.compile(r'"next":([1-9]\d*)\}$')
+MOST_PAGES = 16
 QUESTIONS = {
     "Marlin": ("M115", "M503", "M203", "M211"),
+    "RepRapFirmware": (
+        *(f'M409 K"{key}" F"d99vn"' for key in ("move.axes", "move.extruders", "tools", "sensors.probes", "boards[0]", "heat")),
+        'M409 K"network" F"d99vn"',
+    ),
 }
 OTHERWISE = {
     "Klipper": "Klipper tells its settings over the network, to --port moonraker:HOST, and in its file printer.cfg",
@@ -55,7 +61,17 @@ def _conversation(wire: Port, baud: int) -> str:
         )
     if any(PRINTS_FROM_CARD in line for line in _ask(wire, "M27")):
         raise PrinterError(f"the printer at {wire.name} is printing from its card: ask it when that is done")
-    return "\n".join(line for question in QUESTIONS[name] for line in _ask(wire, question))
+    return "\n".join(line for question in QUESTIONS[name] for line in _pages(wire, question))
+
+
+def _pages(wire: Port, question: str) -> Iterator[str]:
+    """The lines of an answer, and of those to the same question behind where an array of RepRapFirmware's model was cut."""
+    for _ in range(MOST_PAGES):
+        answer = list(_ask(wire, question))
+        yield from answer
+        if not (cut := CUT.search(answer[-1] if answer else "")):
+            return
+        question = f'{question.partition(" F")[0]} F"d99vna{cut[1]}"'
 
 
 def _ask(wire: Port, question: str) -> Iterator[str]:
