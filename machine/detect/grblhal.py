@@ -78,7 +78,7 @@ def _envelope(values: dict[int, float], index: int, travel: float) -> tuple[floa
     """limits_set_work_envelope of machine_limits.c."""
     left = values.get(PULL_OFF, 0.0) if int(values.get(HARD_LIMITS, 0.0)) & 1 else 0.0
     if not int(values.get(HOMING, 0.0)) & AT_ORIGIN:
-        return left - travel, -left
+        return left - travel, 0.0 - left
     to_the_least = int(values.get(HOME_SIDES, 0.0)) >> index & 1
     return (0.0, travel - left) if to_the_least else (left - travel, 0.0)
 

@@ -2,8 +2,9 @@
 
 docs/src/config/ini-config.adoc (0052c79): [TRAJ] COORDINATES names the axes, LINEAR_UNITS and ANGULAR_UNITS say what lengths and
 angles of the file count in, a second; [AXIS_X] has MIN_LIMIT, MAX_LIMIT, MAX_VELOCITY and MAX_ACCELERATION, before 2.8 [AXIS_0]
-by the joint's number; where an axis does not say it, its joint does; none of [TRAJ]'s velocities may be passed. Without a limit an
-axis that turns is endless. [KINS] KINEMATICS names the module: xyzac-trt-kins and its like follow the table.
+by the joint's number; where an axis does not say it, its joint does, and where the kinematics follow the table (xyzac-trt-kins
+and its like, [KINS] KINEMATICS) the joints go first, whose places are those of the machine; none of [TRAJ]'s velocities may be
+passed. Without a limit an axis that turns is endless.
 """
 
 import re
@@ -45,20 +46,18 @@ def read(config: ConfigText) -> Found:
     trajectory, kinematics = sections.get("TRAJ", {}), sections.get("KINS", {})
     module = kinematics.get("kinematics", "")
     coordinates = _letters(trajectory, module)
-    joints = re.sub(
-        r"[^XYZABCUVW]", "", module.partition("coordinates=")[2].split()[0].upper() if "coordinates=" in module else ""
-    )
+    joints = _of_module(module) or coordinates
+    follows = FOLLOWS.search(module) is not None
     units = {
         "linear": _unit(config, trajectory, "linear_units", LINEAR_MM, "mm or inch"),
         "angular": _unit(config, trajectory, "angular_units", ANGULAR_DEG, "degree, radian or grad"),
     }
     axes = {
-        letter: _axis(config, sections, letter, (joints or coordinates).find(letter), units[_kind(letter)])
+        letter: _axis(config, sections, letter, _places(sections, letter, joints.find(letter), follows), units[_kind(letter)])
         for letter in dict.fromkeys(coordinates)
     }
     settings: dict[str, Reading] = {}
     if module:
-        follows = FOLLOWS.search(module) is not None
         settings["coordinates"] = Reading("workpiece" if follows else "table", f"[KINS] KINEMATICS {module.split()[0]}")
     rotary = "".join(letter for letter in axes if letter in TURNING)
     remarks = ("where its kinematics have the axes stands in its .hal files: x-rot-point and its like",) if rotary else ()
@@ -68,8 +67,22 @@ def read(config: ConfigText) -> Found:
 
 def _letters(trajectory: Mapping[str, str], module: str) -> str:
     """The letters of COORDINATES, else of the kinematics, else X Y Z."""
-    told = trajectory.get("coordinates") or (module.partition("coordinates=")[2].split() or [""])[0] or "XYZ"
-    return re.sub(r"[^XYZABCUVW]", "", told.upper())
+    return _axis_letters(trajectory.get("coordinates", "")) or _of_module(module) or "XYZ"
+
+
+def _of_module(module: str) -> str:
+    """The letters of the joints in their order, as the kinematics are told them; "" where they are not."""
+    return _axis_letters((module.lower().partition("coordinates=")[2].split() or [""])[0])
+
+
+def _axis_letters(text: str) -> str:
+    return re.sub(r"[^XYZABCUVW]", "", text.upper())
+
+
+def _places(sections: Sections, letter: str, joint: int, follows: bool) -> list[str]:
+    """The sections that tell of an axis, the one that counts first."""
+    titles = (f"JOINT_{joint}", f"AXIS_{letter}") if follows else (f"AXIS_{letter}", f"JOINT_{joint}")
+    return [title for title in (*titles, f"AXIS_{joint}") if title in sections]
 
 
 def _kind(letter: str) -> str:
@@ -84,9 +97,8 @@ def _unit(config: ConfigText, trajectory: Mapping[str, str], key: str, units: Ma
     return units.get(text, 1.0)
 
 
-def _axis(config: ConfigText, sections: Sections, letter: str, joint: int, unit: float) -> AxisReadings:
+def _axis(config: ConfigText, sections: Sections, letter: str, places: list[str], unit: float) -> AxisReadings:
     trajectory, readings = sections.get("TRAJ", {}), AxisReadings()
-    places = [title for title in (f"AXIS_{letter}", f"JOINT_{joint}", f"AXIS_{joint}") if title in sections]
     for key, theirs in ((SPEED, "MAX_VELOCITY"), (ACCELERATION, "MAX_ACCELERATION")):
         told = _first(config, sections, places, theirs)
         most_key = theirs.replace("MAX_", f"MAX_{_kind(letter).upper()}_")

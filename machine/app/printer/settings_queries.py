@@ -9,11 +9,12 @@ from contextlib import ExitStack
 from math import inf
 from time import monotonic
 
-from machine.app.printer.compatibility import identify_printer
+from machine.app.printer.compatibility import check_answer
 from machine.app.printer.server_checks import check_idle
 from machine.app.requests import SIMULATED
 from machine.detect.found import ConfigText
 from machine.firmware import identify
+from machine.link.identification import GRBL_SAYS, Kind, ask_at_any_rate
 from machine.link.port import Port, open_port
 from machine.network.address import is_server_address
 from machine.network.servers import open_server
@@ -23,15 +24,16 @@ from profiles.machine import Machine
 
 ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
 OK = re.compile(r"ok\b.*")
-PRINTS_FROM_CARD = "SD printing byte"  # M27 of Marlin, sd/cardreader.cpp
+FROM_CARD = "SD printing byte"  # answers Marlin's M27 while it prints a file of its own (sd/cardreader.cpp)
 CUT = re.compile(r'"next":([1-9]\d*)\}$')
 MOST_PAGES = 16
 QUESTIONS = {
-    "Marlin": ("M115", "M503", "M203", "M211"),
+    "Marlin": ("M27", "M115", "M503", "M203", "M211"),
     "RepRapFirmware": (
         *(f'M409 K"{key}" F"d99vn"' for key in ("move.axes", "move.extruders", "tools", "sensors.probes", "boards[0]", "heat")),
         'M409 K"network" F"d99vn"',
     ),
+    "grblHAL": ("$I", "$$"),
 }
 OTHERWISE = {
     "Klipper": "Klipper tells its settings over the network, to --port moonraker:HOST, and in its file printer.cfg",
@@ -49,18 +51,17 @@ def text_of_port(port: str, baud: int, simulated: Machine) -> ConfigText:
 
 
 def _conversation(wire: Port, baud: int) -> str:
-    answer = identify_printer(wire, baud)
-    firmware = identify(answer.words)
-    name = firmware.name if firmware is not None else ""
+    answer, rate = ask_at_any_rate(wire, baud)
+    if answer.kind is Kind.STRANGER and rate == baud and GRBL_SAYS.fullmatch(answer.words):
+        name = "grblHAL"
+    else:
+        check_answer(answer, wire.name, baud, rate)
+        firmware = identify(answer.words)
+        name = firmware.name if firmware is not None else ""
     if name not in QUESTIONS:
-        known = ", ".join(QUESTIONS)
-        raise RemoteProtocolError(
-            OTHERWISE.get(name)
-            or f"the printer at {wire.name} is {answer.firmware or 'of no firmware that it names'}, whose "
-            f"settings are not known how to ask for: {known} tell theirs over a port"
-        )
-    if any(PRINTS_FROM_CARD in line for line in _ask(wire, "M27")):
-        raise PrinterError(f"the printer at {wire.name} is printing from its card: ask it when that is done")
+        words, known = answer.firmware or "of no firmware that it names", ", ".join(QUESTIONS)
+        unknown = f"the printer at {wire.name} is {words}, whose settings cannot be asked for over a port: those of {known} can"
+        raise RemoteProtocolError(OTHERWISE.get(name, unknown))
     return "\n".join(line for question in QUESTIONS[name] for line in _pages(wire, question))
 
 
@@ -84,6 +85,8 @@ def _ask(wire: Port, question: str) -> Iterator[str]:
             text = line.decode("ascii", "replace").strip()
             if OK.fullmatch(text):
                 return
+            if FROM_CARD in text or GRBL_SAYS.fullmatch(text):
+                raise PrinterError(f"the printer at {wire.name} is at work ({text}): ask it when that is done")
             if text:
                 yield text
     raise SilenceError(f"the printer at {wire.name} does not answer {question} within {ANSWER_S:g} s: try it again")
