@@ -4,6 +4,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator, Sequence
+from glob import glob, has_magic
 from pathlib import Path
 
 from machine.app.output import check_writable, refuse_to_overwrite, write_own
@@ -75,9 +76,8 @@ def read_file(file: Path) -> ConfigText:
         raise ProfileError(f"{file}: it is no configuration: a text of less than {MOST_BYTES >> 20} MiB is expected")
 
     def beside(pattern: str) -> Sequence[ConfigText]:
-        plain = not any(sign in pattern for sign in "*?[")
-        files = [file.parent / pattern] if plain else sorted(file.parent.glob(pattern))
-        return [read_file(other) for other in files]
+        files = sorted(glob(pattern, root_dir=file.parent)) if has_magic(pattern) else [pattern]
+        return [read_file(file.parent / other) for other in files]
 
     return ConfigText(str(file), content.decode("utf-8-sig", "replace").replace("\r\n", "\n"), beside)
 
