@@ -145,9 +145,5 @@ def _commands(config: ConfigText, count: list[int]) -> Iterator[tuple[str, Param
 
 def _macro(config: ConfigText, path: str, count: list[int]) -> Iterator[tuple[str, Parameters, int]]:
     """Of a macro; one that does not lie beside the file is passed over."""
-    try:
-        others = config.beside(path.rpartition("/")[2])
-    except ProfileError:
-        return
-    for other in others:
+    for other in config.beside(path.rpartition("/")[2]):
         yield from _commands(other, count)

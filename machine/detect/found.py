@@ -27,7 +27,7 @@ AxisReadings = dict[str, Reading]  # by LIMITS, SPEED, ACCELERATION; mm or deg, 
 @dataclass(frozen=True)
 class ConfigText:
     """What is read. name: of the file or the port, for messages; beside: the texts of files that this one names, by a pattern
-    with * and ?; it raises ProfileError where a plain name is no file."""
+    with * and ?, none where there is no such file; it may raise ProfileError."""
 
     name: str
     text: str

@@ -28,7 +28,7 @@ from machine.detect.found import (
     limits,
     rounded,
 )
-from machine.detect.sections import Sections, number, read_sections
+from machine.detect.sections import Included, Sections, number, read_sections
 from profiles.errors import ProfileError
 
 SIGNS = re.compile(r"^\[(?:printer|include [^\]]+|stepper_x|mcu)\]", re.MULTILINE)
@@ -50,14 +50,16 @@ def recognise(text: str) -> bool:
 
 def read(config: ConfigText) -> Found:
     """What a configuration tells. Raises ProfileError."""
-    version = ""
+    version, included = "", Included()
     if config.text.lstrip().startswith("{"):
         sections, version = _told_sections(config)
     else:
-        sections = _sections(config)
+        sections = _sections(config, included)
     if "printer" not in sections:
         raise ProfileError(f"{config.name}: it has no [printer]: is it whole, and are the files it includes beside it?")
     axes, remarks = _linear(config, sections)
+    if included.missing:
+        remarks.append(f"{', '.join(included.missing)} is not beside it: what stands there is not known")
     letters, rotary = _rotary(config, sections)
     if rotary and not any(letter in letters for letter in rotary):
         remarks.append(
@@ -70,7 +72,7 @@ def read(config: ConfigText) -> Found:
         "klipper" if letters or not rotary else "klipper_steppers",
         axes | {letter: readings for letter, (_, readings) in rotary.items()},
         "".join(rotary),
-        _settings(config, sections),
+        _settings(config, sections, whole=not included.missing),
         {letter: name for letter, (name, _) in rotary.items()},
         probe=_probe(sections),
         remarks=tuple(remarks),
@@ -100,10 +102,10 @@ def _texts(sections: Any) -> Sections:
     return {name: {str(key): str(value) for key, value in values.items()} for name, values in whole.items()}
 
 
-def _sections(config: ConfigText) -> Sections:
+def _sections(config: ConfigText, included: Included) -> Sections:
     """Of a file; what SAVE_CONFIG has written counts where the file says nothing."""
     own, _, saved = config.text.partition(f"\n{SAVED}[")
-    sections = read_sections(replace(config, text=own), INCLUDE)
+    sections = read_sections(replace(config, text=own), INCLUDE, included)
     lines = f"[{saved}".splitlines() if saved else []
     for name, values in read_sections(replace(config, text="\n".join(line.removeprefix(SAVED) for line in lines))).items():
         sections[name] = values | sections.get(name, {})
@@ -157,7 +159,7 @@ def _turning(config: ConfigText, title: str, section: Mapping[str, str], registr
     """The numbers of a stepper; those with which it is registered as an axis go before its own."""
     readings: AxisReadings = {}
     for key, own, told in ((SPEED, "velocity", "LIMIT_VELOCITY"), (ACCELERATION, "accel", "LIMIT_ACCEL")):
-        as_axis = re.search(rf"\b{told}=\s*([0-9.]+)", registration, re.IGNORECASE)
+        as_axis = re.search(rf"\b{told}=\s*([0-9]+(?:\.[0-9]+)?)", registration, re.IGNORECASE)
         value = float(as_axis[1]) if as_axis else number(section, own, f"{config.name}, [{title}]")
         if value:  # without an accel it starts and stops at once
             readings[key] = Reading(rounded(value), told if as_axis else f"[{title}] {own}")
@@ -167,7 +169,8 @@ def _turning(config: ConfigText, title: str, section: Mapping[str, str], registr
     return readings
 
 
-def _settings(config: ConfigText, sections: Sections) -> dict[str, Reading]:
+def _settings(config: ConfigText, sections: Sections, whole: bool) -> dict[str, Reading]:
+    """Settings by key; whole: what is not there is not there."""
     settings: dict[str, Reading] = {}
     extruder, bed, printer = sections.get("extruder", {}), sections.get("heater_bed"), sections["printer"]
     corner = number(printer, "square_corner_velocity", f"{config.name}, [printer]")
@@ -180,12 +183,13 @@ def _settings(config: ConfigText, sections: Sections) -> dict[str, Reading]:
         if (value := number(extruder, theirs, name)) is not None:
             settings[key] = Reading(rounded(value), f"[extruder] {theirs}")
     settings |= _filament(extruder, printer, config)
-    heat_c = number(bed, "max_temp", f"{config.name}, [heater_bed]") if bed is not None else 0.0
-    if heat_c is not None:
-        settings["bed_limit_c"] = Reading(
-            rounded(heat_c), "[heater_bed] max_temp" if bed is not None else "it has no [heater_bed]"
-        )
-    settings["arcs"] = Reading("gcode_arcs" in sections, "[gcode_arcs]" if "gcode_arcs" in sections else "it has no [gcode_arcs]")
+    if bed is None and whole:
+        settings["bed_limit_c"] = Reading(0.0, "it has no [heater_bed]")
+    elif bed is not None and (heat_c := number(bed, "max_temp", f"{config.name}, [heater_bed]")) is not None:
+        settings["bed_limit_c"] = Reading(rounded(heat_c), "[heater_bed] max_temp")
+    arcs = "gcode_arcs" in sections
+    if arcs or whole:
+        settings["arcs"] = Reading(arcs, "[gcode_arcs]" if arcs else "it has no [gcode_arcs]")
     return settings
 
 

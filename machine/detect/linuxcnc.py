@@ -42,7 +42,7 @@ def recognise(text: str) -> bool:
 
 def read(config: ConfigText) -> Found:
     """What a file tells. Raises ProfileError."""
-    sections = read_sections(config, INCLUDE)
+    sections = read_sections(config, INCLUDE, indents=False)
     trajectory, kinematics = sections.get("TRAJ", {}), sections.get("KINS", {})
     module = kinematics.get("kinematics", "")
     coordinates = _letters(trajectory, module)

@@ -128,6 +128,13 @@ def test_moonraker_tells_the_same() -> None:
     assert values(found(text), "Z") == {"speed": 200.0, "acceleration": 1000.0, "limits": [0.0, 210.0]}
 
 
+def test_what_may_stand_in_a_file_that_is_missing_is_not_taken_for_absent() -> None:
+    text = (STEPPERS + GIMBAL).replace("steppers/*.cfg", "mainsail.cfg").replace("[heater_bed]\nmax_temp: 125\n", "")
+    told = read(ConfigText("printer.cfg", text))
+    assert {"bed_limit_c", "arcs"}.isdisjoint(told.settings)
+    assert told.remarks[0] == "mainsail.cfg is not beside it: what stands there is not known"
+
+
 def test_a_delta_tells_no_reach() -> None:
     told = found(GIMBAL.replace("corexy", "delta"))
     assert "limits" not in told.axes["X"]

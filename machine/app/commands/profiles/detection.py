@@ -77,7 +77,8 @@ def read_file(file: Path) -> ConfigText:
 
     def beside(pattern: str) -> Sequence[ConfigText]:
         files = sorted(glob(pattern, root_dir=file.parent)) if has_magic(pattern) else [pattern]
-        return [read_file(file.parent / other) for other in files]
+        paths = [file.parent / other for other in files]
+        return [read_file(path) for path in paths if has_magic(pattern) or path.is_file()]
 
     return ConfigText(str(file), content.decode("utf-8-sig", "replace").replace("\r\n", "\n"), beside)
 

@@ -196,8 +196,6 @@ def test_a_file_of_another_kind_is_one_sentence(tmp_path: Path, capsys: pytest.C
     file.write_bytes(b"\0\1\2")
     assert "a text of less than 4 MiB is expected" in refusal(capsys, out, file)
     assert "cannot be read (no such file" in refusal(capsys, out, tmp_path / "none")
-    file.write_text("[include other.cfg]\n" + GIMBAL)
-    assert "other.cfg: cannot be read (no such file" in refusal(capsys, out, file)
 
 
 def test_numbers_that_no_machine_has_are_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
