@@ -38,14 +38,23 @@ def read_commands(config: ConfigText) -> Found:
     for letter, (low, high) in ends.items():
         if low is not None and high is not None:
             board.axes.setdefault(letter, {})[LIMITS] = limits(f"{config.name}: axis {letter}", low, high, "M208")
-    made = [letter for letter in board.turns if SPEED not in board.axes.get(letter, {})]
-    if made:
-        raise ProfileError(f"{config.name}: M584 makes an axis {made[0]}, of which no M203 tells the speed: is it whole?")
+    _keep_made(board)
     name = NAME.search(config.text)
     board.name = name[1] if name else ""
     if unread:
         board.remarks.append(f"what it has in braces ({unread}) only the board works out: --port duet:HOST asks it")
     return board.found("M566", "M143")
+
+
+def _keep_made(board: DuetBoard) -> None:
+    """Only axes that M584 makes, where it is there: the firmware passes over what is said of other letters."""
+    if not board.turns:
+        return
+    made = (*PRINTING, "E", *board.turns)
+    board.axes = {letter: board.axes.get(letter, {}) for letter in made if letter in board.axes or letter in board.turns}
+    silent = [letter for letter in board.turns if SPEED not in board.axes[letter]]
+    if silent:
+        board.remarks.append(f"M584 makes {' and '.join(silent)}, of which no M203 tells the speed")
 
 
 def _speeds(board: DuetBoard, parameters: Parameters) -> None:

@@ -78,15 +78,28 @@ def _machine(name: str) -> Machine:
 
 
 def _nearest(found: Found, tilts: bool) -> str:
-    """The shipped machine of the same dialect, then firmware, then letters; the first by name among equals."""
+    """The shipped machine of the same firmware, then letters, then dialect, whose axes differ least; the first by name among
+    equals."""
 
-    def differences(name: str) -> tuple[bool, bool, bool, str]:
+    def differences(name: str) -> tuple[bool, bool, bool, int, str]:
         machine = _machine(name)
         letters = {machine.tilt.letter, machine.turn.letter}
         other_firmware = _firmware(machine.dialect) != _firmware(found.dialect)
-        return other_firmware, tilts and not letters <= set(found.rotary), machine.dialect != found.dialect, name
+        other_letters = tilts and not letters <= set(found.rotary)
+        return other_firmware, other_letters, machine.dialect != found.dialect, _differing(found, machine), name
 
     return min((name for name in shipped("machine") if _machine(name).tilts == tilts), key=differences)
+
+
+def _differing(found: Found, machine: Machine) -> int:
+    """How many numbers of the axes are others than a machine's."""
+    linear = {"X": machine.x, "Y": machine.y, "Z": machine.z}
+    values = [
+        (getattr(linear[letter], LINEAR[key]), told.value) for letter in PRINTING for key, told in found.axes[letter].items()
+    ]
+    for axis in (machine.tilt, machine.turn):
+        values += [(getattr(axis, ROTARY[key]), told.value) for key, told in found.axes.get(axis.letter, {}).items()]
+    return sum((list(value) if isinstance(value, tuple) else value) != told for value, told in values)
 
 
 def _firmware(dialect: str) -> str:

@@ -75,6 +75,16 @@ def test_u_and_v_are_taken_for_the_table_where_nothing_else_can_be() -> None:
     assert told.remarks == ("U and V taken for axes that turn, which nothing says of them",)
 
 
+def test_an_axis_of_which_no_speed_is_told_is_kept_and_said() -> None:
+    told = found(CRADLE, SPEEDS.replace(" B1800", ""))
+    assert (told.rotary, "speed" in told.axes["B"]) == ("BC", False)
+    assert told.remarks == ("M584 makes B, of which no M203 tells the speed",)
+
+
+def test_letters_that_m584_does_not_make_are_passed_over() -> None:
+    assert found(CRADLE + "M208 A-5:5\nM203 A60\n").rotary == "BC"
+
+
 def test_what_only_the_board_works_out_is_said() -> None:
     told = found(CRADLE.replace("S290", "S{global.hot}"))
     assert "nozzle_limit_c" not in told.settings
@@ -121,7 +131,6 @@ def test_a_config_g_is_not_taken_for_a_log_of_marlin() -> None:
     ("text", "speeds", "sentence"),
     [
         (CRADLE, SPEEDS.replace("M201 X3000 Y2900 Z100", "M201"), "no acceleration of X"),
-        (CRADLE, SPEEDS.replace(" B1800", ""), "M584 makes an axis B, of which no M203 tells the speed: is it whole"),
         (CRADLE.replace("B-100:100", "B100:-100"), SPEEDS, "axis B: M208 tells limits from 100 to -100"),
         (CRADLE.replace("B0.3 C0.4 ", ""), 'M98 P"speeds.g"', "config.g: it is RepRapFirmware's, but tells no speed of X"),
         (model()[:-30], "", "cut off or damaged"),
