@@ -59,6 +59,7 @@ def settings_report(command: str, settings: SimulatedSettings) -> list[str]:
         for index, (letter, (low, high)) in enumerate(zip(settings.letters, settings.limits, strict=False))
     ]
     model: dict[str, Any] = {
+        "state.status": "idle",
         "boards[0]": {"firmwareName": "RepRapFirmware for Duet 3 MB6HC", "firmwareVersion": VERSION},
         "move.axes": axes,
         "move.extruders": [_drive(settings, len(axes))],

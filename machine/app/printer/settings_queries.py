@@ -17,6 +17,7 @@ from machine.firmware import identify
 from machine.link.identification import GRBL_SAYS, Kind, ask_at_any_rate
 from machine.link.port import Port, open_port
 from machine.network.address import is_server_address
+from machine.network.duet import SETTINGS_ARRAYS, SETTINGS_KEYS
 from machine.network.servers import open_server
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError, RemoteProtocolError, SilenceError
@@ -24,15 +25,15 @@ from profiles.machine import Machine
 
 ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
 OK = re.compile(r"ok\b.*")
-FROM_CARD = "SD printing byte"  # answers Marlin's M27 while it prints a file of its own (sd/cardreader.cpp)
+QUIET_S = 0.25  # what still comes of the questions before is over
+# Answers Marlin's M27 while it prints a file of its own (sd/cardreader.cpp), RepRapFirmware's object model, and grblHAL.
+WORK = "processing|simulating|pausing|paused|resuming|cancelling|busy|changingTool"
+AT_WORK = re.compile(rf'.*(?:SD printing byte|"state\.status".*"result":"(?:{WORK})").*')
 CUT = re.compile(r'"next":([1-9]\d*)\}$')
 MOST_PAGES = 16
 QUESTIONS = {
     "Marlin": ("M27", "M115", "M503", "M203", "M211"),
-    "RepRapFirmware": (
-        *(f'M409 K"{key}" F"d99vn"' for key in ("move.axes", "move.extruders", "tools", "sensors.probes", "boards[0]", "heat")),
-        'M409 K"network" F"d99vn"',
-    ),
+    "RepRapFirmware": tuple(f'M409 K"{key}" F"d99vn"' for key in ("state.status", *SETTINGS_ARRAYS, *SETTINGS_KEYS)),
     "grblHAL": ("$I", "$$"),
 }
 OTHERWISE = {
@@ -62,7 +63,16 @@ def _conversation(wire: Port, baud: int) -> str:
         words, known = answer.firmware or "of no firmware that it names", ", ".join(QUESTIONS)
         unknown = f"the printer at {wire.name} is {words}, whose settings cannot be asked for over a port: those of {known} can"
         raise RemoteProtocolError(OTHERWISE.get(name, unknown))
+    _hear_out(wire)
     return "\n".join(line for question in QUESTIONS[name] for line in _pages(wire, question))
+
+
+def _hear_out(wire: Port) -> None:
+    """Read what still comes, so that no answer is taken for that of the next question."""
+    quiet_s, end_s = monotonic() + QUIET_S, monotonic() + ANSWER_S
+    while (now_s := monotonic()) < min(quiet_s, end_s):
+        if wire.read():
+            quiet_s = now_s + QUIET_S
 
 
 def _pages(wire: Port, question: str) -> Iterator[str]:
@@ -85,8 +95,8 @@ def _ask(wire: Port, question: str) -> Iterator[str]:
             text = line.decode("ascii", "replace").strip()
             if OK.fullmatch(text):
                 return
-            if FROM_CARD in text or GRBL_SAYS.fullmatch(text):
-                raise PrinterError(f"the printer at {wire.name} is at work ({text}): ask it when that is done")
+            if AT_WORK.fullmatch(text) or GRBL_SAYS.fullmatch(text):
+                raise PrinterError(f"the printer at {wire.name} is at work ({text[:80]}): ask it when that is done")
             if text:
                 yield text
     raise SilenceError(f"the printer at {wire.name} does not answer {question} within {ANSWER_S:g} s: try it again")

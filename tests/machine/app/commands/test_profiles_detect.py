@@ -22,6 +22,7 @@ from tests.machine.detect.test_marlin import LOG
 from tests.machine.network.stand_ins import KEY, DuetStandIn, MoonrakerStandIn, stand_in
 from tests.machine.peers import on_terminal, scripted
 
+PLACE = "X:0.00 Y:0.00 Z:0.00 E:0.00\nok"
 OF_THE_FIRMWARE = ("limits_deg", "speed_deg_s", "acceleration_deg_s2", "letter")
 
 
@@ -159,9 +160,12 @@ def test_who_prints_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[
         job.start("a.gcode")
         job.state = "paused"
         assert "is paused a.gcode now: ask it when that is done" in refusal(capsys, tmp_path / "k.toml", "--port", address)
-    from_card = {"M115": "FIRMWARE_NAME:Marlin 2.1\nok", "M27": "SD printing byte 5/99\nok"}
+    from_card = {"M115": "FIRMWARE_NAME:Marlin 2.1\nok", "M114": PLACE, "M27": "SD printing byte 5/99\nok"}
     with on_terminal(scripted(from_card)) as port:
         assert "is at work (SD printing byte 5/99)" in refusal(capsys, tmp_path / "m.toml", "--port", port)
+    status = '{"key":"state.status","flags":"d99vn","result":"processing"}\nok'
+    with on_terminal(scripted({"M115": "FIRMWARE_NAME: RepRapFirmware\nok", "M114": PLACE, "M409": status})) as port:
+        assert '"result":"processing"' in refusal(capsys, tmp_path / "d.toml", "--port", port)
     with on_terminal(scripted({"$": "error:8"}, otherwise="error:20")) as port:
         assert "is at work (error:8)" in refusal(capsys, tmp_path / "g.toml", "--port", port)
 
@@ -183,7 +187,7 @@ def test_who_does_not_tell_its_settings_here_is_one_sentence(
     out = tmp_path / "my.toml"
     with SimulatedPrinter(load("fractal5pro").machine) as klipper:
         assert "--port moonraker:HOST" in refusal(capsys, out, "--port", klipper.path)
-    with on_terminal(scripted({"M115": "FIRMWARE_NAME:Smoothieware\nok"})) as port:
+    with on_terminal(scripted({"M115": "FIRMWARE_NAME:Smoothieware\nok", "M114": PLACE})) as port:
         assert "Smoothieware, whose settings cannot be asked for" in refusal(capsys, out, "--port", port)
     with stand_in("octoprint") as (_, address):
         assert "does not know its firmware's settings" in refusal(capsys, out, "--port", address)
