@@ -22,11 +22,12 @@ from machine.detect.found import (
     limits,
     rounded,
 )
+from machine.gcode.words import NUMBER
 
-SETTING = re.compile(r"^.*?\$(\d+)=(-?[0-9.]+)", re.MULTILINE)
+SETTING = re.compile(rf"^.*?\$(\d{{1,4}})=({NUMBER})", re.MULTILINE)
 AXES = re.compile(r"\[AXS:\d+:([A-Z]+)\]")
 BUFFER = re.compile(r"\[OPT:[^,\]]*,\d+,(\d+)")
-VERSION = re.compile(r"\[VER:([^:\]]+)")
+VERSION = re.compile(r"\[VER:([^:\]\s]+)")
 USUAL = "XYZABCUVW"
 JUNCTION_MM, MINUTE_S = 11, 60.0
 HARD_LIMITS, HOMING, HOME_SIDES, PULL_OFF, ROTARY = 21, 22, 23, 27, 376
@@ -50,7 +51,7 @@ def read(config: ConfigText) -> Found:
     rotary = "".join(letter for letter in letters if letter in TURNING and turning >> TURNING.index(letter) & 1)
     settings: dict[str, Reading] = {}
     accelerations = [values[number] for number in (ACCELERATIONS, ACCELERATIONS + 1) if number in values]
-    if values.get(JUNCTION_MM) and accelerations:
+    if values.get(JUNCTION_MM, 0.0) > 0.0 and min(accelerations, default=0.0) > 0.0:
         speed = corner_speed(values[JUNCTION_MM], min(accelerations))
         settings["junction_speed_mm_s"] = Reading(rounded(speed), f"$11 and the {min(accelerations):g} mm/s2 of $120, $121")
     if buffer := BUFFER.search(config.text):

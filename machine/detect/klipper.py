@@ -84,7 +84,7 @@ def _told_sections(config: ConfigText) -> tuple[Sections, str]:
     """Of a query's answer: `settings` has the values the program works with, `config` the file's."""
     try:
         document = json.loads(config.text)
-    except ValueError:
+    except (ValueError, RecursionError):
         raise ProfileError(f"{config.name}: its JSON is cut off or damaged") from None
     while isinstance(document, dict) and "configfile" not in document:
         document = next((document[key] for key in ("result", "status") if key in document), None)

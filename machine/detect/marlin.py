@@ -120,7 +120,7 @@ def _corner(words: dict[str, dict[str, float]]) -> dict[str, Reading]:
     if jerks:
         return {"junction_speed_mm_s": Reading(rounded(min(jerks)), "M205")}
     printing = words.get("M204", {}).get("P", 0.0)
-    if "J" not in told or printing <= 0.0:
+    if told.get("J", 0.0) <= 0.0 or printing <= 0.0:
         return {}
     source = f"M205 J{told['J']:g}, at the {printing:g} mm/s2 of M204 P"
     return {"junction_speed_mm_s": Reading(rounded(corner_speed(told["J"], printing)), source)}

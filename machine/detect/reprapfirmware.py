@@ -23,6 +23,7 @@ from machine.detect.found import (
     limits,
     rounded,
 )
+from machine.network.answers import number, table
 from profiles.errors import ProfileError
 
 OWN = re.compile(r"^\s*M(?:566|584|574|950|563|143|669)\b", re.MULTILINE)  # commands that no other firmware has
@@ -47,17 +48,17 @@ def _read_model(config: ConfigText) -> Found:
     for axis in _tables(model.get("move.axes")):
         letter = str(axis.get("letter") or "")
         board.axes[letter] = _drive(axis, f"move.axes, {letter}")
-        low, high, jerk = (_number(axis.get(key)) for key in ("min", "max", "jerk"))
+        low, high, jerk = (number(axis.get(key)) for key in ("min", "max", "jerk"))
         if low is not None and high is not None:
             board.axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, f"move.axes, {letter}")
         if jerk is not None:
             board.jerks_mm_s[letter] = jerk / MINUTE_S
     for extruder in _tables(model.get("move.extruders"))[:1]:
         board.axes["E"] = _drive(extruder, "move.extruders")
-    _take_heat(board, _table(model.get("heat")), _tables(model.get("tools")))
+    _take_heat(board, table(model.get("heat")), _tables(model.get("tools")))
     probes = _tables(model.get("sensors.probes"))
-    board.probe = int(_number(probes[0].get("type")) or 0) if probes else 0
-    main, network = _table(model.get("boards[0]")), _table(model.get("network"))
+    board.probe = int(number(probes[0].get("type")) or 0) if probes else 0
+    main, network = table(model.get("boards[0]")), table(model.get("network"))
     board.name = str(network.get("name") or "")
     board.firmware = f"{main.get('firmwareName') or board.firmware} {main.get('firmwareVersion') or ''}".strip()
     return board.found("move.axes, jerk", "heat.heaters, max")
@@ -65,7 +66,7 @@ def _read_model(config: ConfigText) -> Found:
 
 def _take_heat(board: DuetBoard, heat: Table, tools: list[Table]) -> None:
     heaters = heat.get("heaters")
-    limits_c = [_number(_table(heater).get("max")) for heater in (heaters if isinstance(heaters, list) else [])]  # some are null
+    limits_c = [number(table(heater).get("max")) for heater in (heaters if isinstance(heaters, list) else [])]  # some are null
     board.heaters_c = {index: limit for index, limit in enumerate(limits_c) if limit is not None}
     board.bed = _first(heat.get("bedHeaters"), -1)
     board.nozzle = _first(tools[0].get("heaters") if tools else None, board.nozzle)
@@ -79,16 +80,16 @@ def _model(config: ConfigText) -> dict[str, Any]:
             continue
         try:
             answer = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             raise ProfileError(f"{config.name}: an answer to M409 is cut off or damaged") from None
-        key, value = str(answer.get("key")), answer.get("result")
+        key, value = str(table(answer).get("key")), table(answer).get("result")
         paged = isinstance(model.get(key), list) and isinstance(value, list)
         model[key] = model[key] + value if paged else value
     return model
 
 
 def _drive(drive: Table, source: str) -> AxisReadings:
-    speed, acceleration = _number(drive.get("speed")), _number(drive.get("acceleration"))
+    speed, acceleration = number(drive.get("speed")), number(drive.get("acceleration"))
     readings: AxisReadings = {}
     if speed is not None:
         readings[SPEED] = Reading(rounded(speed / MINUTE_S), source)
@@ -97,16 +98,8 @@ def _drive(drive: Table, source: str) -> AxisReadings:
     return readings
 
 
-def _table(value: Any) -> Table:
-    return value if isinstance(value, Mapping) else {}
-
-
 def _tables(value: Any) -> list[Table]:
     return [entry for entry in value if isinstance(entry, Mapping)] if isinstance(value, list) else []
-
-
-def _number(value: Any) -> float | None:
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def _first(values: Any, otherwise: int) -> int:
