@@ -40,7 +40,7 @@ def propose(found: Found, base: str | None = None) -> Proposal:
     tilts = len(found.rotary) >= 2 if base is None else _machine(base).tilts
     name = base or _nearest(found, tilts)
     machine = _machine(name)
-    values: dict[str, Reading] = {"machine.dialect": Reading(found.dialect, "what it is")}
+    values: dict[str, Reading] = {"machine.dialect": Reading(found.dialect, "its dialect")}
     for letter in PRINTING:
         values |= {f"machine.{letter.lower()}.{LINEAR[key]}": reading for key, reading in found.axes[letter].items()}
     if tilts:

@@ -38,7 +38,7 @@ def detect(request: DetectRequest) -> int:
     refuse_to_overwrite(out, request.replace)
     name = found.name or out.stem
     try:
-        text = profile_text("machine", proposal.base, settings_of(proposal, name, found.firmware))
+        text = profile_text("machine", proposal.base, settings_of(proposal, name, found.firmware), proposal.values)
     except ProfileError as error:
         first, *_ = str(error).splitlines()
         raise ProfileError(f"{request.port or request.file}: what it tells is no machine's: {first}") from None
