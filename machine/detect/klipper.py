@@ -81,7 +81,7 @@ def read(config: ConfigText) -> Found:
 
 
 def _told_sections(config: ConfigText) -> tuple[Sections, str]:
-    """Of a query's answer: `settings` has the values the program works with, `config` the file's."""
+    """Of a query's answer: `config` has the file's words, `settings` what the program works with, sections in small letters."""
     try:
         document = json.loads(config.text)
     except (ValueError, RecursionError):
@@ -90,8 +90,10 @@ def _told_sections(config: ConfigText) -> tuple[Sections, str]:
         document = next((document[key] for key in ("result", "status") if key in document), None)
     told = document.get("configfile") if isinstance(document, dict) else None
     sections = _texts(told.get("config") if isinstance(told, dict) else None)
+    written = {name.lower(): name for name in sections}
     for name, values in _texts(told.get("settings") if isinstance(told, dict) else None).items():
-        sections[name] = sections.get(name, {}) | values
+        own = written.get(name, name)
+        sections[own] = sections.get(own, {}) | values
     return sections, str(document.get("software_version") or "") if isinstance(document, dict) else ""
 
 
@@ -99,7 +101,9 @@ def _texts(sections: Any) -> Sections:
     if not isinstance(sections, Mapping):
         return {}
     whole = {str(name): values for name, values in sections.items() if isinstance(values, Mapping)}
-    return {name: {str(key): str(value) for key, value in values.items()} for name, values in whole.items()}
+    return {  # null stands for what is not set and has no default
+        name: {str(key): str(value) for key, value in values.items() if value is not None} for name, values in whole.items()
+    }
 
 
 def _sections(config: ConfigText, included: Included) -> Sections:

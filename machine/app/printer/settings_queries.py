@@ -92,7 +92,7 @@ def _ask(wire: Port, question: str) -> Iterator[str]:
     while monotonic() < end_s:
         *lines, half = (half + wire.read()).replace(b"\r", b"\n").split(b"\n")
         for line in lines:
-            text = line.decode("ascii", "replace").strip()
+            text = line.decode("utf-8", "replace").strip()
             if OK.fullmatch(text):
                 return
             if AT_WORK.fullmatch(text) or GRBL_SAYS.fullmatch(text):

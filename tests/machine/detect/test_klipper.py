@@ -135,6 +135,19 @@ def test_what_may_stand_in_a_file_that_is_missing_is_not_taken_for_absent() -> N
     assert told.remarks[0] == "mainsail.cfg is not beside it: what stands there is not known"
 
 
+def test_moonrakers_names_in_small_letters_are_those_of_the_file_and_null_is_nothing() -> None:
+    axis = {"position_min": 0.0, "position_max": 9.0}
+    settings = {
+        "printer": {"max_velocity": 90.0, "max_accel": 900.0},
+        **{f"stepper_{letter}": axis for letter in "xyz"},
+        **{f"manual_stepper table_{letter}": {"velocity": 5.0, "accel": 0.0, "position_min": None} for letter in "ac"},
+    }
+    config = {f"manual_stepper TABLE_{letter}": {"velocity": "5"} for letter in "AC"}
+    told = found(json.dumps({"result": {"status": {"configfile": {"settings": settings, "config": config}}}}))
+    assert dict(told.steppers) == {"A": "TABLE_A", "C": "TABLE_C"}
+    assert values(told, "A") == {"speed": 5.0}
+
+
 def test_a_delta_tells_no_reach() -> None:
     told = found(GIMBAL.replace("corexy", "delta"))
     assert "limits" not in told.axes["X"]
