@@ -1,6 +1,6 @@
 """Profile file: a machine, a material or a process with a person's settings over it, as the text of a profile of one's own."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from profiles.axes import STANDING
@@ -14,17 +14,20 @@ LONGEST_LINE = 100
 Tables = dict[str, Any]
 
 
-def profile_text(kind: str, name: str, settings: Iterable[str] = ()) -> str:
+def profile_text(kind: str, name: str, settings: Iterable[str] = (), stated: Iterable[str] = ()) -> str:
     """The text of a profile file that reads back to this profile with these settings.
 
     It inherits the shipped profile that this one is or goes back to and says what differs; where that cannot say it, as a row
-    taken out of a table, it says all itself. Raises ProfileError.
+    taken out of a table, it says all itself. stated: keys that are said although the shipped profile has the same, so that they
+    stay when that changes. Raises ProfileError.
     """
     wanted = load_one(name, settings, kind)
     base, whole = shipped_base(kind, name), _values(wanted)
     if base is not None:
         own_name = {"name": whole[kind]["name"]}
         differing = _differing(_values(load_one(base, kind=kind)), whole)
+        for key in stated:
+            differing = merged(differing, _only(whole, key.split(".")))
         text = _text(merged({kind: own_name}, differing), f"{PARENT} = {value_text(base)}\n")
         if _read(kind, text) == wanted:
             return text
@@ -45,6 +48,12 @@ def _read(kind: str, text: str) -> dict[str, Frozen | None]:
     document = read_toml(text)
     whole: Tables = {section: {} for section in OF_KIND[kind]} | merged(tables(kind, document[PARENT]), own_tables(document))
     return {section: sound_section(section, whole[section]) for section in OF_KIND[kind]}
+
+
+def _only(whole: Mapping[str, Any], path: Sequence[str]) -> Tables:
+    """The tables that hold one value alone."""
+    value = whole[path[0]]
+    return {path[0]: _only(value, path[1:]) if len(path) > 1 else value}
 
 
 def _differing(shared: Mapping[str, Any], whole: Mapping[str, Any]) -> Tables:

@@ -194,6 +194,20 @@ class ImportRequest:
 
 
 @dataclass(frozen=True)
+class DetectRequest:
+    """A firmware that tells of its machine, at a port or in a file. base: profile that is inherited, None: the nearest shipped
+    one; out: file to write, None: in the user's own folder; replace: write over it."""
+
+    port: str | None
+    file: Path | None
+    baud: int = 115200
+    base: str | None = None
+    out: Path | None = None
+    json: bool = False
+    replace: bool = False
+
+
+@dataclass(frozen=True)
 class CouponRequest:
     """Bars that tell what joints hold. names: of machine, material and process; shape: how the bars are broken; vary: KEY=VALUE
     that half of them are printed with, none: the usual ones; html, png: what shows them; report: a table and nothing else.

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import CalibrationRequest, CouponRequest, Given, ImportRequest
+from machine.app.requests import CalibrationRequest, CouponRequest, DetectRequest, Given, ImportRequest
 from machine.app.terminal.option_groups import with_option_groups
-from machine.app.terminal.options import Force, HtmlFile, MachineName, ModelProfileOptions, Settings, machine_profile
+from machine.app.terminal.options import Baud, Force, HtmlFile, MachineName, ModelProfileOptions, Settings, machine_profile
 
 profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
 
@@ -106,7 +106,7 @@ COMMANDS = {command.__name__: with_option_groups(command) for command in (calibr
 @profiles_app.command("list")
 def profiles_list() -> int:
     """The shipped profiles and your own."""
-    from machine.app.commands.profiles import list_profiles
+    from machine.app.commands.profiles.listing import list_profiles
 
     return list_profiles()
 
@@ -119,7 +119,7 @@ def profiles_show(
     settings: Settings = None,
 ) -> int:
     """Resolved values of one profile, with what each key means."""
-    from machine.app.commands.profiles import show
+    from machine.app.commands.profiles.listing import show
 
     return show(name, json, settings or [])
 
@@ -131,7 +131,7 @@ def profiles_save(
     settings: Settings = None,
 ) -> int:
     """A profile with changes of yours as a profile of your own, that says what differs and inherits the rest."""
-    from machine.app.commands.profiles import save
+    from machine.app.commands.profiles.listing import save
 
     return save(name, settings or [], out)
 
@@ -151,15 +151,41 @@ def profiles_import(
     json: Annotated[bool, typer.Option("--json", help="what became of every setting as JSON")] = False,
 ) -> int:
     """Another slicer's settings as a material and a process of yours, with what was taken, worked out and left."""
-    from machine.app.commands.profiles_import import import_profiles
+    from machine.app.commands.profiles.importing import import_profiles
 
     presets = {"process": process, "material": material, "printer": printer}
     return import_profiles(ImportRequest(file, presets, name, out, replace, json))
 
 
+@profiles_app.command("detect")
+def profiles_detect(
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="printer.cfg, config.g, a log of M503, a dump of $$, LinuxCNC's .ini"),
+    ] = None,
+    *,
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="of a printer; moonraker:HOST, duet:HOST; or sim")
+    ] = None,
+    baud: Baud = DetectRequest.baud,
+    base: Annotated[str | None, typer.Option("--base", metavar="NAME", help="inherit it, else the nearest shipped one")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE.toml", help="profile to write; else one of your own")
+    ] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
+    json: Annotated[bool, typer.Option("--json", help="what was found, what not and what to measure as JSON")] = False,
+) -> int:
+    """A machine profile by what the printer's firmware tells of itself. Nothing moves: only questions are asked."""
+    from machine.app.commands.profiles.detection import detect
+
+    if (port is None) == (file is None):
+        raise typer.BadParameter("one of FILE and --port PORT is expected")
+    return detect(DetectRequest(port, file, baud, base, out, json, replace))
+
+
 @profiles_app.command("check")
 def profiles_check(file: Annotated[Path, typer.Argument(metavar="FILE", help="a .toml profile")]) -> int:
     """All problems of a profile file at once; exit 1 when there are any."""
-    from machine.app.commands.profiles import check
+    from machine.app.commands.profiles.listing import check
 
     return check(file)

@@ -85,6 +85,10 @@ def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, be
     return f"B:{bed_c:.1f} /{bed_target_c:.1f} T0:{nozzle_c:.1f} /{nozzle_target_c:.1f}"
 
 
+UNKNOWN = frozenset({
+    "M92", "M108", "M113", "M116", "M154", "M155", "M211", "M302", "M409", "M410", "M486", "M503", "M568", "M572", "M665", "M876",
+    "M900", "G43.4",
+})  # fmt: skip
 IDENTITY = "FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0-simulated"
 
 SIMULATED = SimulationRules(
@@ -122,9 +126,7 @@ SIMULATED = SimulationRules(
     position=position_report,
     temperatures=temperature_report,
     while_heating="",
-    lacks=frozenset(
-        {"M108", "M113", "M116", "M154", "M155", "M211", "M302", "M410", "M486", "M568", "M572", "M665", "M876", "M900", "G43.4"}
-    ),
+    lacks=UNKNOWN,
     # klippy/extras/idle_timeout.py: timeout 600, TURN_OFF_HEATERS and M84; stepper_enable.py, motor_off: homing is forgotten.
     idle=Idle(after_s=600.0, axes=5, shuts_down=True),
 )

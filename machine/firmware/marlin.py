@@ -7,6 +7,7 @@ Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
+from machine.firmware.marlin_settings import settings_report
 from machine.firmware.simulation import Idle, SimulationRules
 
 DIALECT = Dialect(
@@ -53,8 +54,9 @@ SIMULATED = SimulationRules(
     unhomed="echo:Home XYZ First",
     kill=("Error:Printer halted. kill() called!", "//action:poweroff"),
     reports_position=True,
+    settings=settings_report,
     has_build_options=True,
-    lacks=frozenset({"M116", "M568", "M572"}),
+    lacks=frozenset({"M116", "M409", "M568", "M572"}),
     # module/motion.cpp, bugfix-2.1.x: current_position begins with the home positions; apply_motion_limits asks axis_was_homed.
     starts_at_home=True,
     # Configuration_adv.h: DEFAULT_STEPPER_TIMEOUT_SEC 120, DISABLE_IDLE_X, _Y, _Z and _E; _I and _J are commented out.

@@ -4,12 +4,15 @@ Mainline has no TCP, so coordinates are the table's. Line numbers are parsed but
 dropped in silence (GCodeBuffer/StringParser.cpp, 3.6); USB loses nothing.
 """
 
+import json
+import re
 from collections.abc import Mapping
+from typing import Any
 
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
-from machine.firmware.simulation import SimulationRules
+from machine.firmware.simulation import SimulatedSettings, SimulationRules
 
 DIALECT = Dialect(
     firmware="RepRapFirmware",
@@ -34,6 +37,10 @@ DIALECT = Dialect(
 )
 
 
+VERSION = "3.6.0-simulated"
+KEY = re.compile(r'K"([^"]*)"')
+
+
 def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
     """`X:1.000 Y:2.000 E:0.000 E0:0.0 Count 80 160 Machine 1.000 2.000 Bed comp 0.000`."""
     named = " ".join(f"{letter}:{value:.3f}" for letter, value in coordinates.items())
@@ -41,8 +48,34 @@ def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) 
     return f"{named} E0:{coordinates['E']:.1f} Count {counts} Machine {bare} Bed comp 0.000"
 
 
+def settings_report(command: str, settings: SimulatedSettings) -> list[str]:
+    """M409: a key of the object model as one line of JSON (Platform/Platform.cpp, its tables of axes and extruders): speed and
+    jerk a minute."""
+    key = KEY.search(command)
+    if not command.startswith("M409") or key is None:
+        return []
+    axes = [
+        {"letter": letter, "min": low, "max": high, **_drive(settings, index)}
+        for index, (letter, (low, high)) in enumerate(zip(settings.letters, settings.limits, strict=False))
+    ]
+    model: dict[str, Any] = {
+        "state.status": "idle",
+        "boards[0]": {"firmwareName": "RepRapFirmware for Duet 3 MB6HC", "firmwareVersion": VERSION},
+        "move.axes": axes,
+        "move.extruders": [_drive(settings, len(axes))],
+        "tools": [{"heaters": [1]}],
+        "heat": {"bedHeaters": [0], "heaters": [{"max": settings.bed_limit_c}, {"max": settings.nozzle_limit_c}]},
+    }
+    return [json.dumps({"key": key[1], "flags": "d99vn", "result": model.get(key[1])}, separators=(",", ":"))]
+
+
+def _drive(settings: SimulatedSettings, index: int) -> dict[str, float]:
+    acceleration, speed = settings.accelerations[index], settings.speeds[index]
+    return {"acceleration": acceleration, "jerk": 60.0 * settings.jerk, "speed": 60.0 * speed}
+
+
 SIMULATED = SimulationRules(
-    identity="FIRMWARE_NAME: RepRapFirmware for Duet 3 MB6HC FIRMWARE_VERSION: 3.6.0-simulated ELECTRONICS: Duet 3 MB6HC v1.01",
+    identity=f"FIRMWARE_NAME: RepRapFirmware for Duet 3 MB6HC FIRMWARE_VERSION: {VERSION} ELECTRONICS: Duet 3 MB6HC v1.01",
     banner=("RepRapFirmware for Duet 3 MB6HC is up and running.",),
     numbers="drop",
     queue_lines=1,
@@ -53,7 +86,8 @@ SIMULATED = SimulationRules(
     unhomed="Error: G0/G1: insufficient axes homed",
     kill=("Error: Emergency Stop! Reset the controller to continue.",),
     position=position_report,
-    lacks=frozenset({"M154", "M155", "M113", "M876", "M900"}),
+    settings=settings_report,
+    lacks=frozenset({"M503", "M154", "M155", "M113", "M876", "M900"}),
 )
 
 REPRAPFIRMWARE = Firmware(

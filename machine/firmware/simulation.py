@@ -1,6 +1,6 @@
 """SimulationRules: how the simulated printer takes lines and words its answers in the name of a firmware."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -8,6 +8,34 @@ from typing import Literal
 PositionReport = Callable[[Mapping[str, float], Mapping[str, int]], str]
 # Nozzle, its target, bed, its target, all deg C -> what M105 answers.
 TemperatureReport = Callable[[float, float, float, float], str]
+
+
+@dataclass(frozen=True)
+class SimulatedSettings:
+    """What a printer stands at. letters: of X Y Z and what turns the table, the filament last; limits: mm or deg, and steps a mm
+    or degree: of all but the filament; speeds, accelerations: of all, per s and s2; printing, travelling: of M204, mm/s2; jerk:
+    mm/s."""
+
+    letters: str
+    limits: Sequence[tuple[float, float]]
+    steps: Sequence[float]
+    speeds: Sequence[float]
+    accelerations: Sequence[float]
+    printing: float
+    travelling: float
+    jerk: float
+    soft_limits: bool
+    nozzle_limit_c: float
+    bed_limit_c: float
+
+
+# A command and the settings -> the lines that it is answered with before its ok.
+SettingsReport = Callable[[str, SimulatedSettings], list[str]]
+
+
+def no_settings_report(command: str, settings: SimulatedSettings) -> list[str]:
+    """Of a firmware that tells nothing by commands."""
+    return []
 
 
 def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
@@ -50,7 +78,7 @@ class SimulationRules:
     with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
     behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
     it believes itself at its home positions, and keeps only axes that were homed inside the limits.
-    answers_blank: an empty line is answered with ok. idle: None: its motors stay on.
+    settings: what it tells of its settings. answers_blank: an empty line is answered with ok. idle: None: its motors stay on.
     """
 
     identity: str
@@ -74,6 +102,7 @@ class SimulationRules:
     reports_position: bool = False
     position: PositionReport = position_report
     temperatures: TemperatureReport = temperature_report
+    settings: SettingsReport = no_settings_report
     while_heating: str = " W:?"
     lacks: frozenset[str] = frozenset()
     starts_at_home: bool = False

@@ -6,6 +6,7 @@ without a request, so a 401 begins a new one. The file is written as NAME.part a
 is recognised as its characters come in, whatever waits. A print can only be cancelled while it is paused (M25, then M0).
 """
 
+import json
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -22,6 +23,8 @@ DEFAULT_PASSWORD = "reprap"  # of a board on which none was set; its name must b
 WRITTEN_S = 120.0
 START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
 MOST_PAGES = 16
+SETTINGS_ARRAYS = ("move.axes", "move.extruders", "tools", "sensors.probes")
+SETTINGS_KEYS = ("boards[0]", "heat", "network")
 STOPPED = frozenset({Phase.PAUSING, Phase.PAUSED, Phase.CANCELLING})
 STATES = {
     "idle": Phase.READY,
@@ -156,6 +159,12 @@ class Duet(PrintServer):
         value = table(self._value("/rr_gcode", {"gcode": line}))
         if value.get("err", 0) != 0:
             raise ServerError(f"{self.name} has not taken {line}: it is busy")
+
+    def settings(self) -> str:
+        """Those keys of its object model, as M409 answers them."""
+        lines = [{"key": key, "result": self._array(key)} for key in SETTINGS_ARRAYS]
+        lines += [{"key": key, "result": self._model(key)} for key in SETTINGS_KEYS]
+        return "\n".join(json.dumps(line) for line in lines)
 
     def emergency_stop(self) -> None:
         """M112: the board halts until it is reset."""

@@ -5,6 +5,7 @@ cancellation waits for the command under way, a heating included, and is answere
 emergency stop is not.
 """
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -133,6 +134,11 @@ class Moonraker(PrintServer):
     def command(self, line: str) -> None:
         """Have a line of G-code executed, after the one under way."""
         self._order("/printer/gcode/script", {"script": line})
+
+    def settings(self) -> str:
+        """Its Klipper's configuration and version (docs/Status_Reference.md, configfile)."""
+        version = str(table(self._get("/printer/info")).get("software_version") or "")
+        return json.dumps({"software_version": version, **self._query(("configfile",))})
 
     def emergency_stop(self) -> None:
         """Klipper shuts down at once."""

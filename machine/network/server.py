@@ -7,6 +7,7 @@ from enum import Enum
 from machine.link.protocol.events import Temperature
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession
+from profiles.errors import ServerError
 
 
 class Phase(Enum):
@@ -113,6 +114,10 @@ class PrintServer(ABC):
     @abstractmethod
     def command(self, line: str) -> None:
         """Have a line of G-code executed."""
+
+    def settings(self) -> str:
+        """What its firmware tells of its settings, as JSON, a line for each answer."""
+        raise ServerError(f"{self.name} does not know its firmware's settings: ask the printer at its own port")
 
     @abstractmethod
     def emergency_stop(self) -> None:

@@ -103,6 +103,15 @@ def _area(board: Board) -> str:
     return f"area:{{full:{{{reach}}},work:{{{reach}}}}}"
 
 
+def _tell_settings(board: Board, words: WordValues, text: str) -> Work:
+    """What a command stands at when it has no words of its own; M409 of RepRapFirmware names a key in them."""
+    if not words or text.startswith("M409"):
+        for line in board.rules.settings(text.strip(), board.motion.settings()):
+            board.say(line)
+    command = MOVING.get(text.split()[0])
+    return command(board, words, text) if command is not None else None
+
+
 def _autoreport_temperatures(board: Board, words: WordValues, text: str) -> Work:
     board.report_every_s = max(0.0, words.get("S", 0.0))
     board.report_s = board.now_s + board.report_every_s if board.report_every_s else inf
@@ -159,6 +168,7 @@ def _stop_waiting(board: Board, words: WordValues, text: str) -> Work:
 
 COMMANDS: dict[str, Command] = {
     **MOVING,
+    **dict.fromkeys(("M92", "M201", "M203", "M204", "M205", "M211", "M409", "M503"), _tell_settings),
     **dict.fromkeys(("M80", "M81"), _power),
     **dict.fromkeys(("M104", "M140", "M568"), heat),
     **dict.fromkeys(("M109", "M190"), heat_and_wait),

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import ceil, hypot, inf, pi, sqrt
 
 from machine.firmware import simulation_of
+from machine.firmware.simulation import SimulatedSettings
 from machine.gcode.arcs import arc_centre, chords, sweep_rad
 from machine.gcode.modes import Modes, axes_of
 from machine.kinematics.coordinates import origin_mm
@@ -251,6 +252,26 @@ class Motion:
         for axis, most in self.modes.named(words.items()):
             if most > 0:
                 bounds[axis] = most
+
+    def settings(self) -> SimulatedSettings:
+        """What the firmware stands at."""
+        machine = self._machine
+        there = range(6) if machine.tilts else (0, 1, 2, 5)
+        usual = min(self.accelerations[:2])
+        printing, travelling = (usual if a == inf else a for a in (self._printing, self._travelling))
+        return SimulatedSettings(
+            letters="".join(self.letters[axis] for axis in there),
+            limits=[self.limits[axis] for axis in there if axis < 5],
+            steps=[STEPS[axis] for axis in there if axis < 5],
+            speeds=[self.speeds[axis] for axis in there],
+            accelerations=[self.accelerations[axis] for axis in there],
+            printing=printing,
+            travelling=travelling,
+            jerk=self.jerk_mm_s,
+            soft_limits=self.soft_limits,
+            nozzle_limit_c=machine.nozzle_limit_c,
+            bed_limit_c=machine.bed_limit_c,
+        )
 
     def rename(self, words: WordValues) -> None:
         """G92: the position of the axes gets these coordinates."""

@@ -130,13 +130,9 @@ def _override_flow(board: Board, words: WordValues, text: str) -> Work:
 
 
 def _limit(board: Board, words: WordValues, text: str) -> Work:
-    """M211: soft limits on, off, reported."""
-    motion = board.motion
+    """M211: soft limits on and off."""
     if "S" in words:
-        motion.soft_limits = words["S"] != 0
-        return None
-    least, most = ("".join(f" {a}:{b[side]:.2f}" for a, b in zip(motion.letters, motion.limits, strict=False)) for side in (0, 1))
-    board.say(f"echo:Soft endstops: {'On' if motion.soft_limits else 'Off'}  Min: {least}   Max: {most}")
+        board.motion.soft_limits = words["S"] != 0
     return None
 
 

@@ -28,14 +28,18 @@ AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 
 def identify_printer(wire: Port, baud: int) -> Answer:
     """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
-    port = wire.name
     answer, rate = ask_at_any_rate(wire, baud)
+    check_answer(answer, wire.name, baud, rate)
+    return answer
+
+
+def check_answer(answer: Answer, port: str, baud: int, rate: int) -> None:
+    """Refuse what is no printer, or one that answers at another rate; raises PrinterError with a sentence of what it is."""
     if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED) and rate != baud:
         raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: use --baud {rate}")
     if answer.kind is not Kind.PRINTER:
         error, refusal, _ = NO_PRINTERS[answer.kind]
         raise error(refusal.format(port=port, baud=baud, **_words(answer)))
-    return answer
 
 
 def _words(answer: Answer) -> dict[str, str]:

@@ -49,6 +49,14 @@ def check_free(server: str, status: JobStatus) -> None:
         raise ServerError(f"{server} cannot print now: {status.message or 'its printer is not connected'}")
 
 
+def check_idle(server: str, status: JobStatus) -> None:
+    """Refuse a server that prints, or whose printer is not there, where only questions are asked. Raises ServerError."""
+    if status.phase in ACTIVE:
+        raise ServerError(f"{server} is {status.phase.value} {status.file or 'a file'} now: ask it when that is done")
+    if status.phase is Phase.OFFLINE:
+        raise ServerError(f"{server} cannot tell its settings now: {status.message or 'its printer is not connected'}")
+
+
 def check_no_server(port: str) -> None:
     """Refuse a print server where a line to a printer itself is needed. Raises ServerError."""
     if is_server_address(port):

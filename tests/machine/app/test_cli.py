@@ -122,7 +122,7 @@ def test_a_bug_ends_with_exit_3_and_a_log_file(monkeypatch: pytest.MonkeyPatch, 
     def broken() -> int:
         raise ZeroDivisionError("planted")
 
-    monkeypatch.setattr("machine.app.commands.profiles.list_profiles", broken)
+    monkeypatch.setattr("machine.app.commands.profiles.listing.list_profiles", broken)
     assert main(["profiles", "list"]) == 3
     log = Path(capsys.readouterr().err.strip().rsplit(" ", 1)[1])
     assert "ZeroDivisionError: planted" in log.read_text()
@@ -133,7 +133,7 @@ def test_a_full_disk_under_standard_output_is_no_bug(monkeypatch: pytest.MonkeyP
     def full() -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("machine.app.commands.profiles.list_profiles", full)
+    monkeypatch.setattr("machine.app.commands.profiles.listing.list_profiles", full)
     assert main(["profiles", "list"]) == 1
     assert capsys.readouterr().err == "tiltprint: a file cannot be written: no space is left\n"
     monkeypatch.setattr("sys.stdout", SimpleNamespace(flush=full))
@@ -159,7 +159,7 @@ def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.Monkey
         except KeyboardInterrupt as beneath:
             raise SystemError("returned a result with an exception set") from beneath
 
-    monkeypatch.setattr("machine.app.commands.profiles.list_profiles", interrupted)
+    monkeypatch.setattr("machine.app.commands.profiles.listing.list_profiles", interrupted)
     assert main(["profiles", "list"]) == 130
 
 

@@ -39,6 +39,14 @@ def test_a_profile_says_what_differs_from_the_shipped_one_that_it_goes_back_to(t
     )
 
 
+def test_a_value_that_is_stated_stays_when_the_shipped_profile_changes() -> None:
+    text = profile_text("machine", "generic_ac", ["machine.name=mine"], ["machine.x.limits_mm", "machine.lift_mm"])
+    assert (
+        text
+        == 'inherits = "generic_ac"\n\n[machine]\nname = "mine"\nlift_mm = 10.0\n\n[machine.x]\nlimits_mm = [-160.0, 160.0]\n'
+    )
+
+
 @pytest.mark.parametrize("kind", ["machine", "material", "process"])
 def test_every_shipped_profile_can_be_kept_as_it_is(kind: str, tmp_path: Path) -> None:
     for name in known(kind):

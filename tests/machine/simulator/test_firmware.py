@@ -265,9 +265,18 @@ def test_soft_limits_clamp_without_a_word() -> None:
 
 def test_m211_tells_and_lifts_the_soft_limits() -> None:
     firmware = printer()
-    assert answer(firmware, "M211\n")[0].startswith("echo:Soft endstops: On  Min:  X:-160.00")
+    told = answer(firmware, "M211\n")
+    assert told[0] == "  M211 S1 ; ON"
+    assert told[1].startswith("  Min:  X-160.00 Y-160.00 Z-80.00 A-95.00")
     answer(firmware, "M211 S0\nG0 X161\n")
     assert firmware.record().end[-1, 0] == 161.0
+
+
+def test_settings_are_told_as_marlin_tells_them() -> None:
+    firmware = printer()
+    answer(firmware, "M203 X250\n")
+    assert answer(firmware, "M203\n") == ["  M203 X250.00 Y300.00 Z15.00 A30.00 C60.00 E60.00", "ok"]
+    assert "echo:  M203 X250.00 Y300.00 Z15.00 A30.00 C60.00 E60.00" in answer(firmware, "M503\n")
 
 
 def test_an_axis_driven_against_its_end_stays_there_unknown_to_the_firmware() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
-from machine.app.commands.profiles_import import import_profiles
+from machine.app.commands.profiles.importing import import_profiles
 from machine.app.requests import ImportRequest
 from mdp.save import stl
 from profiles.errors import OutputError

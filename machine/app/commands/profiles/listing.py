@@ -1,4 +1,4 @@
-"""The profiles commands: list, show, check."""
+"""The profiles commands that list, show, save and check."""
 
 import json
 import sys

@@ -1,0 +1,106 @@
+"""RepRapFirmware 3: config.g, or its object model as M409 and rr_model answer it, a line of JSON for each key.
+
+Platform/Platform.cpp, Heating/Heat.cpp and Heater.cpp (fc1cd16c): speed and jerk of an axis are a minute, acceleration a second
+squared; heat.bedHeaters and a tool's heaters name entries of heat.heaters, whose max is the greatest temperature.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from machine.detect.config_g import read_commands
+from machine.detect.duet_board import MINUTE_S, DuetBoard
+from machine.detect.found import (
+    ACCELERATION,
+    LIMITS,
+    SPEED,
+    AxisReadings,
+    ConfigText,
+    Found,
+    Reading,
+    check_whole,
+    limits,
+    rounded,
+)
+from machine.network.answers import number, table
+from profiles.errors import ProfileError
+
+OWN = re.compile(r"^\s*M(?:566|584|574|950|563|143|669)\b", re.MULTILINE)  # commands that no other firmware has
+MODEL = re.compile(r'^\s*\{"key":\s*"', re.MULTILINE)
+
+Table = Mapping[str, Any]
+
+
+def recognise(text: str) -> bool:
+    """Whether a text is a config.g, or answers to M409."""
+    return MODEL.search(text) is not None or (OWN.search(text) is not None and "echo:" not in text)
+
+
+def read(config: ConfigText) -> Found:
+    """What either tells. Raises ProfileError."""
+    return check_whole(_read_model(config) if MODEL.search(config.text) else read_commands(config), config.name)
+
+
+def _read_model(config: ConfigText) -> Found:
+    model = _model(config)
+    board = DuetBoard()
+    for axis in _tables(model.get("move.axes")):
+        letter = str(axis.get("letter") or "")
+        board.axes[letter] = _drive(axis, f"move.axes, {letter}")
+        low, high, jerk = (number(axis.get(key)) for key in ("min", "max", "jerk"))
+        if low is not None and high is not None:
+            board.axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, f"move.axes, {letter}")
+        if jerk is not None:
+            board.jerks_mm_s[letter] = jerk / MINUTE_S
+    for extruder in _tables(model.get("move.extruders"))[:1]:
+        board.axes["E"] = _drive(extruder, "move.extruders")
+    _take_heat(board, table(model.get("heat")), _tables(model.get("tools")))
+    probes = _tables(model.get("sensors.probes"))
+    board.probe = int(number(probes[0].get("type")) or 0) if probes else 0
+    main, network = table(model.get("boards[0]")), table(model.get("network"))
+    board.name = str(network.get("name") or "")
+    board.firmware = f"{main.get('firmwareName') or board.firmware} {main.get('firmwareVersion') or ''}".strip()
+    return board.found("move.axes, jerk", "heat.heaters, max")
+
+
+def _take_heat(board: DuetBoard, heat: Table, tools: list[Table]) -> None:
+    heaters = heat.get("heaters")
+    limits_c = [number(table(heater).get("max")) for heater in (heaters if isinstance(heaters, list) else [])]  # some are null
+    board.heaters_c = {index: limit for index, limit in enumerate(limits_c) if limit is not None}
+    board.bed = _first(heat.get("bedHeaters"), -1)
+    board.nozzle = _first(tools[0].get("heaters") if tools else None, board.nozzle)
+
+
+def _model(config: ConfigText) -> dict[str, Any]:
+    """Key -> what it holds; the pages of an array are put together."""
+    model: dict[str, Any] = {}
+    for line in config.text.splitlines():
+        if not MODEL.match(line):
+            continue
+        try:
+            answer = json.loads(line)
+        except (ValueError, RecursionError):
+            raise ProfileError(f"{config.name}: an answer to M409 is cut off or damaged") from None
+        key, value = str(table(answer).get("key")), table(answer).get("result")
+        paged = isinstance(model.get(key), list) and isinstance(value, list)
+        model[key] = model[key] + value if paged else value
+    return model
+
+
+def _drive(drive: Table, source: str) -> AxisReadings:
+    speed, acceleration = number(drive.get("speed")), number(drive.get("acceleration"))
+    readings: AxisReadings = {}
+    if speed is not None:
+        readings[SPEED] = Reading(rounded(speed / MINUTE_S), source)
+    if acceleration is not None:
+        readings[ACCELERATION] = Reading(rounded(acceleration), source)
+    return readings
+
+
+def _tables(value: Any) -> list[Table]:
+    return [entry for entry in value if isinstance(entry, Mapping)] if isinstance(value, list) else []
+
+
+def _first(values: Any, otherwise: int) -> int:
+    return values[0] if isinstance(values, list) and values and isinstance(values[0], int) else otherwise

@@ -1,0 +1,101 @@
+"""What LinuxCNC's .ini tells of a machine."""
+
+import pytest
+
+from machine.detect.found import ConfigText, Found
+from machine.detect.linuxcnc import read, recognise
+from profiles.errors import ProfileError
+
+INI = """
+[EMC]
+MACHINE = Cradle mill
+[TRAJ]
+COORDINATES = X Y Z A C
+LINEAR_UNITS = mm
+ANGULAR_UNITS = degree
+MAX_LINEAR_VELOCITY = 60
+[KINS]
+KINEMATICS = xyzac-trt-kins sparm=identityfirst
+JOINTS = 5
+#INCLUDE axes.inc
+"""
+AXES = """
+[AXIS_X]
+MIN_LIMIT = -900
+MAX_LIMIT = 900
+MAX_VELOCITY = 75
+MAX_ACCELERATION = 500
+[AXIS_Y]
+MAX_VELOCITY = 40
+MAX_ACCELERATION = 450
+[AXIS_Z]
+MAX_VELOCITY = 20   # slow
+MAX_ACCELERATION = 200
+[JOINT_0]
+MIN_LIMIT = -150
+MAX_LIMIT = 152.5
+[JOINT_3]
+MIN_LIMIT = -95
+MAX_LIMIT = 20
+MAX_VELOCITY = 25
+MAX_ACCELERATION = 120
+[JOINT_4]
+MIN_LIMIT = -1e99
+MAX_LIMIT = 1e99
+MAX_VELOCITY = 30
+MAX_ACCELERATION = 150
+"""
+
+
+def found(text: str = INI, axes: str = AXES) -> Found:
+    return read(ConfigText("mill.ini", text, lambda name: [ConfigText(name, axes)]))
+
+
+def values(found: Found, letter: str) -> dict[str, object]:
+    return {key: reading.value for key, reading in found.axes[letter].items()}
+
+
+def test_the_joints_tell_the_reach_where_the_kinematics_follow_the_table() -> None:
+    assert recognise(INI)
+    assert values(found(), "X") == {"speed": 60.0, "acceleration": 500.0, "limits": [-150.0, 152.5]}
+    assert values(found(INI.replace("xyzac-trt-kins", "trivkins")), "X")["limits"] == [-900.0, 900.0]
+
+
+def test_axes_that_turn_are_told_by_their_joints_and_1e99_bounds_nothing() -> None:
+    told = found()
+    assert (told.rotary, told.name) == ("AC", "Cradle mill")
+    assert values(told, "A") == {"speed": 25.0, "acceleration": 120.0, "limits": [-95.0, 20.0]}
+    assert values(told, "C") == {"speed": 30.0, "acceleration": 150.0}
+
+
+def test_kinematics_that_follow_the_table_take_places_on_it() -> None:
+    assert found().settings["coordinates"].value == "workpiece"
+    assert found(INI.replace("xyzac-trt-kins", "trivkins")).settings["coordinates"].value == "table"
+
+
+def test_inches_and_radians_become_mm_and_degrees() -> None:
+    told = found(INI.replace("= mm", "= inch").replace("= degree", "= radian").replace("VELOCITY = 60", "VELOCITY = 99"))
+    assert values(told, "Y") == {"speed": 1016.0, "acceleration": 11430.0}
+    assert values(told, "A")["speed"] == 1432.3945
+
+
+def test_a_file_of_before_2_8_numbers_its_axes() -> None:
+    old = "[EMC]\n[TRAJ]\nCOORDINATES = X Y Z\n" + "".join(
+        f"[AXIS_{number}]\nMIN_LIMIT = 0\nMAX_LIMIT = {number + 1}00\nMAX_VELOCITY = 9\nMAX_ACCELERATION = 90\n"
+        for number in range(3)
+    )
+    assert values(found(old), "Z") == {"speed": 9.0, "acceleration": 90.0, "limits": [0.0, 300.0]}
+
+
+@pytest.mark.parametrize(
+    ("text", "axes", "sentence"),
+    [
+        (INI, AXES[:110], "no acceleration of Y, no speed of Z: is it whole"),
+        (INI, AXES.replace("152.5", "-152.5"), "axis X: .JOINT_0. MIN_LIMIT, MAX_LIMIT tells limits from -150 to -152.5"),
+        (INI.replace("= mm", "= furlong"), AXES, "LINEAR_UNITS is 'furlong': mm or inch is expected"),
+        (INI, AXES + "MAX_VEL", "neither a section nor a setting"),
+    ],
+)
+def test_what_is_cut_off_or_absurd_is_one_sentence(text: str, axes: str, sentence: str) -> None:
+    with pytest.raises(ProfileError, match=sentence):
+        found(text, axes)

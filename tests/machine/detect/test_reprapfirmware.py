@@ -1,0 +1,142 @@
+"""What a RepRapFirmware tells of its machine: config.g, or the object model of M409."""
+
+import json
+
+import pytest
+
+from machine.detect.found import ConfigText, Found
+from machine.detect.marlin import recognise as is_marlin
+from machine.detect.reprapfirmware import read, recognise
+from profiles.errors import ProfileError
+
+CRADLE = """
+; a cradle under a CoreXY head
+M550 P"Cradle"                      ; name
+M669 K1
+M584 X0.0 Y0.1 Z0.2 B0.3 C0.4 E0.5
+M98 P"0:/sys/speeds.g"
+M208 X-60 Y-55 Z-3 S1
+M208 X118 Y112 Z90 S0
+M208 B-100:100 C-99999:99999
+M140 H0
+M143 H0 S110
+M563 P0 D0 H1 F0
+M143 H1 S290
+M558 P9 C"^zprobe.in" H5 F120
+if exists(global.fast)
+  M203 X99999 Y99999
+M575 P1 S1 B57600
+"""
+SPEEDS = """
+M566 X600.00 Y540 Z12 B60 C60 E120
+M203 X18000.00 Y17400 Z900 B1800 C3600 E3600
+M201 X3000 Y2900 Z100 B400 C500 E2500
+"""
+
+
+def found(text: str = CRADLE, speeds: str = SPEEDS) -> Found:
+    return read(ConfigText("config.g", text, lambda name: [ConfigText(name, speeds)]))
+
+
+def values(found: Found, letter: str) -> dict[str, object]:
+    return {key: reading.value for key, reading in found.axes[letter].items()}
+
+
+def test_speeds_a_minute_become_speeds_a_second() -> None:
+    assert values(found(), "X") == {"speed": 300.0, "acceleration": 3000.0, "limits": [-60.0, 118.0]}
+    assert values(found(), "B") == {"speed": 30.0, "acceleration": 400.0, "limits": [-100.0, 100.0]}
+
+
+def test_s1_means_speeds_a_second() -> None:
+    assert values(found(CRADLE + "M203 S1 X300 Z15\n"), "Z")["speed"] == 15.0
+
+
+def test_jerk_is_the_lesser_of_x_and_y_a_second() -> None:
+    assert found().settings["junction_speed_mm_s"].value == 9.0
+    assert found(CRADLE + "M205 X7 Y8\n").settings["junction_speed_mm_s"].value == 7.0
+
+
+def test_heaters_are_those_of_tool_and_bed() -> None:
+    told = found().settings
+    assert (told["nozzle_limit_c"].value, told["bed_limit_c"].value) == (290.0, 110.0)
+    assert found(CRADLE.replace("M140 H0", "M140 H-1")).settings["bed_limit_c"].value == 0.0
+
+
+def test_name_letters_and_probe_are_told() -> None:
+    told = found()
+    assert (told.name, told.rotary, told.probe) == ("Cradle", "BC", "a BLTouch as its probe")
+
+
+def test_u_and_v_are_taken_for_the_table_where_nothing_else_can_be() -> None:
+    told = found(
+        CRADLE.replace(" B", " U").replace(" C0", " V0").replace(" C-", " V-"), SPEEDS.replace("B", "U").replace("C", "V")
+    )
+    assert told.rotary == "UV"
+    assert told.remarks == ("U and V taken for axes that turn, which nothing says of them",)
+
+
+def test_an_axis_of_which_no_speed_is_told_is_kept_and_said() -> None:
+    told = found(CRADLE, SPEEDS.replace(" B1800", ""))
+    assert (told.rotary, "speed" in told.axes["B"]) == ("BC", False)
+    assert told.remarks == ("M584 makes B, of which no M203 tells the speed",)
+
+
+def test_letters_that_m584_does_not_make_are_passed_over() -> None:
+    assert found(CRADLE + "M208 A-5:5\nM203 A60\n").rotary == "BC"
+
+
+def test_what_only_the_board_works_out_is_said() -> None:
+    told = found(CRADLE.replace("S290", "S{global.hot}"))
+    assert "nozzle_limit_c" not in told.settings
+    assert told.remarks == ("what it has in braces (1) only the board works out: --port duet:HOST asks it",)
+
+
+def model(**axis: object) -> str:
+    drives = [
+        {"letter": letter, "min": -90.0, "max": 90.0, "speed": 6000.0, "acceleration": 900.0, "jerk": 480.0, **axis}
+        for letter in "XYZAC"
+    ]
+    answers = {
+        "move.axes": drives[:3],
+        "move.extruders": [{"speed": 3000.0, "acceleration": 1200.0}],
+        "tools": [{"heaters": [2]}],
+        "heat": {"bedHeaters": [-1], "heaters": [{"max": 110.0}, None, {"max": 280.5}]},
+        "boards[0]": {"firmwareName": "RepRapFirmware for Duet 3 MB6HC", "firmwareVersion": "3.5.4"},
+    }
+    pages = [{"key": "move.axes", "flags": "d99vna3", "result": drives[3:], "next": 0}]
+    return "\n".join(json.dumps(line) for line in (*({"key": key, "result": value} for key, value in answers.items()), *pages))
+
+
+def test_the_object_model_counts_in_minutes_too() -> None:
+    told = found(model())
+    assert recognise(model())
+    assert values(told, "A") == {"speed": 100.0, "acceleration": 900.0, "limits": [-90.0, 90.0]}
+    assert told.settings["extruder_speed_mm_s"].value == 50.0
+    assert told.settings["junction_speed_mm_s"].value == 8.0
+
+
+def test_the_object_models_heaters_are_found_by_their_numbers() -> None:
+    told = found(model())
+    assert (told.firmware, told.rotary) == ("RepRapFirmware for Duet 3 MB6HC 3.5.4", "AC")
+    assert told.settings["bed_limit_c"].value == 0.0
+    assert told.settings["nozzle_limit_c"].value == 280.5
+
+
+def test_a_config_g_is_not_taken_for_a_log_of_marlin() -> None:
+    assert recognise(CRADLE)
+    assert not is_marlin(CRADLE + SPEEDS)
+
+
+@pytest.mark.parametrize(
+    ("text", "speeds", "sentence"),
+    [
+        (CRADLE, SPEEDS.replace("M201 X3000 Y2900 Z100", "M201"), "no acceleration of X"),
+        (CRADLE.replace("B-100:100", "B100:-100"), SPEEDS, "axis B: M208 tells limits from 100 to -100"),
+        (CRADLE.replace("B0.3 C0.4 ", ""), 'M98 P"speeds.g"', "config.g: it is RepRapFirmware's, but tells no speed of X"),
+        (model()[:-30], "", "cut off or damaged"),
+        (model(min=95.0), "", "limits from 95 to 90"),
+    ],
+)
+def test_what_is_cut_off_or_absurd_is_one_sentence(text: str, speeds: str, sentence: str) -> None:
+    with pytest.raises(ProfileError, match=sentence):
+        found(text, speeds)
