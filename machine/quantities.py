@@ -40,3 +40,13 @@ def filament_cm3(filament_mm: float, material: Material) -> float:
 def filament_g(filament_mm: float, material: Material) -> float:
     """Weight of a length of filament."""
     return filament_cm3(filament_mm, material) * material.density_g_cm3
+
+
+def price(filament_mm: float, material: Material) -> float | None:
+    """What a length of filament costs, in the material's currency; None where its price is not set."""
+    return None if material.price_per_kg is None else filament_g(filament_mm, material) / 1000.0 * material.price_per_kg
+
+
+def in_currency(amount: float, material: Material) -> str:
+    """An amount as a person reads it: 0.42 EUR."""
+    return f"{amount:.2f} {material.currency}".rstrip()

@@ -155,7 +155,7 @@ def _settings(files: ProfileFiles) -> Act:
         bench = replace(session.bench, given=given)
         names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
         part = request.query_params.get("part", "")
-        rows = settings_list(bench.profile, given, int(part) if is_small_number(part) else 0)
+        rows = settings_list(bench.profile, session.bench.given, int(part) if is_small_number(part) else 0)
         return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
 
     return answer
