@@ -46,7 +46,7 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     )
     wrong = "document.querySelector('[data-key=\"process.walls\"] .wrong')"
     browser.wait(f"{wrong} && {wrong}.textContent")
-    assert browser.value(f"{wrong}.textContent").startswith("process.walls is -3")
+    assert browser.value(f"{wrong}.textContent").startswith("Walls is -3")
     browser.wait(changed("process.top_layers"))
     assert browser.value("$('problem').hidden && document.querySelectorAll('.wrong:not([hidden])').length") == 1
     choose_part(browser, 1)

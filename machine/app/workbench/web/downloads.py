@@ -75,12 +75,13 @@ async def shared_page(session: Session, request: Request) -> Response:
 
 
 async def gcode(session: Session, request: Request) -> Response:
-    """The G-code; with errors only for who has said that he wants it all the same, as with `export --force`."""
+    """The G-code; with errors only for who has said that he wants it all the same."""
     sliced = session.slicing.needed().sliced
     if (errors := sliced.errors) and request.query_params.get("force") != "yes":
+        count = f"{len(errors)} error{'s' * (len(errors) > 1)}"
         raise PlanError(
-            f"the dry run found {len(errors)} errors, the first: {errors[0].message}: no G-code is saved unless you say that you"
-            " want it all the same (--force)"
+            f"the dry run found {count}, the first: {errors[0].message}: no G-code is saved unless you say that you want it all"
+            " the same"
         )
     return FileResponse(sliced.gcode, headers=_saved_as(f"{file_stem(session.bench)}.gcode"), media_type="text/plain")
 

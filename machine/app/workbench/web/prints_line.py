@@ -4,12 +4,14 @@ import json
 import secrets
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
 from machine.app.crash import bug_in_words, log_bug
+from machine.app.workbench.bench.page_words import page_words, with_page_words
 from machine.app.workbench.printing.commands import PageOfPrints, obey
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.workbench import Workbench
@@ -17,6 +19,7 @@ from machine.app.workbench.web.line import parsed, receive, refuse_closed, send,
 from profiles.errors import UserError
 
 MOST_COMMAND = 10_000  # characters
+SENTENCES = ("sentence", "question", "checks", "figures", "said", "upload")  # of a print's state
 
 
 def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
@@ -36,7 +39,8 @@ def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], A
         await socket.accept()
         with prints.page(page):
             try:
-                await until_either_ends(tell(prints, prints.snapshot, socket), _hear(socket, PageOfPrints(page, session, prints)))
+                hearing = _hear(socket, PageOfPrints(page, session, prints))
+                await until_either_ends(tell(prints, lambda: _told(prints), socket), hearing)
             except ExceptionGroup as bugs:
                 log_bug(bugs.exceptions[0], ())
 
@@ -56,6 +60,12 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
     return answer
 
 
+def _told(prints: Prints) -> dict[str, Any]:
+    """What every page is told, in the page's own words; what the printer says stays."""
+    state = prints.snapshot()
+    return with_page_words(state, ("ports",)) | {"prints": [with_page_words(job, SENTENCES) for job in state["prints"]]}
+
+
 async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
     while True:
         text = await receive(socket)
@@ -63,6 +73,6 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
             asked = parsed(text, MOST_COMMAND)
             obey(page, asked)
         except UserError as error:
-            await send(socket, json.dumps({"problem": str(error), "forcible": error.forcible}))
+            await send(socket, json.dumps({"problem": page_words(str(error)), "forcible": error.forcible}))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
             await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

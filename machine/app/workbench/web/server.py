@@ -11,6 +11,7 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from machine.app.workbench.bench.command_line import export_command
+from machine.app.workbench.bench.page_words import page_words
 from machine.app.workbench.bench.settings import settings_list
 from machine.app.workbench.bench.values import is_small_number
 from machine.app.workbench.printing.prints import Prints
@@ -105,7 +106,7 @@ def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request]
         except ClientDisconnect:  # the page has gone while it sent a file
             return Response(status_code=400)
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
-            return JSONResponse({"problem": session.refuse(error)}, status_code=422)
+            return JSONResponse({"problem": page_words(session.refuse(error))}, status_code=422)
 
     return answer
 

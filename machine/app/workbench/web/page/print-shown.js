@@ -44,7 +44,7 @@ export function showPrint(print, commands) {
   const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
   if ($("run-news").textContent !== news) $("run-news").textContent = news;
   const asking = !runs && !uploads && (!over || end === "refused");
-  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on because of --force` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on all the same` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
   $("ask-told").textContent = print.question || (print.starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
@@ -88,7 +88,7 @@ function showUpload(upload) {
 }
 
 const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>
-  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} errors in the dry run` : ""}`;
+  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} error${errors === 1 ? "" : "s"} in the dry run` : ""}`;
 
 /** How long ago a moment was, in seconds since 1970. */
 function ago(moment_s) {
