@@ -47,6 +47,13 @@ def price(filament_mm: float, material: Material) -> float | None:
     return None if material.price_per_kg is None else filament_g(filament_mm, material) / 1000.0 * material.price_per_kg
 
 
-def in_currency(amount: float, material: Material) -> str:
-    """An amount as a person reads it: 0.42 EUR."""
-    return f"{amount:.2f} {material.currency}".rstrip()
+def price_in_words(filament_mm: float, material: Material) -> str:
+    """The same as a person reads it, 0.42 EUR; "" where the price is not set."""
+    amount = price(filament_mm, material)
+    return "" if amount is None else f"{amount:.2f} {material.currency}".rstrip()
+
+
+def price_json(filament_mm: float, material: Material) -> dict[str, float | str]:
+    """`cost` and `currency` for a report in JSON; nothing where the price is not set."""
+    amount = price(filament_mm, material)
+    return {} if amount is None else {"cost": amount, "currency": material.currency}

@@ -165,6 +165,7 @@ def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(b
     assert line == browser.value(in_frame(browser, "document.getElementById('readout-line').textContent"))
     browser.click("#undo")
     browser.wait("document.body.classList.contains('stale')")
+    assert browser.value("[$('verdict').classList.contains('stale'), $('verdict-remedy').textContent]") == [True, "Slice again"]
     assert "Out of date" in browser.value("document.querySelector('#bar .stale-told').innerText")
     browser.click("#leave-print")
     assert browser.value("$('save-gcode').disabled && $('compare').disabled && document.documentElement.dataset.walls === ''")

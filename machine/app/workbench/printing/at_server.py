@@ -68,7 +68,7 @@ def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> LoadedPr
             check_free(server.name, server.status())
         check_server_machine(parse_server_address(order.printing.port), greeting, profile.machine, order.force)
     program = program_of(order)
-    checks.reporter.tell(figures=figures(program))
+    checks.reporter.tell(figures=figures(program, profile.material))
     with checks.that(CLEAN):
         ready_for_server(greeting, program, profile, order.name, order.force)
     if order.starts:

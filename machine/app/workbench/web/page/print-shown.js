@@ -87,8 +87,8 @@ function showUpload(upload) {
   tellIn("run-told", []);
 }
 
-const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>
-  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} error${errors === 1 ? "" : "s"} in the dry run` : ""}`;
+const figuresTold = ({ lines, time_s: time, filament_mm: filament, filament_g: grams, costs, errors }) =>
+  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m (${grams.toFixed(1)} g${costs ? `, ${costs}` : ""}) of filament${errors ? `, ${errors} error${errors === 1 ? "" : "s"} in the dry run` : ""}`;
 
 /** How long ago a moment was, in seconds since 1970. */
 function ago(moment_s) {
