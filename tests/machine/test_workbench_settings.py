@@ -93,8 +93,13 @@ def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile
     browser.click("#only-changed")
     browser.click("[data-id='group process: shell'] button")
     browser.wait(f"!{keys}.includes('process.walls')")
-    browser.open(bench.address)
-    browser.wait(f"{keys}.length && !{keys}.includes('process.walls')")  # what is folded stays so when the page is loaded again
+    browser.value("document.querySelector('#axes [data-end=\"-y\"]').dispatchEvent(new Event('click'))")
+    axis = "document.querySelector('#axes [data-end=x]').getAttribute('transform')"
+    browser.wait(f"{axis} === 'translate(26.0 0.0)'")
+    browser.open(bench.address)  # the same tab, groups and view when the page is loaded again
+    browser.wait(
+        f"{keys}.length && !{keys}.includes('process.walls') && !$('settings').hidden && {axis} === 'translate(26.0 0.0)'"
+    )
     browser.click("[data-id='group process: shell'] button")
     browser.click("#undo")
     browser.click("#undo")
