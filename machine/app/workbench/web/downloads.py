@@ -1,6 +1,7 @@
 """Downloads: what a page saves and looks at: profiles, the plan, the parts, the G-code and the page of the print."""
 
 from pathlib import Path
+from urllib.parse import quote
 
 from starlette.background import BackgroundTask
 from starlette.requests import Request
@@ -103,4 +104,6 @@ def _once(file: Path, kind: str, name: str) -> Response:
 
 
 def _saved_as(name: str) -> dict[str, str]:
-    return {"content-disposition": f'attachment; filename="{name}"'}
+    """How a browser is told a file's name, letters of all scripts as RFC 6266 has them."""
+    plain = name.encode("ascii", "replace").decode().replace("?", "_")
+    return {"content-disposition": f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name)}"}

@@ -70,6 +70,8 @@ def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
         route("left/{number:int}", uploads.open_left, "POST"),
+        route("kept", uploads.list_kept),
+        route("kept/{name}", uploads.open_kept, "POST"),
         route("plan.toml", plan, need=Need.PARTS),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces, need=Need.PARTS),

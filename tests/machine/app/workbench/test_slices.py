@@ -54,4 +54,7 @@ def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same(tmp_path
         asyncio.run(gcode(session, refused))
     answer = asyncio.run(gcode(session, forced))
     assert isinstance(answer, FileResponse)
-    assert (answer.path, answer.headers["content-disposition"]) == (sliced.gcode, 'attachment; filename="tree.gcode"')
+    assert (answer.path, answer.headers["content-disposition"]) == (
+        sliced.gcode,
+        "attachment; filename=\"tree.gcode\"; filename*=UTF-8''tree.gcode",
+    )
