@@ -1,8 +1,8 @@
 """Command line: what a person types to get the G-code of what lies on the bench."""
 
 from pathlib import Path
-from unicodedata import normalize
 from shlex import join
+from unicodedata import normalize
 
 import numpy as np
 

@@ -83,7 +83,7 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
     with workbench("--port", port) as running, running.line() as page:
         assert running.port == killed.port
         assert killed.ask("")[0] == 404
-        (kept,) = (work for work in json.loads(running.ask("kept")[1]) if work["name"] == "tee.stl")
+        kept = next(work for work in json.loads(running.ask("kept")[1]) if work["name"] == "tee.stl")
         assert kept["parts"] == 2
         assert running.ask(f"kept/{kept['kept']}", "POST", Origin=f"http://127.0.0.1:{running.port}")[0] == 200
         again = page.until(lambda state: state["locked"] == [True])

@@ -3,6 +3,7 @@
 
 import { $, needsKey, notice } from "../../../../view/template/page.js";
 import { alike, withWholeOptions } from "./elements.js";
+import { handPanel, showHand } from "./hand-panel.js";
 import { followIn } from "./print-frame.js";
 import { askToNotify, notifyOver, titleOfPrints } from "./print-news.js";
 import { hear, showBar, showPrint, showProgress, showWhich, silence, sure } from "./print-shown.js";
@@ -38,6 +39,7 @@ export function printPanel() {
     showPrint(print(), print()?.holder === OWN_PAGE);
     follow();
     hear(state.prints);
+    showHand(print(), print()?.holder === OWN_PAGE);
     keepHeats(state.prints);
     showHeats(print());
     titleOfPrints(running);
@@ -61,6 +63,8 @@ export function printPanel() {
     send({ do: "check", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value), send_only: sendOnly, force: $("force").checked });
     unforce();
   });
+  $("hand").addEventListener("click", () => { send({ do: "hand", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value) }); unforce(); });
+  handPanel((asked) => command("by_hand", asked));
   $("follow-server").addEventListener("click", () => send({ do: "follow", port: port() }));
   $("rest-field").addEventListener("toggle", () => { if ($("rest-field").open) send({ do: "journals" }); });
   $("journal-typed").addEventListener("focus", () => { $("journal-other").checked = true; });

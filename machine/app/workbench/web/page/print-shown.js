@@ -37,7 +37,7 @@ export function showWhich(prints, chosen) {
 export function showPrint(print, commands) {
   $("run").hidden = !print;
   if (!print) return void ($("printer-field").open = true);
-  const { phase, progress, figures, end, upload } = print, uploads = phase === "uploading", over = phase === "over", runs = phase === "printing" || phase === "leaving";
+  const { phase, progress, figures, end, upload } = print, uploads = phase === "uploading", over = phase === "over", runs = ["printing", "hand", "leaving"].includes(phase);
   $("run-title").textContent = `${print.resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
   $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(print) : uploads && upload ? upload[0] : { checking: "checking …", ready: print.starts ? "ready to print" : "ready to be handed over", uploading: "handing the file over", printing: "starting", leaving: "ending" }[phase];
   $("run-state").className = over ? end : "";
@@ -101,6 +101,7 @@ export function showProgress(print) {
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
   const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target == null ? "" : ` of ${target.toFixed(0)}`} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
   $("run-progress").value = progress.share || 0;
+  $("run-progress").hidden = phase === "hand";
   tellIn("run-told", [
     progress.part != null && ["part", of(progress.part, progress.parts)],
     progress.layer != null && ["layer", of(progress.layer, progress.layers)],

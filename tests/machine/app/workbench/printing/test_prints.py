@@ -376,7 +376,9 @@ def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
         obey(page_of(prints_with_one()), {"do": "feed", "print": 1, "percent": percent})
 
 
-@pytest.mark.parametrize("name", sorted({*COMMANDS} - {"ports", "journals", "check", "go_on", "follow", "emergency", "take"}))
+@pytest.mark.parametrize(
+    "name", sorted({*COMMANDS} - {"ports", "journals", "check", "go_on", "follow", "hand", "emergency", "take"})
+)
 def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_at_once(name: str) -> None:
     prints = prints_with_one()
     with pytest.raises(PrinterError, match="another page commands this print"):
