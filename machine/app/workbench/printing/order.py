@@ -102,7 +102,7 @@ def first_state(order: Order) -> State:
         "baud": printing.baud,
         "sim_speed": printing.sim_speed,
         "server": is_server_address(printing.port),
-        **dict.fromkeys(("question", "log", "journal", "end", "sentence"), ""),
+        **dict.fromkeys(("question", "log", "journal", "webcam", "end", "sentence"), ""),
         **dict.fromkeys(("checks", "words", "said"), ()),
         **dict.fromkeys(("figures", "upload", "progress")),
         **dict.fromkeys(("forcible", "stop_given"), False),

@@ -1,5 +1,6 @@
 """Prints line: a page's line to the prints: one of its own, so that a print's news, five a second, carry nothing else."""
 
+import asyncio
 import json
 import secrets
 from collections.abc import Awaitable, Callable
@@ -16,7 +17,8 @@ from machine.app.workbench.printing.commands import PageOfPrints, obey
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.line import parsed, receive, refuse_closed, send, tell, until_either_ends
-from profiles.errors import UserError
+from machine.network.http import fetch_picture
+from profiles.errors import ServerError, UserError
 
 MOST_COMMAND = 10_000  # characters
 SENTENCES = ("sentence", "question", "checks", "figures", "said", "upload")  # of a print's state
@@ -63,7 +65,24 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 def _told(prints: Prints) -> dict[str, Any]:
     """What every page is told, in the page's own words; what the printer says stays."""
     state = prints.snapshot()
-    return with_page_words(state, ("ports",)) | {"prints": [with_page_words(job, SENTENCES) for job in state["prints"]]}
+    jobs = [with_page_words(job, SENTENCES) | {"webcam": bool(job["webcam"])} for job in state["prints"]]
+    return with_page_words(state, ("ports",)) | {"prints": jobs}
+
+
+def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
+    """What answers a request for a picture of the camera at a print: the page may load nothing from elsewhere itself."""
+
+    async def answer(request: Request) -> Response:
+        for job in prints.prints:
+            if job.number == request.path_params["print"] and job.state["webcam"]:
+                try:
+                    picture, kind = await asyncio.to_thread(fetch_picture, job.state["webcam"])
+                except ServerError as error:
+                    return Response(f"{error}\n", 502)
+                return Response(picture, media_type=kind, headers={"cache-control": "no-store"})
+        return Response("there is no camera at this print\n", 404)
+
+    return answer
 
 
 async def _hear(socket: WebSocket, page: PageOfPrints) -> None:

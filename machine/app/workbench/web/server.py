@@ -33,7 +33,7 @@ from machine.app.workbench.web.downloads import (
 from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, refuse_closed, talk
 from machine.app.workbench.web.page import workbench_page
-from machine.app.workbench.web.prints_line import print_log, prints_line
+from machine.app.workbench.web.prints_line import print_log, print_webcam, prints_line
 from machine.app.workbench.web.profile_files import ProfileFiles
 from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.snapshot import marks_key
@@ -51,6 +51,7 @@ def application(
     event loop, all else in that of the sessions."""
     of_prints = [
         Route(BELOW + "prints/{print:int}/log", print_log(prints)),
+        Route(BELOW + "prints/{print:int}/webcam", print_webcam(prints)),
         WebSocketRoute(BELOW + "prints", prints_line(prints, workbench)),
     ]
     others = sessions.application(_of_sessions(workbench, port, uploads))

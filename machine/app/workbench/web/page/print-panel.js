@@ -10,6 +10,7 @@ import { hear, showBar, showPrint, showProgress, showWhich, silence, sure } from
 import { OWN_PAGE, printsLine, stopsAsked } from "./prints-line.js";
 import { onState } from "./store.js";
 import { keepHeats, showHeats } from "./temperature-graph.js";
+import { webcamPanel } from "./webcam.js";
 import { chosenOr, port, SERVERS, showJournals, showPort, showPorts, unforce } from "./where-to-print.js";
 
 const STOP_KEY = "e";
@@ -64,6 +65,7 @@ export function printPanel() {
     unforce();
   });
   $("hand").addEventListener("click", () => { send({ do: "hand", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value) }); unforce(); });
+  webcamPanel(print);
   handPanel((asked) => command("by_hand", asked));
   $("follow-server").addEventListener("click", () => send({ do: "follow", port: port() }));
   $("rest-field").addEventListener("toggle", () => { if ($("rest-field").open) send({ do: "journals" }); });
