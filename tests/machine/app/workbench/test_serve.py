@@ -6,6 +6,7 @@ import socket
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -45,12 +46,17 @@ def send(running: Running, folder: Path, name: str, content: bytes) -> int:
     return running.send(folder / name)[0]
 
 
-def wait_until_kept() -> None:
-    """Until all that was done on the one bench is in the state folder."""
+def wait_until_kept(since_s: float) -> None:
+    """Until all that was done on the one bench from a time on is in the state folder."""
     end_s = time.monotonic() + 30.0
-    while not any(json.loads(record.read_text())["locked"] for record in kept_folder().glob("*/work.json")):
+    folder = kept_folder()
+    while not any(_is_locked(json.loads(record.read_text()), since_s) for record in folder.glob("*/work.json")):
         assert time.monotonic() < end_s
         time.sleep(0.05)
+
+
+def _is_locked(work: dict[str, Any], since_s: float) -> bool:
+    return bool(work["locked"]) and work["written_s"] > since_s
 
 
 def test_the_port_of_a_server_whose_lines_are_not_over_yet_is_taken_at_once() -> None:
@@ -70,6 +76,7 @@ def test_two_servers_never_have_one_port() -> None:
 def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and_opens_its_files(
     temporary: Path, port: str
 ) -> None:
+    began_s = time.time()
     with workbench("--port", port) as killed, killed.line() as page:
         assert send(killed, temporary, "tee.stl", TEE) == 200
         page.until(lambda state: state["model"])
@@ -78,7 +85,7 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
         page.until(lambda state: state["parts"] == 2)
         page.do("lock", part=2, locked=True)
         page.until(lambda state: state["locked"] == [True])
-        wait_until_kept()
+        wait_until_kept(began_s)
         kill(killed)
     with workbench("--port", port) as running, running.line() as page:
         assert running.port == killed.port

@@ -20,7 +20,7 @@ export function titleOfPrints(running) {
 
 /** Asked as a print begins, for a hand has just pressed a button: may the browser say when it is over? */
 export function askToNotify() {
-  if (globalThis.Notification?.permission === "default") Notification.requestPermission();
+  if (globalThis.Notification?.permission === "default" && navigator.userActivation?.isActive !== false) Notification.requestPermission();
 }
 
 /** Says of prints that this page commands that they are over, where the page itself is not seen. */

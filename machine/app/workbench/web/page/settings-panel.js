@@ -108,7 +108,7 @@ function showProfiles(profiles) {
 }
 
 /** A word finds its plural, too, and the other way round. */
-const stem = (word) => (word.length > 3 ? word.replace(/s$/, "") : word);
+const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); // a key stays whole
 
 /** The words by which a setting is found, those that say most first. */
 const textsOf = ({ key, label, title, synonyms, meaning, about }) => [`${label} ${key}`, synonyms, `${title} ${meaning} ${about}`].map((text) => text.toLowerCase());
