@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from machine.app.requests import Given
@@ -138,7 +139,7 @@ def _process_rows(profile: Profile) -> dict[str, dict[str, Any]]:
 
 def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str = "", about: str = "") -> Iterator[dict[str, Any]]:
     """group, about: of the table that the model is, "" for the section itself, whose keys are in groups by their matters."""
-    schema = model.model_json_schema()["properties"]
+    schema = _schema(model)
     for name, field in model.model_fields.items():
         table = field.annotation
         if isinstance(table, type) and issubclass(table, Frozen):
@@ -160,6 +161,13 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
             "optional": may_be_left_out(field.annotation),
             **_kind(schema[name], values[name]),
         }
+
+
+@cache
+def _schema(model: type[Frozen]) -> dict[str, Any]:
+    """What pydantic says of every key: it works that out anew each time, which takes longer than all the rest."""
+    properties: dict[str, Any] = model.model_json_schema()["properties"]
+    return properties
 
 
 def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:

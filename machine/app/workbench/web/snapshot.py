@@ -22,7 +22,7 @@ from mdp.zone import Zone
 MOST_FACES = 2_000_000  # that a page draws
 # Of the state: what holds sentences.
 SENTENCES = (
-    *("problem", "problems", "answers", "busy", "lacking", "notes", "standing", "resting"),
+    *("problem", "problems", "answers", "busy", "stopped", "lacking", "notes", "standing", "resting"),
     *("search", "trial", "refused", "slicing", "sliced", "comparing", "compared"),
 )
 
