@@ -40,3 +40,20 @@ def filament_cm3(filament_mm: float, material: Material) -> float:
 def filament_g(filament_mm: float, material: Material) -> float:
     """Weight of a length of filament."""
     return filament_cm3(filament_mm, material) * material.density_g_cm3
+
+
+def price(filament_mm: float, material: Material) -> float | None:
+    """What a length of filament costs, in the material's currency; None where its price is not set."""
+    return None if material.price_per_kg is None else filament_g(filament_mm, material) / 1000.0 * material.price_per_kg
+
+
+def price_in_words(filament_mm: float, material: Material) -> str:
+    """The same as a person reads it, 0.42 EUR; "" where the price is not set."""
+    amount = price(filament_mm, material)
+    return "" if amount is None else f"{amount:.2f} {material.currency}".rstrip()
+
+
+def price_json(filament_mm: float, material: Material) -> dict[str, float | str]:
+    """`cost` and `currency` for a report in JSON; nothing where the price is not set."""
+    amount = price(filament_mm, material)
+    return {} if amount is None else {"cost": amount, "currency": material.currency}

@@ -11,6 +11,10 @@ class Material(Frozen):
     name: str = Field(description="what people call it")
     diameter_mm: float = Field(1.75, ge=1, le=4, description="filament diameter, mm")
     density_g_cm3: float = Field(1.24, gt=0, le=10, description="density, g/cm3")
+    price_per_kg: float | None = Field(
+        None, ge=0, le=1e6, description="what a kilogram costs, so that reports tell what a print costs; absent: they do not"
+    )
+    currency: str = Field("", max_length=12, description="what the price is counted in, as EUR; stands behind it in reports")
     nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature, deg C")
     first_layer_nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature of part 1's first layer, deg C")
     homing_nozzle_c: float = Field(

@@ -12,7 +12,7 @@ from profiles.machine import Blocks, Machine
 from profiles.places import shipped_of_dialect
 from profiles.profile import Profile
 
-RESUME = "resume"
+RESUME, START = "resume", "start"
 MOST_QUOTED = 3
 HEATING = ("M104", "M109", "M140", "M190")
 OTHER_WORD = {"S": "P", "P": "S"}  # what a temperature stands behind in the other kind of firmware
@@ -66,6 +66,13 @@ def _values(profile: Profile, block: str) -> dict[str, object]:
     if block == RESUME:
         return resume_placeholders(profile.machine, (0.0, 0.0, 0.0), level(profile.machine), 0.0)
     return placeholders("check", profile, [], 0.0, 0.0)
+
+
+def filled_start(profile: Profile) -> list[str]:
+    """The lines of the start block with its placeholders filled in, comments left out. Raises ProfileError."""
+    machine = profile.machine
+    lines = fill_block(machine.gcode.start, START, _values(profile, START), dialect_of(machine).longest_line)
+    return [text for line in lines if (text := line.partition(";")[0].strip())]
 
 
 def refused_lines(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:

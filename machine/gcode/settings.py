@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from machine.quantities import duration, filament_cm3, filament_g
+from machine.quantities import duration, filament_cm3, filament_g, price
 from profiles.profile import Profile
 
 LONGEST_COMMENT = 190
@@ -20,14 +20,17 @@ def head(name: str, profile: Profile) -> Iterator[str]:
 
 
 def foot(profile: Profile, filament_mm: float, seconds: float) -> Iterator[str]:
-    """Filament and time in PrusaSlicer's words, which print hosts look for, then every setting."""
+    """Filament, time and, where its price is set, cost in PrusaSlicer's words, which print hosts look for, then every setting."""
     material = profile.material
     yield f"; filament used [mm] = {filament_mm:.2f}"
     yield f"; filament used [cm3] = {filament_cm3(filament_mm, material):.2f}"
     yield f"; filament used [g] = {filament_g(filament_mm, material):.2f}"
+    if material.price_per_kg is not None:
+        yield f"; filament cost = {price(filament_mm, material):.2f}"
     yield f"; estimated printing time (normal mode) = {duration(seconds)}"
     yield CONFIG_BEGIN
-    for key, value in flat(profile.model_dump(), ""):
+    unpriced = {"material": {"price_per_kg", "currency"}} if material.price_per_kg is None else None
+    for key, value in flat(profile.model_dump(exclude=unpriced), ""):
         yield comment(f"{key} = {value}")
     yield CONFIG_END
 

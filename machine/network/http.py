@@ -29,6 +29,7 @@ WHOLE_S = 30.0  # from the first byte of an answer to its last: ANSWER_S is betw
 ERRNO = re.compile(r"^\[errno -?\d+\] ")
 MOST_BYTES = 16_000_000  # of an answer
 FILE_TYPE = "application/octet-stream"
+MOST_PICTURE, PICTURES = 8_000_000, ("image/jpeg", "image/png", "image/webp")  # of a camera
 WORDS = 160  # characters of a server's own words in a message
 Tell = Callable[[str, bytes], None]  # direction and what went over the line, as a log takes it
 
@@ -191,6 +192,24 @@ class HttpSession:
         if error is None and not reply.body.lstrip().startswith(b"<"):  # a page says nothing in a line
             error = reply.body[: 4 * WORDS].decode("utf-8", "replace")
         return plain(self._without_key(str(error or "")))
+
+
+def fetch_picture(url: str) -> tuple[bytes, str]:
+    """A picture and its type. Raises ServerError where nothing, or no picture, is there."""
+    import httpx
+
+    try:
+        with httpx.stream("GET", url, timeout=CONNECT_S, trust_env=False, follow_redirects=False) as answer:
+            kind, body = answer.headers.get("content-type", "").partition(";")[0].strip().lower(), b""
+            if answer.status_code != 200 or kind not in PICTURES:
+                raise ServerError(f"the camera gives no picture: status {answer.status_code}, {plain(kind) or 'of no type'}")
+            for piece in answer.iter_bytes():
+                body += piece
+                if len(body) > MOST_PICTURE:
+                    raise ServerError(f"the camera gives more than {MOST_PICTURE // 1_000_000} MB: it is no picture")
+    except (httpx.HTTPError, httpx.InvalidURL, UnicodeError, OSError) as error:
+        raise ServerError(f"the camera does not answer: {plain(str(error)).lower()}") from None
+    return body, kind
 
 
 def plain(text: str) -> str:

@@ -13,6 +13,7 @@ from machine.network.answers import entry, number, table, temperature, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession
 from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
+from machine.network.webcam import picture_address
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
@@ -65,6 +66,15 @@ class Moonraker(PrintServer):
         pairs = ((number(entry(toolhead.get(f"axis_{end}"), k)) for end in ("minimum", "maximum")) for k in range(3))
         limits = zip("XYZ", (tuple(pair) for pair in pairs), strict=True)
         return {letter: (low, high) for letter, (low, high) in limits if low is not None and high is not None}
+
+    def webcam(self) -> str:
+        reply = self._http.get("/server/webcams/list")
+        cameras = table(table(reply.json()).get("result")).get("webcams") if reply.status == 200 else None
+        told = (table(camera) for camera in cameras) if isinstance(cameras, list) else ()
+        pictures = (
+            picture_address(camera.get("snapshot_url"), self._http.address) for camera in told if camera.get("enabled", True)
+        )
+        return next(filter(None, pictures), "")
 
     def status(self) -> JobStatus:
         """From the objects that Klipper reports; where it does not run, from what Moonraker says of it."""

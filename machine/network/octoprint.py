@@ -10,6 +10,7 @@ from typing import Any
 from machine.network.answers import number, table, temperature, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
+from machine.network.webcam import picture_address
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers
@@ -37,6 +38,11 @@ class OctoPrint(PrintServer):
         if "moonraker" in text.lower():
             raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
         return ServerIdentity(text)
+
+    def webcam(self) -> str:
+        reply = self._http.get("/api/settings")  # some keys may not read them
+        settings = table(reply.json()) if reply.status == 200 else {}
+        return picture_address(table(settings.get("webcam")).get("snapshotUrl"), self._http.address)
 
     def status(self) -> JobStatus:
         """From /api/job, and from /api/printer where its printer is connected."""

@@ -87,6 +87,10 @@ class PrintServer(ABC):
     def status(self) -> JobStatus:
         """Where it stands."""
 
+    def webcam(self) -> str:
+        """Where its camera gives a picture; "": it has none, or does not tell."""
+        return ""
+
     @abstractmethod
     def has(self, file: str) -> bool:
         """Whether it holds a file of this name."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Alternative, Program
-from machine.quantities import duration, filament_g, newtons, percent
+from machine.quantities import duration, filament_g, newtons, percent, price_in_words
 from machine.reader.parsed import MoveKind
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
@@ -226,9 +226,11 @@ def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
     values = summary(run)
     count = str(len(layers.first)) if layers.by == "comments" else f"{len(layers.first)}, by their heights"
     mass_g = filament_g(float(run.program.e_mm.sum()), profile.material)
+    costs = price_in_words(values["filament_mm"], profile.material)
     return [
         ["time", duration(values["time_s"])],
         ["filament", f"{values['filament_mm'] / 1000:.2f} m, {mass_g:.1f} g"],
+        *([["costs", costs]] if costs else []),
         *([["parts", str(values["parts"])]] if values["parts"] else []),
         ["layers", count],
         *[[key, str(values[key])] for key in ("reorientations", "retractions")],

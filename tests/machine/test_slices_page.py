@@ -165,6 +165,7 @@ def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(b
     assert line == browser.value(in_frame(browser, "document.getElementById('readout-line').textContent"))
     browser.click("#undo")
     browser.wait("document.body.classList.contains('stale')")
+    assert browser.value("[$('verdict').classList.contains('stale'), $('verdict-remedy').textContent]") == [True, "Slice again"]
     assert "Out of date" in browser.value("document.querySelector('#bar .stale-told').innerText")
     browser.click("#leave-print")
     assert browser.value("$('save-gcode').disabled && $('compare').disabled && document.documentElement.dataset.walls === ''")
@@ -213,7 +214,7 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
     browser.wait("!$('print-problem').hidden && !$('force-line').hidden")
     problem = browser.value("$('print-problem').textContent")
     assert problem.startswith("the dry run found 2 errors, the first: ")
-    assert problem.endswith("(simulate lists all, --force goes on)")
+    assert problem.endswith("(tick Go on all the same to print it nevertheless)")
     assert browser.value("$('run').hidden")  # nobody has been asked who is there
     browser.click("#undo")
     browser.wait("$('check').disabled && $('force-line').hidden && $('print-problem').hidden")
@@ -256,11 +257,11 @@ def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench
     framed = browser.value(f"(({{ bounds, placesDrawn }}) => bounds(placesDrawn({{ {scene}, walls: {walls} }}).flat()))({names})")
     assert framed == [[-30, -20, 0], [30, 20, 4]]  # what is drawn are the copies, not the model
     type_in(browser, "copies", 0)
-    browser.wait("$('problem').textContent === '--copies is 0: 1 to 1000 is allowed' && $('copies').value === '1'")
+    browser.wait("$('problem').textContent === 'Copies is 0: 1 to 1000 is allowed' && $('copies').value === '1'")
     type_in(browser, "stop-kind", "filament_change")
     type_in(browser, "stop-at", "1:x")
     browser.click("#add-stop button")
-    browser.wait("$('problem').textContent.startsWith('--filament-change 1:x: PART:LAYER') && $('stop-at').value === '1:x'")
+    browser.wait("$('problem').textContent.startsWith('1:x under Copies and pauses: PART:LAYER') && $('stop-at').value === '1:x'")
     type_in(browser, "stop-at", "1:2.5mm")
     browser.click("#add-stop button")
     browser.wait("$('stops').innerText.includes('part 1, at 2.5 mm') && $('stop-at').value === ''")

@@ -201,7 +201,8 @@ def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(fir
         assert "Another page commands this print; this one watches." in firefox.value("$('held-told').textContent")
         firefox.click("#take")
         firefox.wait("$('held').hidden && !$('run-commands').hidden")
-        put(firefox, "$('search-settings')", "", "input")  # so that every setting has its field
+        put(firefox, "$('search-settings')", "", "input")
+        firefox.click("#level-all")  # so that every setting has its field
         typed, stopping = kinds_of_fields(firefox)
         assert typed == ["number", "search", "select-one", "text", "textarea"]
         assert not set(typed) & set(stopping)

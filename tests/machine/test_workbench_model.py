@@ -79,7 +79,7 @@ def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_i
     assert "reaches all of it" in browser.value("$('fit-told').textContent")
     drag_slider(browser, "scale", 2000, "change")
     browser.wait("$('fit-told').classList.contains('refused')")
-    assert "process.scale makes the model smaller" in browser.value("$('fit-told').textContent")
+    assert "Scale of the model makes the model smaller" in browser.value("$('fit-told').textContent")
     drag_slider(browser, "scale", -3, "change")
     browser.wait("$('scale').value === '2000'")
     browser.click("#scale-as-read")

@@ -181,7 +181,7 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
 def test_a_setting_is_found_by_a_word_changed_and_marked(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "tee.stl", stl(tee()))
     browser.click("#tab-settings")
-    browser.wait("document.querySelectorAll('[data-key]').length > 100")
+    browser.wait("document.querySelectorAll('[data-key]').length > 25")
     browser.value("{ $('search-settings').value = 'steepest overhang'; $('search-settings').dispatchEvent(new Event('input')); }")
     assert browser.value("document.querySelectorAll('[data-key]').length") == 1
     before = area(browser)

@@ -157,6 +157,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert browser.value(PRINTING) == "paused"
         browser.click("#follow")
         browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state)")
+        browser.click("#level-all")  # so that every setting has its field
         typed, stopping = kinds_of_fields(browser)
         assert typed == ["number", "search", "select-one", "text", "textarea"]
         assert not set(typed) & set(stopping)

@@ -36,6 +36,7 @@ def choose_part(browser: Browser, part: int) -> None:
 def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "settings.stl", stl(tee()))
     browser.click("#tab-settings")
+    browser.click("#level-all")
     put(browser, "machine.tilt.limits_deg", "-45, 45")
     browser.wait(changed("machine.tilt.limits_deg"))
     browser.value("window.both = ['process.walls', 'process.top_layers'].map((key) => `[data-key=\"${key}\"] input`)")
@@ -45,7 +46,7 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     )
     wrong = "document.querySelector('[data-key=\"process.walls\"] .wrong')"
     browser.wait(f"{wrong} && {wrong}.textContent")
-    assert browser.value(f"{wrong}.textContent").startswith("process.walls is -3")
+    assert browser.value(f"{wrong}.textContent").startswith("Walls is -3")
     browser.wait(changed("process.top_layers"))
     assert browser.value("$('problem').hidden && document.querySelectorAll('.wrong:not([hidden])').length") == 1
     choose_part(browser, 1)
@@ -66,11 +67,51 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: set a part'")
 
 
+def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile_they_belong_to(
+    browser: Browser, bench: Running
+) -> None:
+    open_model(browser, bench, "words.stl", stl(tee()))
+    browser.click("#tab-settings")
+    browser.click("#level-simple")
+    keys = "[...$('settings-list').querySelectorAll('.setting')].map((row) => row.dataset.key)"
+    browser.wait(f"{keys}.includes('process.walls') && !{keys}.includes('process.seam_gap')")
+    for words, key in (("perimeters", "process.walls"), ("cooling", "material.fan"), ("raft", "search.pedestal_mm")):
+        browser.value(f"{{ $('search-settings').value = '{words}'; $('search-settings').dispatchEvent(new Event('input')); }}")
+        assert key in browser.value(keys)
+    browser.value("{ $('search-settings').value = ''; $('search-settings').dispatchEvent(new Event('input')); }")
+    put(browser, "process.walls", 5)
+    put(browser, "material.nozzle_c", 222)
+    browser.wait(f"{changed('process.walls')} && {changed('material.nozzle_c')}")
+    browser.click("#only-changed")
+    shown = browser.value(keys)
+    assert {"process.walls", "material.nozzle_c"} <= set(shown)
+    assert "process.bottom_layers" not in shown
+    assert browser.value("document.querySelector('[data-key=\"process.walls\"] .was').textContent") == "The profile has 3"
+    browser.click("#reset-material")
+    browser.wait(f"{keys}.includes('process.walls') && !{keys}.includes('material.nozzle_c')")
+    assert browser.value("$('reset-material').hidden")
+    browser.click("#only-changed")
+    browser.click("[data-id='group process: shell'] button")
+    browser.wait(f"!{keys}.includes('process.walls')")
+    browser.value("document.querySelector('#axes [data-end=\"-y\"]').dispatchEvent(new Event('click'))")
+    axis = "document.querySelector('#axes [data-end=x]').getAttribute('transform')"
+    browser.wait(f"{axis} === 'translate(26.0 0.0)'")
+    browser.open(bench.address)  # the same tab, groups and view when the page is loaded again
+    browser.wait(
+        f"{keys}.length && !{keys}.includes('process.walls') && !$('settings').hidden && {axis} === 'translate(26.0 0.0)'"
+    )
+    browser.click("[data-id='group process: shell'] button")
+    browser.click("#undo")
+    browser.click("#undo")
+    assert browser.complaints == []
+
+
 def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_command_line_writes(
     browser: Browser, bench: Running, tmp_path: Path
 ) -> None:
     open_model(browser, bench, "block.stl", stl(tee()))
     browser.click("#tab-settings")
+    browser.click("#level-all")
     put(browser, "machine.gcode.before_part", "M400\nM117 {prat}")
     wrong = "document.querySelector('[data-key=\"machine.gcode.before_part\"] .wrong')?.textContent"
     browser.wait(wrong)
@@ -122,6 +163,7 @@ def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_a
     row = "[...$('front-told').querySelectorAll('dd')].map((cell) => cell.textContent)"
     before = browser.value(row)
     browser.click("#tab-settings")
+    browser.click("#level-all")
     put(browser, "material.nozzle_c", 222)
     browser.wait(changed("material.nozzle_c"))
     assert browser.value(row) == before

@@ -11,7 +11,7 @@ from machine.app.pipeline.programs import refuse_errors
 from machine.app.requests import STDOUT, ModelRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say_lines
-from machine.app.terminal.report import joints_table, print_table
+from machine.app.terminal.report import joints_table, print_price, print_table
 from machine.dryrun.dryrun import summary
 from machine.view.page import print_page
 from profiles.errors import OutputError
@@ -44,7 +44,7 @@ def export(request: ModelRequest) -> int:
         write_bytes(outputs.html, print_page(request.name, program, profile, alternatives=alternatives))
     if outputs.json is not None:
         comparison = {"compare": alternatives_json(alternatives)} if alternatives else {}
-        write_json(outputs.json, summary(program.run) | comparison)
+        write_json(outputs.json, summary(program.run) | print_price(program, profile) | comparison)
     table = print_table(program, profile)
     if alternatives:
         table += "\n" + joints_table(alternatives[0].joints) + compare_table(alternatives)

@@ -8,7 +8,7 @@ from machine.app.output import check_outputs, write_bytes, write_json
 from machine.app.pipeline.programs import load_program
 from machine.app.requests import STDOUT, ModelRequest
 from machine.app.terminal.plain import show
-from machine.app.terminal.report import agreement_line, print_table
+from machine.app.terminal.report import agreement_line, print_price, print_table
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import find_starvation
@@ -47,7 +47,10 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     if outputs.html is not None:
         write_bytes(outputs.html, print_page(request.name, program, profile, known=loaded.machine_known))
     if outputs.json is not None:
-        write_json(outputs.json, summary(program.run) | ({} if agreed is None else {"model": asdict(agreed)}))
+        write_json(
+            outputs.json,
+            summary(program.run) | print_price(program, profile) | ({} if agreed is None else {"model": asdict(agreed)}),
+        )
     if outputs.json != STDOUT:
         show(print_table(program, profile) + ("" if agreed is None else agreement_line(agreed)))
     return 1 if program.run.errors else 0

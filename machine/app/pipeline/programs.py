@@ -66,10 +66,11 @@ def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
     """Raise MoveError for a program whose dry run found errors; force: only say so."""
     if not errors:
         return
+    count = f"{len(errors)} error{'s' * (len(errors) > 1)}"
     if force:
-        say(f"the dry run found {len(errors)} errors", forced=True)
+        say(f"the dry run found {count}", forced=True)
         return
     raise MoveError(
-        f"the dry run found {len(errors)} errors, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})",
+        f"the dry run found {count}, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})",
         forcible=True,
     )

@@ -2,7 +2,7 @@
 
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.medium import SERIAL, Wire
-from machine.link.protocol.events import Event, Ok, Temperature, unknown_command
+from machine.link.protocol.events import Event, Ok, Position, Temperature, position_in, unknown_command
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
@@ -22,14 +22,15 @@ class StopError(Exception):
 class CommandSession:
     """greet(), then command() after command, then leave(). One thread at a time; order() may be called from any other.
 
-    unknown: commands that the printer did not know.
+    unknown: commands that the printer did not know; heat, position: as it has told them last.
     """
 
     def __init__(self, wire: Wire, limit: int = LINE_LIMIT) -> None:
         self.unknown: list[str] = []
         self._limit = limit
         self._ordered: type[Exception] | None = None
-        self._heat = Temperature()
+        self.heat = Temperature()
+        self.position: Position | None = None
         self._command = ""
         self.exchange = Exchange(
             wire, SERIAL, timing=Timing(), on_event=self._heard, on_turn=self._turned, on_lost=self._lost, limit=limit
@@ -67,7 +68,7 @@ class CommandSession:
         if not self._idle():
             return "heaters, for a command was under way"
         self.command("M105")
-        targets = (("nozzle", self._heat.nozzle_target_c), ("bed", self._heat.bed_target_c))
+        targets = (("nozzle", self.heat.nozzle_target_c), ("bed", self.heat.bed_target_c))
         return " and ".join(f"{name} set to {target_c:.0f} deg C" for name, target_c in targets if target_c)
 
     def switch_off(self) -> bool:
@@ -91,10 +92,11 @@ class CommandSession:
         return self.exchange.greeted and self.exchange.connection.fault is None and window.acknowledged == window.sent
 
     def _heard(self, event: Event) -> None:
+        self.position = position_in(event) or self.position
         if isinstance(event, Ok):
-            self._heat = event.temperature or self._heat
+            self.heat = event.temperature or self.heat
         elif isinstance(event, Temperature):
-            self._heat = event
+            self.heat = event
         elif unknown_command(event) and self.exchange.greeted:
             self.unknown.append(self._command)
 

@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
 
+import numpy as np
+
 from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Program
-from machine.quantities import duration, minutes, newtons, percent
+from machine.quantities import duration, filament_g, minutes, newtons, percent, price_in_words, price_json
 from machine.view.parts import risky_before_mm2
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.joint import Joint, weakest_of
@@ -98,8 +100,28 @@ def _number(area_mm2: float) -> str:
 
 def print_table(program: Program, profile: Profile) -> str:
     """What there is to say of a print: its dry run, what its cuts take, the settings of single parts."""
-    said = run_table(program.run) + interfaces_line(program.interface_mm3) + pins_line(program.sliced)
+    said = (
+        run_table(program.run)
+        + _costs_line(program, profile)
+        + interfaces_line(program.interface_mm3)
+        + pins_line(program.sliced)
+    )
     return said + part_settings_lines(profile)
+
+
+def print_price(program: Program, profile: Profile) -> dict[str, float | str]:
+    """What a print's filament costs, for its JSON; nothing where the material has no price."""
+    return price_json(_filament_mm(program), profile.material)
+
+
+def _costs_line(program: Program, profile: Profile) -> str:
+    filament_mm, material = _filament_mm(program), profile.material
+    costs = price_in_words(filament_mm, material)
+    return f"costs {costs} for {filament_g(filament_mm, material):.1f} g of filament\n" if costs else ""
+
+
+def _filament_mm(program: Program) -> float:
+    return float(np.max(program.run.program.filament_mm, initial=0.0))
 
 
 def run_table(run: DryRun) -> str:

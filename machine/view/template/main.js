@@ -36,7 +36,7 @@ async function main() {
   const chooseTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);
   const findings = findingsOf(print, scene, ring, camera, player.stop), code = textOf(print, scene, ring, player.stop);
   scene.go(rows.count - 1);
-  outsideOf({ scene, findings, code, chooseTheme });
+  outsideOf({ scene, findings, code, chooseTheme, camera, bells: ring });
   if (!gl) return withoutPicture();
   const picture = pictureOf(gl, print, scene, camera, ring, findings.showMarkers);
   const fit = fitting(print, scene, camera, picture, ring);

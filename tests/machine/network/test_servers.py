@@ -83,6 +83,22 @@ def test_a_file_that_a_moonraker_has_not_scanned_yet_is_there_all_the_same() -> 
         assert (server.has("copied.gcode"), server.has("other.gcode")) == (True, False)
 
 
+@pytest.mark.parametrize(("kind", "path", "value", "picture"), [
+    ("moonraker", "/server/webcams/list", {"result": {"webcams": [
+        {"enabled": False, "snapshot_url": "/off"}, {"enabled": True, "snapshot_url": "/webcam/?action=snapshot"},
+    ]}}, "http://127.0.0.1/webcam/?action=snapshot"),
+    ("octoprint", "/api/settings", {"webcam": {"snapshotUrl": "http://localhost:8080/?action=snapshot"}},
+     "http://127.0.0.1:8080/?action=snapshot"),
+    ("octoprint", "/api/settings", {"webcam": []}, ""), ("moonraker", "/server/webcams/list", [], ""), ("duet", "/none", {}, ""),
+])  # fmt: skip
+def test_a_server_tells_of_its_camera_or_of_none(kind: str, path: str, value: object, picture: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.greet()
+        assert server.webcam() == ""
+        job.refuse[path] = (200, value)
+        assert server.webcam() == picture
+
+
 @every_kind
 def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
     seen: list[JobStatus] = []

@@ -22,7 +22,7 @@ class Effect(IntEnum):
 # Read by neither: heat, air, retraction, what only moves between strokes, and what only the G-code's text has.
 UNREAD = frozenset(
     {
-        *(f"material.{key}" for key in ("name", "density_g_cm3")),
+        *(f"material.{key}" for key in ("name", "density_g_cm3", "price_per_kg", "currency")),
         *(f"material.{key}_c" for key in ("nozzle", "first_layer_nozzle", "homing_nozzle", "standby", "bed")),
         *(
             f"material.fan{key}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from machine.app.requests import Given
@@ -9,6 +10,7 @@ from machine.app.workbench.bench.part_settings import own_values
 from machine.gcode.blocks import block_problems, placeholder_names
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen, may_be_left_out
+from profiles.labels.labels import group_title, label_of, unit_of
 from profiles.machine import GCODE
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
 from profiles.places import KINDS, OF_KIND, known
@@ -44,6 +46,14 @@ def _in_one_line(value: str) -> str:
         plain = "\n" not in meant and meant == meant.strip() and read_value(meant) == meant
         return meant if plain else value_text(meant)
     return value_text(meant) if "\n" in value else value.strip()
+
+
+def without_settings(given: Given, kind: str | None) -> Given:
+    """The same with none of what is set for a machine, a material or a process; None: for all three. Raises ProfileError."""
+    if kind is not None and kind not in KINDS:
+        raise ProfileError(f"{kind!r} is no profile: {', '.join(KINDS)} are known")
+    gone = given.settings if kind is None else settings_of(given, kind)
+    return replace(given, settings=tuple(setting for setting in given.settings if setting not in gone))
 
 
 def settings_of(given: Given, kind: str) -> list[str]:
@@ -85,24 +95,51 @@ def allowed_keys(part: int) -> set[str]:
 
 
 def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[str, Any]]:
-    """Every key in its group (a matter, or a table of a machine): its meaning, kind, range or choices, value, and whether a
-    person has changed it. part: of this part alone, what it may have of its own; 0: of all."""
+    """Every key in its group (a matter, or a table of a machine): its label, level, unit, meaning, kind, range or choices, value,
+    whether a person has changed it, and then what the profile has. part: of this part alone, what it may have of its own; 0: of
+    all."""
     if part == 0:
         changed = {setting.partition("=")[0].strip() for setting in given.settings}
+        unchanged = {row["key"]: row["value"] for row in _all_rows(_unchanged(given))} if changed else {}
         return [
-            {**row, "changed": row["key"] in changed, "placeholders": _placeholders(row["key"], profile)}
-            for section in ORDER
-            for row in _rows(section, SECTIONS[section], getattr(profile, section).model_dump(mode="json"))
+            {
+                **row,
+                "changed": row["key"] in changed,
+                "unchanged": unchanged.get(row["key"]) if row["key"] in changed else None,
+                "placeholders": _placeholders(row["key"], profile),
+            }
+            for row in _all_rows(profile)
         ]
     own, allowed = own_values(profile, part), allowed_keys(part)
-    values = profile.of_part(part).process.model_dump(mode="json")
-    rows = [(row["key"].removeprefix("process."), row) for row in _rows("process", SECTIONS["process"], values)]
-    return [{**row, "changed": name in own} for name, row in rows if name in allowed]
+    rows, of_all = (_process_rows(sliced) for sliced in (profile.of_part(part), profile))
+    return [
+        {**row, "changed": name in own, "unchanged": of_all[name]["value"] if name in own else None}
+        for name, row in rows.items()
+        if name in allowed
+    ]
+
+
+def _unchanged(given: Given) -> Profile | None:
+    """The profiles as they are named; None where they are right only with what is set."""
+    try:
+        return load(given.machine, given.material, given.process)
+    except ProfileError:
+        return None
+
+
+def _all_rows(profile: Profile | None) -> Iterator[dict[str, Any]]:
+    for section in ORDER if profile is not None else ():
+        yield from _rows(section, SECTIONS[section], getattr(profile, section).model_dump(mode="json"))
+
+
+def _process_rows(profile: Profile) -> dict[str, dict[str, Any]]:
+    rows = _rows("process", SECTIONS["process"], profile.process.model_dump(mode="json"))
+    return {row["key"].removeprefix("process."): row for row in rows}
 
 
 def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str = "", about: str = "") -> Iterator[dict[str, Any]]:
     """group, about: of the table that the model is, "" for the section itself, whose keys are in groups by their matters."""
-    schema = model.model_json_schema()["properties"]
+    schema = _schema(model)
     for name, field in model.model_fields.items():
         table = field.annotation
         if isinstance(table, type) and issubclass(table, Frozen):
@@ -110,14 +147,27 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
             continue
         matter = next(kind for kind in reversed(model.__mro__) if issubclass(kind, Frozen) and name in kind.model_fields)
         own = f"{prefix}: {matter.__name__.lower()}" if matter is not model else prefix
+        key, label = f"{prefix}.{name}", label_of(f"{prefix}.{name}")
         yield {
-            "key": f"{prefix}.{name}",
+            "key": key,
+            "label": label.text,
+            "level": label.level,
+            "synonyms": label.synonyms,
+            "unit": unit_of(key),
             "group": group or own,
+            "title": group_title(group or own),
             "about": about or _sentence(matter),
             "meaning": field.description or "",
             "optional": may_be_left_out(field.annotation),
             **_kind(schema[name], values[name]),
         }
+
+
+@cache
+def _schema(model: type[Frozen]) -> dict[str, Any]:
+    """What pydantic says of every key: it works that out anew each time, which takes longer than all the rest."""
+    properties: dict[str, Any] = model.model_json_schema()["properties"]
+    return properties
 
 
 def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:

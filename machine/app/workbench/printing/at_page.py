@@ -1,6 +1,6 @@
 """At page: a person who attends a print at a page of the workbench, as a terminal's screen and keys would have it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from queue import SimpleQueue
 from threading import Event as Flag
@@ -13,6 +13,7 @@ from machine.app.printer.watch_page import state_of
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.printer_messages import PrinterMessages
 from machine.app.terminal.progress import Report
+from machine.app.workbench.printing.order import HandCommand
 from machine.app.workbench.printing.reporter import StateReporter
 from machine.dryrun.timeline import Timeline
 from machine.link.pending_commands import Command, Control
@@ -32,9 +33,14 @@ class AtPage:
         self._reporter = reporter
         self._answers: SimpleQueue[bool] = SimpleQueue()
         self._gives_up, self._halts = Flag(), Flag()
+        self.by_hand: SimpleQueue[HandCommand] = SimpleQueue()  # what is to be done at a printer that is in hand
+        self.interrupt: Callable[[Command | str], None] = lambda word: None  # called with what ends it at once
 
-    def hear(self, word: Command | str, value: float = 100.0) -> None:
-        """What the person wants: a command of a print, BEGIN or LEAVE."""
+    def hear(self, word: Command | HandCommand | str, value: float = 100.0) -> None:
+        """What the person wants: a command of a print or by hand, BEGIN or LEAVE."""
+        if isinstance(word, HandCommand):
+            self.by_hand.put(word)
+            return
         if isinstance(word, Command):
             self.control.ask(word, value)
         if word in (Command.CANCEL, LEAVE):
@@ -45,12 +51,19 @@ class AtPage:
             self._halts.set()
         if word in ANSWERS:
             self._answers.put(word == BEGIN)
+        if word in (Command.CANCEL, Command.EMERGENCY_STOP):
+            self.interrupt(word)
 
     def leave(self) -> None:
         """The server is gone, and nobody can command any more: the print ends as if it had been cancelled, but one on a print
         server goes on there."""
         self.stop.set()
         self._answers.put(False)
+        self.interrupt(LEAVE)
+
+    def lets_go(self) -> bool:
+        """Whether a printer in hand is let go of, its heaters off."""
+        return self.stop.is_set() or self._gives_up.is_set()
 
     def agrees(self) -> bool:
         """Wait for the person's word to begin."""

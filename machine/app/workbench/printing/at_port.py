@@ -35,10 +35,10 @@ def _checked(order: PrintOrder, checks: Checks) -> LoadedProgram:
     with checks.that(_answers(answer, order)):
         check_machine(answer, profile.machine, order.force)
     program = program_of(order)
-    tell(figures=figures(program))
+    tell(figures=figures(program, profile.material))
     with checks.that(CLEAN):
         program = ready_program(answer, program, profile, name=order.name, printing=printing, force=order.force)
-    tell(figures=figures(program))  # with what the line's rate adds
+    tell(figures=figures(program, profile.material))  # with what the line's rate adds
     return LoadedProgram(order.name, program, profile)
 
 

@@ -21,6 +21,7 @@ from machine.network.address import parse_server_address
 from machine.network.follow import End
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import PrintServer
+from profiles.errors import ServerError
 
 
 def print_on_server(order: PrintOrder, person: AtPage, checks: Checks) -> State:
@@ -28,6 +29,7 @@ def print_on_server(order: PrintOrder, person: AtPage, checks: Checks) -> State:
     address = order.printing.port
     with server_session(address, f"{order.name} to {address}", "print" if order.starts else "send") as (server, log):
         job = _checked(order, server, checks)
+        checks.reporter.tell(webcam=_webcam(server))
         checks.reporter.tell(phase="ready")
         if not person.agrees():
             return LEFT
@@ -49,9 +51,17 @@ def follow_on_server(order: FollowOrder, person: AtPage, checks: Checks) -> Stat
         server.greet()
         now = running_print(server)
         person.agreed, name = True, file_name(now)  # from now on it may be stopped
-        checks.reporter.tell(name=name)
+        checks.reporter.tell(name=name, webcam=_webcam(server))
         end = follow_there(server, now, Observers(log), person)
     return _ended(end, name, address)
+
+
+def _webcam(server: PrintServer) -> str:
+    """Where its camera gives a picture; a print does not fail for want of it."""
+    try:
+        return server.webcam()
+    except ServerError:
+        return ""
 
 
 def _ended(end: End, name: str, address: str) -> State:
@@ -68,7 +78,7 @@ def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> LoadedPr
             check_free(server.name, server.status())
         check_server_machine(parse_server_address(order.printing.port), greeting, profile.machine, order.force)
     program = program_of(order)
-    checks.reporter.tell(figures=figures(program))
+    checks.reporter.tell(figures=figures(program, profile.material))
     with checks.that(CLEAN):
         ready_for_server(greeting, program, profile, order.name, order.force)
     if order.starts:

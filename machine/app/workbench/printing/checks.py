@@ -11,7 +11,9 @@ from machine.app.workbench.printing.order import PrintOrder, State
 from machine.app.workbench.printing.reporter import StateReporter
 from machine.dryrun.dryrun import dry_run, summary
 from machine.program import Program
+from machine.quantities import filament_g, price_in_words
 from profiles.errors import PlanError
+from profiles.material import Material
 
 LINES_KEPT = 100  # of what the program says
 MOST_FINDINGS = 50  # in the list; the page of the print has all
@@ -71,12 +73,14 @@ def program_of(order: PrintOrder) -> Program:
     return Program(lines, dry_run(lines, order.profile, findings), None)
 
 
-def figures(program: Program) -> dict[str, Any]:
-    """What a person is told of a program."""
+def figures(program: Program, material: Material) -> dict[str, Any]:
+    """What a person is told of a program that prints with a material."""
     values, findings = summary(program.run), program.run.findings
     return {
         "time_s": values["time_s"],
         "filament_mm": values["filament_mm"],
+        "filament_g": filament_g(values["filament_mm"], material),
+        "costs": price_in_words(values["filament_mm"], material),
         "lines": len(program.lines),
         "findings": [f"{finding.severity}: {finding.message}" for finding in findings[:MOST_FINDINGS]],
         "errors": len(program.run.errors),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from machine.app.requests import PrintRequest
 from machine.app.workbench.bench.values import Asked, is_number
-from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
+from machine.app.workbench.printing.order import FollowOrder, HandCommand, HandDoes, HandOrder, Order, ResumeOrder
 from machine.app.workbench.printing.ordering import order_of
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.running_print import RunningPrint
@@ -78,6 +78,18 @@ def _rest(session: Session, asked: Asked) -> Order:
     return ResumeOrder(Path(journal).absolute(), _printing(asked), machine)
 
 
+def _hand(session: Session, asked: Asked) -> Order:
+    """The printer by hand, as the machine and the material of the page's bench are."""
+    return HandOrder(session.bench.profile.of_all_parts, _printing(asked))
+
+
+def _by_hand(meant: RunningPrint, asked: Asked) -> None:
+    does, axis, by_mm = str(asked.get("does")), str(asked.get("axis") or ""), asked.get("by_mm", 0.0)
+    if does not in set(HandDoes) or meant.state["phase"] != "hand" or not is_number(by_mm):
+        raise PrinterError("this cannot be done by hand now")
+    meant.say((HandCommand(HandDoes(does), axis[:1], float(by_mm), asked.get("keep_heat") is True),))
+
+
 def _server(asked: Asked) -> PrintRequest:
     printing = _printing(asked)
     parse_server_address(printing.port)
@@ -110,6 +122,8 @@ COMMANDS: dict[str, Command] = {
     "check": _begin(_slices),
     "go_on": _begin(_rest),
     "follow": _begin(lambda session, asked: FollowOrder(_server(asked))),
+    "hand": _begin(_hand),
+    "by_hand": _of_print(_by_hand),
     "emergency": lambda page, asked: page.prints.stop_at_once(asked.get("print")),
     "take": _take,
     "begin": _of_print(lambda meant, asked: meant.begin()),

@@ -1,6 +1,7 @@
 """Order: what is to be printed where, and the state of a print as its process tells it."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,8 +11,8 @@ from machine.network.address import is_server_address
 from profiles.profile import Profile
 
 # checking: nothing but a question has gone to the printer; ready: waits for a person's word; uploading: a print server gets the
-# file; leaving: the heaters go off.
-Phase = Literal["checking", "ready", "uploading", "printing", "leaving", "over"]
+# file; hand: nothing is printed, a person heats and moves the machine; leaving: the heaters go off.
+Phase = Literal["checking", "ready", "uploading", "printing", "hand", "leaving", "over"]
 State = dict[str, Any]  # of a print, as JSON: order, phase and all that process.py tells
 
 
@@ -47,7 +48,35 @@ class FollowOrder:
     printing: PrintRequest
 
 
-Order = PrintOrder | ResumeOrder | FollowOrder
+@dataclass(frozen=True, eq=False)
+class HandOrder:
+    """Nothing is printed: a person heats and moves the machine."""
+
+    profile: Profile
+    printing: PrintRequest
+
+
+class HandDoes(StrEnum):
+    """What a person may do by hand."""
+
+    HEAT = "heat"
+    COOL = "cool"
+    HOME = "home"
+    JOG = "jog"
+    LET_GO = "let_go"
+
+
+@dataclass(frozen=True)
+class HandCommand:
+    """axis, by_mm: of a jog; keep_heat: of letting go, the heaters stay as they are."""
+
+    does: HandDoes
+    axis: str = ""
+    by_mm: float = 0.0
+    keep_heat: bool = False
+
+
+Order = PrintOrder | ResumeOrder | FollowOrder | HandOrder
 
 
 def first_state(order: Order) -> State:
@@ -57,7 +86,13 @@ def first_state(order: Order) -> State:
     journal = order.journal if isinstance(order, ResumeOrder) else None
     return {
         "phase": "checking",
-        "name": slices.name if slices else journal.stem if journal else "what it prints",
+        "name": slices.name
+        if slices
+        else journal.stem
+        if journal
+        else "by hand"
+        if isinstance(order, HandOrder)
+        else "what it prints",
         "machine": slices.profile.machine.name if slices else "",
         "resumes": str(journal or ""),
         "key": slices.key if slices else "",
@@ -67,7 +102,7 @@ def first_state(order: Order) -> State:
         "baud": printing.baud,
         "sim_speed": printing.sim_speed,
         "server": is_server_address(printing.port),
-        **dict.fromkeys(("question", "log", "journal", "end", "sentence"), ""),
+        **dict.fromkeys(("question", "log", "journal", "webcam", "end", "sentence"), ""),
         **dict.fromkeys(("checks", "words", "said"), ()),
         **dict.fromkeys(("figures", "upload", "progress")),
         **dict.fromkeys(("forcible", "stop_given"), False),

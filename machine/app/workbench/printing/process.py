@@ -14,11 +14,12 @@ from typing import BinaryIO
 
 from machine.app.crash import bug_in_words
 from machine.app.terminal.plain import said_to
+from machine.app.workbench.printing.at_hand import by_hand
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.at_port import go_on, print_at_port
 from machine.app.workbench.printing.at_server import follow_on_server, print_on_server
 from machine.app.workbench.printing.checks import Checks
-from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
+from machine.app.workbench.printing.order import FollowOrder, HandOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.printing.reporter import StateReporter
 from machine.app.workbench.work.worker import read_frames, take_pipes
 from machine.network.address import is_server_address
@@ -45,6 +46,8 @@ def carry_out(order: Order, person: AtPage, checks: Checks) -> State:
             return go_on(order, person, checks)
         if isinstance(order, FollowOrder):
             return follow_on_server(order, person, checks)
+        if isinstance(order, HandOrder):
+            return by_hand(order, person, checks)
         if is_server_address(order.printing.port):
             return print_on_server(order, person, checks)
         return print_at_port(order, person, checks)

@@ -26,7 +26,7 @@ class SessionBase(Observable):
 
     problem: what could not be done last; answers: to the last commands that a page gave a name, by that: why they were refused,
     "" for those that are done; busy: what the pages wait for; quick, long, hand: its tasks in the pools; received: the files of
-    its pages; followers: called after every change of the bench.
+    its pages; followers: called after every change of the bench; endings: as the session closes, its files still there.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -37,6 +37,7 @@ class SessionBase(Observable):
         self.busy = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
+        self.endings: list[Callable[[], None]] = []
         self.received = Received()
         self._files = count(1)
         self._tasks: set[asyncio.Task[None]] = set()
@@ -49,6 +50,8 @@ class SessionBase(Observable):
     def close(self) -> None:
         """End all work; its files go, and its pages are told."""
         self.closed = True
+        for end in self.endings:
+            end()
         for task in self._tasks:
             task.cancel()
         for tasks in (self.quick, self.long, self.hand):

@@ -1,14 +1,14 @@
 """Commands: all that a page may ask of its bench, by name: what each needs to lie there, and what does it."""
 
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.changes import lay, lock, reset_part, set_part, stand, take, turn
 from machine.app.workbench.bench.planes import Cuts, add_plane, move_plane, remove_plane, reorder
-from machine.app.workbench.bench.settings import with_name, with_typed
+from machine.app.workbench.bench.settings import with_name, with_typed, without_settings
 from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
 from machine.app.workbench.bench.values import Asked, text_or_none
 from machine.app.workbench.session.finding import search_way
@@ -75,7 +75,9 @@ def _take_profile(session: Session, asked: Asked) -> Work:
 
 
 def _reset(session: Session, asked: Asked) -> Work:
-    return session.take_given("take all changes back", lambda given: replace(given, settings=()))
+    kind = asked.get("kind")
+    whose = "all changes" if kind is None else f"changes of the {kind}"
+    return session.take_given(f"take {whose} back", lambda given: without_settings(given, kind))
 
 
 def _stop(session: Session, asked: Asked) -> None:

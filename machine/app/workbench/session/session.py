@@ -1,9 +1,11 @@
 """Session: one bench, and the work under way for it."""
 
 import asyncio
+import shutil
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import localtime, strftime
 from typing import Any
 from weakref import finalize
 
@@ -16,6 +18,7 @@ from machine.app.workbench.bench.bench import (
     with_model_turned_as_read,
     with_plan,
     with_profile,
+    with_rotation,
     with_scaled_model,
 )
 from machine.app.workbench.bench.effect import Effect, effect_of_change
@@ -24,14 +27,17 @@ from machine.app.workbench.bench.settings import check_block, profile_as_given
 from machine.app.workbench.session.base import SessionBase
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.finding import Finding
+from machine.app.workbench.session.keeping import Keeping
 from machine.app.workbench.session.marking import Marking
 from machine.app.workbench.session.pricing import Pricing
 from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
+from machine.app.workbench.work.kept_work import KeptWork
 from machine.app.workbench.work.models import Resting
 from machine.app.workbench.work.worker_pool import WorkerPools
+from machine.planning.stops import parse_stops
 from mdp.directions.turns import turned_by
 from mdp.model_file import locate
 from mdp.plans.plan_file import PlanFile
@@ -66,6 +72,7 @@ class Session(SessionBase):
         self._settling, self._drawing = asyncio.Lock(), asyncio.Lock()
         self._pieces: tuple[Bench, Path] | None = None  # drawn last
         self.marking = Marking(self, self.trials)
+        self.keeping = Keeping(self)
         self._ranking: asyncio.Task[None] | None = None
         self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
@@ -93,6 +100,22 @@ class Session(SessionBase):
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
         await self.open_model(locate(name), name)
+
+    async def open_kept(self, work: KeptWork) -> None:
+        """Put kept work on the bench again, and go on keeping it where it was. Raises UserError, then it stays as it is there."""
+        word = f"open the work of {strftime('%H:%M', localtime(work.written_s))}"
+        with self.keeping.opening(work.folder):
+            await self.take_given(word, lambda given: work.given)
+            path = locate(work.name) if work.model is None else self.received.new_file(work.name)
+            if work.model is not None:
+                await asyncio.to_thread(shutil.copyfile, work.model, path)
+            await self.open_model(path, work.name)
+            if work.plan is not None:
+                await self.open_plan(work.plan)
+            bench = with_rotation(self.bench, work.rotation)
+            locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in work.locked)
+            stops = parse_stops(work.pauses, work.changes)
+            self.do(word, replace(bench, locked=locked, stops=stops, copies=work.copies))
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""

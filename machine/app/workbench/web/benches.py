@@ -4,6 +4,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 
+from machine.app.workbench.bench.page_words import page_words
 from machine.app.workbench.bench.values import is_small_number
 from machine.app.workbench.session.workbench import Workbench
 from profiles.errors import PlanError
@@ -22,7 +23,7 @@ def bench_routes(workbench: Workbench) -> list[Route]:
         try:
             number = workbench.open(workbench.sessions.get(int(like)) if is_small_number(like) else None)
         except PlanError as error:
-            return JSONResponse({"problem": str(error)}, status_code=422)
+            return JSONResponse({"problem": page_words(str(error))}, status_code=422)
         return JSONResponse({"number": number})
 
     async def closed(request: Request) -> Response:

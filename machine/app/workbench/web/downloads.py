@@ -1,6 +1,7 @@
 """Downloads: what a page saves and looks at: profiles, the plan, the parts, the G-code and the page of the print."""
 
 from pathlib import Path
+from urllib.parse import quote
 
 from starlette.background import BackgroundTask
 from starlette.requests import Request
@@ -75,12 +76,13 @@ async def shared_page(session: Session, request: Request) -> Response:
 
 
 async def gcode(session: Session, request: Request) -> Response:
-    """The G-code; with errors only for who has said that he wants it all the same, as with `export --force`."""
+    """The G-code; with errors only for who has said that he wants it all the same."""
     sliced = session.slicing.needed().sliced
     if (errors := sliced.errors) and request.query_params.get("force") != "yes":
+        count = f"{len(errors)} error{'s' * (len(errors) > 1)}"
         raise PlanError(
-            f"the dry run found {len(errors)} errors, the first: {errors[0].message}: no G-code is saved unless you say that you"
-            " want it all the same (--force)"
+            f"the dry run found {count}, the first: {errors[0].message}: no G-code is saved unless you say that you want it all"
+            " the same"
         )
     return FileResponse(sliced.gcode, headers=_saved_as(f"{file_stem(session.bench)}.gcode"), media_type="text/plain")
 
@@ -102,4 +104,6 @@ def _once(file: Path, kind: str, name: str) -> Response:
 
 
 def _saved_as(name: str) -> dict[str, str]:
-    return {"content-disposition": f'attachment; filename="{name}"'}
+    """How a browser is told a file's name, letters of all scripts as RFC 6266 has them."""
+    plain = name.encode("ascii", "replace").decode().replace("?", "_")
+    return {"content-disposition": f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name)}"}

@@ -1,22 +1,27 @@
 """Prints line: a page's line to the prints: one of its own, so that a print's news, five a second, carry nothing else."""
 
+import asyncio
 import json
 import secrets
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
 from machine.app.crash import bug_in_words, log_bug
+from machine.app.workbench.bench.page_words import page_words, with_page_words
 from machine.app.workbench.printing.commands import PageOfPrints, obey
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.line import parsed, receive, refuse_closed, send, tell, until_either_ends
-from profiles.errors import UserError
+from machine.network.http import fetch_picture
+from profiles.errors import ServerError, UserError
 
 MOST_COMMAND = 10_000  # characters
+SENTENCES = ("sentence", "question", "checks", "figures", "said", "upload")  # of a print's state
 
 
 def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
@@ -36,7 +41,8 @@ def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], A
         await socket.accept()
         with prints.page(page):
             try:
-                await until_either_ends(tell(prints, prints.snapshot, socket), _hear(socket, PageOfPrints(page, session, prints)))
+                hearing = _hear(socket, PageOfPrints(page, session, prints))
+                await until_either_ends(tell(prints, lambda: _told(prints), socket), hearing)
             except ExceptionGroup as bugs:
                 log_bug(bugs.exceptions[0], ())
 
@@ -56,6 +62,29 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
     return answer
 
 
+def _told(prints: Prints) -> dict[str, Any]:
+    """What every page is told, in the page's own words; what the printer says stays."""
+    state = prints.snapshot()
+    jobs = [with_page_words(job, SENTENCES) | {"webcam": bool(job["webcam"])} for job in state["prints"]]
+    return with_page_words(state, ("ports",)) | {"prints": jobs}
+
+
+def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
+    """What answers a request for a picture of the camera at a print: the page may load nothing from elsewhere itself."""
+
+    async def answer(request: Request) -> Response:
+        for job in prints.prints:
+            if job.number == request.path_params["print"] and job.state["webcam"]:
+                try:
+                    picture, kind = await asyncio.to_thread(fetch_picture, job.state["webcam"])
+                except ServerError as error:
+                    return Response(f"{error}\n", 502)
+                return Response(picture, media_type=kind, headers={"cache-control": "no-store"})
+        return Response("there is no camera at this print\n", 404)
+
+    return answer
+
+
 async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
     while True:
         text = await receive(socket)
@@ -63,6 +92,6 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
             asked = parsed(text, MOST_COMMAND)
             obey(page, asked)
         except UserError as error:
-            await send(socket, json.dumps({"problem": str(error), "forcible": error.forcible}))
+            await send(socket, json.dumps({"problem": page_words(str(error)), "forcible": error.forcible}))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
             await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

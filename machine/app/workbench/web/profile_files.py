@@ -33,6 +33,12 @@ class ProfileFiles:
             raise ProfileError(str(error).replace(f"{Path(copy).parent}{os.sep}", "")) from None
         return True
 
+    def copied(self, given: Given, own_names: dict[str, str]) -> Given:
+        """The same with copies of the profiles that are files, which have these names. Raises OSError."""
+        for kind, name in own_names.items():
+            given = named(given, kind, str(shutil.copy(getattr(given, kind), self._received.new_file(name))))
+        return given
+
     def as_shown(self, given: Given) -> Given:
         """Names and settings for a person, who knows of a file that was sent by its own name alone."""
         for kind in KINDS:

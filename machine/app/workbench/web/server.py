@@ -11,6 +11,7 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from machine.app.workbench.bench.command_line import export_command
+from machine.app.workbench.bench.page_words import page_words
 from machine.app.workbench.bench.settings import settings_list
 from machine.app.workbench.bench.values import is_small_number
 from machine.app.workbench.printing.prints import Prints
@@ -32,7 +33,7 @@ from machine.app.workbench.web.downloads import (
 from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, refuse_closed, talk
 from machine.app.workbench.web.page import workbench_page
-from machine.app.workbench.web.prints_line import print_log, prints_line
+from machine.app.workbench.web.prints_line import print_log, print_webcam, prints_line
 from machine.app.workbench.web.profile_files import ProfileFiles
 from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.snapshot import marks_key
@@ -50,6 +51,7 @@ def application(
     event loop, all else in that of the sessions."""
     of_prints = [
         Route(BELOW + "prints/{print:int}/log", print_log(prints)),
+        Route(BELOW + "prints/{print:int}/webcam", print_webcam(prints)),
         WebSocketRoute(BELOW + "prints", prints_line(prints, workbench)),
     ]
     others = sessions.application(_of_sessions(workbench, port, uploads))
@@ -69,6 +71,8 @@ def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
         route("left/{number:int}", uploads.open_left, "POST"),
+        route("kept", uploads.list_kept),
+        route("kept/{name}", uploads.open_kept, "POST"),
         route("plan.toml", plan, need=Need.PARTS),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces, need=Need.PARTS),
@@ -105,7 +109,7 @@ def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request]
         except ClientDisconnect:  # the page has gone while it sent a file
             return Response(status_code=400)
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
-            return JSONResponse({"problem": session.refuse(error)}, status_code=422)
+            return JSONResponse({"problem": page_words(session.refuse(error))}, status_code=422)
 
     return answer
 
@@ -155,7 +159,7 @@ def _settings(files: ProfileFiles) -> Act:
         bench = replace(session.bench, given=given)
         names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
         part = request.query_params.get("part", "")
-        rows = settings_list(bench.profile, given, int(part) if is_small_number(part) else 0)
+        rows = settings_list(bench.profile, session.bench.given, int(part) if is_small_number(part) else 0)
         return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
 
     return answer

@@ -6,6 +6,7 @@ from typing import Any
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import Model
+from machine.app.workbench.bench.page_words import in_page_words, with_page_words
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.commands import Need, lacking
 from machine.app.workbench.session.session import Session
@@ -19,10 +20,19 @@ from mdp.plans.plan_file import ZONE_KINDS
 from mdp.zone import Zone
 
 MOST_FACES = 2_000_000  # that a page draws
+# Of the state: what holds sentences.
+SENTENCES = (
+    *("problem", "problems", "answers", "busy", "stopped", "lacking", "notes", "standing", "resting"),
+    *("search", "trial", "refused", "slicing", "sliced", "comparing", "compared"),
+)
 
 
 def snapshot(session: Session) -> dict[str, Any]:
-    """Everything but the triangles; small enough to be told whole whenever anything changes."""
+    """Everything but the triangles, in the page's own words; small enough to be told whole whenever anything changes."""
+    return with_page_words(_state(session), SENTENCES)
+
+
+def _state(session: Session) -> dict[str, Any]:
     bench, history, search = session.bench, session.history, session.finding.search
     standing = session.standing.now
     resting = session.resting[1] if bench.model is not None and session.resting[0] == bench.model.key else ()
@@ -92,7 +102,7 @@ def _model(model: Model) -> dict[str, Any]:
         "faces": model.faces,
         "size_mm": model.size_mm,
         "volume_mm3": model.volume_mm3,
-        "notes": model.notes,
+        "notes": in_page_words(model.notes),
         "drawn": model.faces <= MOST_FACES,
     }
 

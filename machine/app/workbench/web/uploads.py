@@ -5,6 +5,7 @@ import asyncio
 import shutil
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from starlette.requests import Request
@@ -12,6 +13,7 @@ from starlette.responses import JSONResponse, Response
 
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.profile_files import ProfileFiles
+from machine.app.workbench.work.kept_work import folders_kept, read_work
 from machine.app.workbench.work.received import remove_file
 from profiles.errors import PlanError, reason
 
@@ -55,6 +57,32 @@ class Uploads:
                 raise PlanError(f"{path.name}, left by a workbench that was killed, cannot be read: {reason(error)}") from None
 
         return await self._open(session, path.name, copy_to)
+
+    async def list_kept(self, session: Session, request: Request) -> Response:
+        """The work that was kept of other benches, the newest first; that of a newer version says so when it is opened."""
+        rows = []
+        for folder in folders_kept():
+            try:
+                work = read_work(folder)
+            except PlanError:
+                rows.append({"kept": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
+            else:
+                rows.append({"kept": folder.name, "name": work.name, "parts": work.parts, "written_s": work.written_s})
+        return JSONResponse(rows)
+
+    async def open_kept(self, session: Session, request: Request) -> Response:
+        """The same put on a bench."""
+        name = request.path_params["name"]
+        folder = next((folder for folder in folders_kept() if folder.name == name), None)
+        if folder is None:
+            raise PlanError("this work is not kept any more, or another page has opened it")
+        work = read_work(folder)
+        try:
+            given = self.profiles.copied(work.given, work.own_names)
+            await session.open_kept(replace(work, given=given))
+        except OSError as error:
+            raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
+        return JSONResponse({})
 
     async def _open(self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]]) -> Response:
         path, taken = session.received.new_file(name), False

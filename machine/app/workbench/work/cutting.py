@@ -71,11 +71,11 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
             if progress.stage == 0:
                 compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text, best)))
                 return
-            left = f"{100 * progress.best_share:.1f} % of the risky area left"
+            left = f"{100 * progress.best_share:.1f} % of the overhangs left"
             if lying is mesh:
                 best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
             otherwise = "" if lying is mesh else "laid down otherwise: "
-            tell(Searched(f"{otherwise}stage {progress.stage}, {progress.beam} in the beam, {left}", best))
+            tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
 
         return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, by_hand=locked, price=price)
 

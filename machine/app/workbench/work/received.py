@@ -28,7 +28,7 @@ class Received:
 
     def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix=PREFIX)
-        self._lock = _lock(self.path)
+        self._lock = lock_folder(self.path)
         self._numbers = itertools.count(1)
 
     @property
@@ -61,7 +61,7 @@ def tidy_left() -> tuple[Path, ...]:
     left = []
     for folder in sorted(Path(tempfile.gettempdir()).glob(f"{PREFIX}*")):
         with suppress(OSError):
-            lock = None if _is_begun(folder) else _lock(folder)
+            lock = None if _is_begun(folder) else lock_folder(folder)
             if lock is None:
                 continue
             try:
@@ -93,7 +93,7 @@ def _is_done_with(folder: Path) -> bool:
     return time.time() - marker.stat().st_mtime > KEPT_S
 
 
-def _lock(folder: Path) -> int | None:
+def lock_folder(folder: Path) -> int | None:
     """Lock a folder of this user's for this process; None when another process holds it, or where there are no such locks."""
     if fcntl is None:
         return None

@@ -93,7 +93,7 @@ STEPPERS = ("stepper_a", "stepper_b")
     ("moonraker", {"steppers": STEPPERS, "macros": ()}, (KLIPPER,),
      f"Pro calls HOME_AB, {NO_MACRO} and would pass over: it needs [gcode_macro HOME_AB]"),
     ("moonraker", {"steppers": STEPPERS}, ("own.gcode",), f"own.gcode calls CHAMBER_HEAT, {NO_MACRO}"),
-    ("octoprint", {}, (MARLIN,), "the dry run found 1 errors, the first: the part begins in air"),
+    ("octoprint", {}, (MARLIN,), "the dry run found 1 error, the first: the part begins in air"),
     ("octoprint", {}, (MARLIN, "--set", "machine.tilt.point_mm=[0, 0, -33]"),
      "was made when machine.tilt.point_mm of generic A/C table was"),
 ])  # fmt: skip

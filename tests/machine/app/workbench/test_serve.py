@@ -4,11 +4,14 @@ import json
 import signal
 import socket
 import tempfile
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from machine.app.workbench.web.serve import listen
+from machine.app.workbench.work.kept_work import kept_folder
 from mdp.save import stl
 from profiles.errors import OutputError
 from tests.machine.browser import Browser
@@ -43,6 +46,19 @@ def send(running: Running, folder: Path, name: str, content: bytes) -> int:
     return running.send(folder / name)[0]
 
 
+def wait_until_kept(since_s: float) -> None:
+    """Until all that was done on the one bench from a time on is in the state folder."""
+    end_s = time.monotonic() + 30.0
+    folder = kept_folder()
+    while not any(_is_locked(json.loads(record.read_text()), since_s) for record in folder.glob("*/work.json")):
+        assert time.monotonic() < end_s
+        time.sleep(0.05)
+
+
+def _is_locked(work: dict[str, Any], since_s: float) -> bool:
+    return bool(work["locked"]) and work["written_s"] > since_s
+
+
 def test_the_port_of_a_server_whose_lines_are_not_over_yet_is_taken_at_once() -> None:
     with listen(0) as own:
         at = own.getsockname()
@@ -60,13 +76,26 @@ def test_two_servers_never_have_one_port() -> None:
 def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and_opens_its_files(
     temporary: Path, port: str
 ) -> None:
+    began_s = time.time()
     with workbench("--port", port) as killed, killed.line() as page:
         assert send(killed, temporary, "tee.stl", TEE) == 200
         page.until(lambda state: state["model"])
+        page.do("set", key="process.walls", value="4")
+        page.do("add", normal=[0, 0, 1], offset_mm=8.0)
+        page.until(lambda state: state["parts"] == 2)
+        page.do("lock", part=2, locked=True)
+        page.until(lambda state: state["locked"] == [True])
+        wait_until_kept(began_s)
         kill(killed)
     with workbench("--port", port) as running, running.line() as page:
         assert running.port == killed.port
         assert killed.ask("")[0] == 404
+        kept = next(work for work in json.loads(running.ask("kept")[1]) if work["name"] == "tee.stl")
+        assert kept["parts"] == 2
+        assert running.ask(f"kept/{kept['kept']}", "POST", Origin=f"http://127.0.0.1:{running.port}")[0] == 200
+        again = page.until(lambda state: state["locked"] == [True])
+        assert (again["given"]["settings"], again["parts"], again["model"]["name"]) == (["process.walls=4"], 2, "tee.stl")
+        assert kept["kept"] not in [work["kept"] for work in json.loads(running.ask("kept")[1])]  # it is kept on there
         (left,) = json.loads(running.ask("left")[1])
         assert (left["name"], left["bytes"]) == ("tee.stl", len(TEE))
         own = f"http://127.0.0.1:{running.port}"

@@ -110,14 +110,14 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
     with bench.line() as page:
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
-        assert "--ranker none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
+        assert "Ranked as none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
         page.do("search", orient=False)
         as_it_lies = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
         assert not any("laid down" in note for note in as_it_lies["notes"])
         page.do("search", ranker="learned")
         laid = page.until(lambda state: state["rotation"] != as_it_lies["rotation"] and not state["search"])
         (told,) = (note for note in laid["notes"] if "laid down" in note)
-        assert told.startswith("it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars")
+        assert told.startswith("it is laid down on its front (turned 90 about x): in one piece with 0 mm² of scars")
         assert told.endswith("; Undo, then Find parts without Lay it down, too, keeps it as it stands")
         assert laid["front"][0]["support_area_mm2"] < as_it_lies["front"][0]["support_area_mm2"]
         assert bench.ask("plan.toml")[1] == (folder / "parts" / "plan.toml").read_bytes()
@@ -259,7 +259,7 @@ def test_what_is_marked_on_a_model_in_one_piece_is_in_a_plan_that_its_command_ta
         page.until(lambda state: not state["sliced"])
 
 
-def test_copies_and_pauses_are_those_of_the_command_line_and_so_are_their_sentences(bench: Running, folder: Path) -> None:
+def test_copies_and_pauses_are_the_command_line_s_and_their_sentences_name_fields(bench: Running, folder: Path) -> None:
     (folder / "box.stl").write_bytes(stl(box(8, 8, 4)))
     with bench.line() as page:
         bench.send(folder / "box.stl")
@@ -281,12 +281,12 @@ def test_copies_and_pauses_are_those_of_the_command_line_and_so_are_their_senten
         page.until(lambda state: not state["sliced"]["stale"])
         page.do("add_stop", kind="pause", at="2-3")
         assert page.until(lambda state: state["problem"])["problem"].startswith(
-            "--pause 2-3: PART:LAYER or PART:HEIGHTmm is expected"
+            "2-3 under Copies and pauses: PART:LAYER or PART:HEIGHTmm is expected"
         )
         page.do("add", normal=[0, 0, 1], offset_mm=2.0)
         page.until(lambda state: state["parts"] == 2 and not state["problem"])
         page.do("slice")
-        sentence = "--copies 2: box.stl is cut into 2 parts, copies are printed in one piece each: --parts 1"
+        sentence = "2 copies: box.stl is cut into 2 parts, copies are printed in one piece each: take 1 under In how many parts"
         assert page.until(lambda state: state["problem"])["problem"] == sentence
         bench.send(folder / "box.stl")
         page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
@@ -299,7 +299,7 @@ def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbi
         page.do("add", normal=[1, 0, 0], offset_mm=8.0)
         page.until(lambda state: state["parts"] == 2)
         page.do("set", key="process.walls", value="400")
-        assert "process.walls" in page.until(lambda state: state["problem"])["problem"]
+        assert "Walls is 400" in page.until(lambda state: state["problem"])["problem"]
         page.do("profile", kind="machine", name="three_axis")
         gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["problem"])
         assert gone["parts"] == 0

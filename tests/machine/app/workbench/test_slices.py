@@ -50,8 +50,11 @@ def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same(tmp_path
     session: Any = SimpleNamespace(slicing=SimpleNamespace(needed=lambda: SimpleNamespace(sliced=sliced)))
     session.bench = SimpleNamespace(model=SimpleNamespace(name="demo:tree"))
     refused, forced = (Request({"type": "http", "query_string": query}) for query in (b"", b"force=yes"))
-    with pytest.raises(PlanError, match="found 1 errors, the first: the nozzle touches the part: no G-code is saved unless"):
+    with pytest.raises(PlanError, match="found 1 error, the first: the nozzle touches the part: no G-code is saved unless"):
         asyncio.run(gcode(session, refused))
     answer = asyncio.run(gcode(session, forced))
     assert isinstance(answer, FileResponse)
-    assert (answer.path, answer.headers["content-disposition"]) == (sliced.gcode, 'attachment; filename="tree.gcode"')
+    assert (answer.path, answer.headers["content-disposition"]) == (
+        sliced.gcode,
+        "attachment; filename=\"tree.gcode\"; filename*=UTF-8''tree.gcode",
+    )

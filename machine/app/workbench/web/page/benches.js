@@ -56,7 +56,20 @@ function benchRow({ number, name, parts, work }) {
 
 export function benchesPanel() {
   $("another").addEventListener("click", () => openBench());
+  keptWorks();
   onState(({ benches }, before) => { if (!alike(benches, before?.benches)) showBenches(benches); });
+}
+
+/** Work that was kept of earlier benches, as one with nothing on it is offered it. */
+export async function keptWorks() {
+  const answer = await fetch("kept").catch(() => null), works = answer?.ok ? await answer.json() : [];
+  $("kept-field").hidden = !works.length;
+  $("kept-works").replaceChildren(...works.map(({ kept, name, parts, written_s: written }) => {
+    const at = new Date(1000 * written), today = at.toDateString() === new Date().toDateString();
+    const when = today ? at.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+    const open = () => fetch(`kept/${encodeURIComponent(kept)}`, { method: "POST" }).then(keptWorks, () => {}); // a refusal comes by the line
+    return made("button", { type: "button", onclick: open }, made("span", { text: `Work of ${when}` }), made("small", { text: name ? `${name}${parts ? `, ${parts} part${parts === 1 ? "" : "s"}` : ""}` : "cannot be read here" }));
+  }));
 }
 
 export async function leftFiles() {

@@ -69,7 +69,7 @@ export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParam
 export async function save(address) {
   const answer = await fetch(address);
   if (!answer.ok) return;
-  const name = /filename="([^"]+)"/.exec(answer.headers.get("content-disposition"))[1];
+  const name = decodeURIComponent(/filename\*=UTF-8''(\S+)/.exec(answer.headers.get("content-disposition"))[1]);
   const link = made("a", { href: URL.createObjectURL(await answer.blob()), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);

@@ -4,10 +4,12 @@ import { cameraOf, CORNERS, handle, VIEWS } from "../../../../view/template/came
 import { RAD } from "../../../../view/template/math.js";
 import { $, needsKey, notice } from "../../../../view/template/page.js";
 import { tabsOf } from "../../../../view/template/tabs.js";
+import { axesOf } from "./axes.js";
 import { benchesPanel } from "./benches.js";
 import { clicksOf, press } from "./clicks.js";
 import { withWholeOptions } from "./elements.js";
 import { handlesOf } from "./handles.js";
+import { keptLook } from "./kept-look.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { marksPanel } from "./marks-panel.js";
 import { modelPanel, sizePanel } from "./model-panel.js";
@@ -18,6 +20,7 @@ import { pictureOf } from "./picture.js";
 import { apartPanel } from "./pieces.js";
 import { planesPanel } from "./planes-panel.js";
 import { printFrame } from "./print-frame.js";
+import { titleOfModel } from "./print-news.js";
 import { printPanel } from "./print-panel.js";
 import { ringsOf } from "./rings.js";
 import { saveMenu } from "./save-menu.js";
@@ -32,6 +35,7 @@ function main() {
   const follow = async (state) => {
     update({ state, turning: null });
     await fetchModel(state.model, picture, () => follow(store.state));
+    look.restore();
     if (store.state.version === state.version) root.dataset.version = state.version;
   };
   openLine(follow, (how) => {
@@ -39,6 +43,7 @@ function main() {
     notice(LINE_TOLD[how], "line");
   });
   tabsOf((tab) => update({ tab }));
+  const look = keptLook(camera, picture);
   onState(tellState);
   benchesPanel();
   modelPanel();
@@ -47,7 +52,7 @@ function main() {
   planesPanel(picture);
   marksPanel(picture);
   stopsPanel();
-  slicesPanel(printFrame().showFinding);
+  slicesPanel(printFrame(camera, picture).showFinding);
   comparePanel();
   saveMenu();
   settingsPanel();
@@ -64,6 +69,7 @@ function main() {
     pedestalOf(picture);
     handle($("canvas"), camera, { changed: picture.ask, pressed: (event) => press(event, picture) });
     viewsOf(camera, picture, ringPlaces);
+    axesOf(camera, picture);
   } else {
     document.body.classList.add("no-picture");
     $("show-rings").disabled = true;
@@ -75,7 +81,7 @@ function main() {
 
 function tellState({ model, problem, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
   const root = document.documentElement;
-  document.title = model ? `${model.name} – tiltprint` : "tiltprint";
+  titleOfModel(model ? model.name : "");
   $("title").textContent = model ? model.name : "tiltprint";
   $("summary").textContent = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`;
   root.dataset.busy = busy;
@@ -118,16 +124,18 @@ function keysOf(camera, picture) {
   const keys = {
     ArrowLeft: arrow(-1, 0), ArrowRight: arrow(1, 0), ArrowUp: arrow(0, 1), ArrowDown: arrow(0, -1),
     "+": () => camera.zoom(0.85), "=": () => camera.zoom(0.85), "-": () => camera.zoom(1 / 0.85),
-    f: () => $("fit").click(), d: () => $("theme").click(), r: () => $("show-rings").click(), n: () => $("neck").click(), Escape: () => update({ clicks: "", corner: null, part: 0, hand: null }),
+    f: () => $("fit").click(), d: () => $("theme").click(), r: () => $("show-rings").click(), n: () => $("neck").click(), "?": () => $("keys").showModal(), Escape: () => update({ clicks: "", corner: null, part: 0, hand: null }),
   };
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
+  $("keys-button").addEventListener("click", () => $("keys").showModal());
+  $("keys-close").addEventListener("click", () => $("keys").close());
   addEventListener("keydown", (event) => {
     if (event.target.closest?.("[data-typing]")) return; // what is typed there has an undo of its own
     if ((event.ctrlKey || event.metaKey) && ["z", "y"].includes(event.key.toLowerCase())) {
       event.preventDefault();
       return send({ do: event.shiftKey || event.key.toLowerCase() === "y" ? "redo" : "undo" });
     }
-    if (event.ctrlKey || event.metaKey || event.altKey || needsKey(event)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || needsKey(event) || $("keys").open) return;
     const act = keys[event.key] || keys[event.key.toLowerCase()];
     if (!act) return;
     event.preventDefault();

@@ -4,8 +4,8 @@
 import { $ } from "../../../../view/template/page.js";
 import { store, subscribe, update } from "./store.js";
 
-/** {showFinding(its place in the list)}. */
-export function printFrame() {
+/** {showFinding(its place in the list)}. The two pages look from the same side: each takes the view of the other when it is shown. */
+export function printFrame(camera, picture) {
   const frame = $("print-page");
   let ready = false, waiting = [];
   const post = (message) => frame.contentWindow.postMessage(message, location.origin);
@@ -14,22 +14,28 @@ export function printFrame() {
     ready: () => {
       ready = true;
       post({ tiltprint: "theme", dark: store.dark });
+      post({ tiltprint: "view", yaw: camera.yaw, pitch: camera.pitch });
       waiting.splice(0).forEach(post);
     },
     text: async () => {
       const answer = await fetch(`${frame.getAttribute("src")}/text`);
       if (answer.ok) post({ tiltprint: "text", text: new File([await answer.blob()], "the print") });
     },
+    view: ({ yaw, pitch }) => {
+      Object.assign(camera, { yaw, pitch });
+      picture?.ask();
+    },
     leave: () => $("leave-print").click(),
   };
   addEventListener("message", ({ data, origin, source }) => {
-    if (source === frame.contentWindow && origin === location.origin) heard[data?.tiltprint]?.();
+    if (source === frame.contentWindow && origin === location.origin) heard[data?.tiltprint]?.(data);
   });
   const show = () => {
     const { state: { sliced }, looking, tab } = store, address = sliced ? `print/${sliced.key}` : "";
     document.body.classList.toggle("looking", looking && tab !== "printing");
     $("look").setAttribute("aria-pressed", looking);
     frame.hidden = $("leave-print").hidden = !looking;
+    if (looking && ready && frame.getAttribute("src") === address) post({ tiltprint: "view", yaw: camera.yaw, pitch: camera.pitch });
     if (!looking || frame.getAttribute("src") === address) return;
     [ready, waiting] = [false, []];
     frame.src = address;

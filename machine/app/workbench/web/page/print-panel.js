@@ -3,10 +3,14 @@
 
 import { $, needsKey, notice } from "../../../../view/template/page.js";
 import { alike, withWholeOptions } from "./elements.js";
+import { handPanel, showHand } from "./hand-panel.js";
 import { followIn } from "./print-frame.js";
+import { askToNotify, notifyOver, titleOfPrints } from "./print-news.js";
 import { hear, showBar, showPrint, showProgress, showWhich, silence, sure } from "./print-shown.js";
 import { OWN_PAGE, printsLine, stopsAsked } from "./prints-line.js";
 import { onState } from "./store.js";
+import { keepHeats, showHeats } from "./temperature-graph.js";
+import { webcamPanel } from "./webcam.js";
 import { chosenOr, port, SERVERS, showJournals, showPort, showPorts, unforce } from "./where-to-print.js";
 
 const STOP_KEY = "e";
@@ -36,6 +40,11 @@ export function printPanel() {
     showPrint(print(), print()?.holder === OWN_PAGE);
     follow();
     hear(state.prints);
+    showHand(print(), print()?.holder === OWN_PAGE);
+    keepHeats(state.prints);
+    showHeats(print());
+    titleOfPrints(running);
+    notifyOver(state.prints, OWN_PAGE);
     showBar(running, print());
     stops.told();
     document.documentElement.dataset.printing = print() ? print().progress?.state && print().phase === "printing" ? print().progress.state : print().phase : "";
@@ -55,6 +64,9 @@ export function printPanel() {
     send({ do: "check", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value), send_only: sendOnly, force: $("force").checked });
     unforce();
   });
+  $("hand").addEventListener("click", () => { send({ do: "hand", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value) }); unforce(); });
+  webcamPanel(print);
+  handPanel((asked) => command("by_hand", asked));
   $("follow-server").addEventListener("click", () => send({ do: "follow", port: port() }));
   $("rest-field").addEventListener("toggle", () => { if ($("rest-field").open) send({ do: "journals" }); });
   $("journal-typed").addEventListener("focus", () => { $("journal-other").checked = true; });
@@ -63,7 +75,7 @@ export function printPanel() {
     send({ do: "go_on", journal, machine: $("rest-machine").value.trim(), port: port(), baud: Number($("baud").value) });
   });
   $("which").addEventListener("change", () => { chosen = Number($("which").value); sure(false); show(state); });
-  $("begin").addEventListener("click", () => command("begin"));
+  $("begin").addEventListener("click", () => { askToNotify(); command("begin"); });
   $("leave").addEventListener("click", () => command("cancel"));
   $("break-off").addEventListener("click", () => command("cancel"));
   $("leave-printing").addEventListener("click", () => command("leave"));

@@ -37,14 +37,14 @@ export function showWhich(prints, chosen) {
 export function showPrint(print, commands) {
   $("run").hidden = !print;
   if (!print) return void ($("printer-field").open = true);
-  const { phase, progress, figures, end, upload } = print, uploads = phase === "uploading", over = phase === "over", runs = phase === "printing" || phase === "leaving";
+  const { phase, progress, figures, end, upload } = print, uploads = phase === "uploading", over = phase === "over", runs = ["printing", "hand", "leaving"].includes(phase);
   $("run-title").textContent = `${print.resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
   $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(print) : uploads && upload ? upload[0] : { checking: "checking …", ready: print.starts ? "ready to print" : "ready to be handed over", uploading: "handing the file over", printing: "starting", leaving: "ending" }[phase];
   $("run-state").className = over ? end : "";
   const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
   if ($("run-news").textContent !== news) $("run-news").textContent = news;
   const asking = !runs && !uploads && (!over || end === "refused");
-  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on because of --force` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on all the same` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
   $("ask-told").textContent = print.question || (print.starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
@@ -87,8 +87,8 @@ function showUpload(upload) {
   tellIn("run-told", []);
 }
 
-const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>
-  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} errors in the dry run` : ""}`;
+const figuresTold = ({ lines, time_s: time, filament_mm: filament, filament_g: grams, costs, errors }) =>
+  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m (${grams.toFixed(1)} g${costs ? `, ${costs}` : ""}) of filament${errors ? `, ${errors} error${errors === 1 ? "" : "s"} in the dry run` : ""}`;
 
 /** How long ago a moment was, in seconds since 1970. */
 function ago(moment_s) {
@@ -101,6 +101,7 @@ export function showProgress(print) {
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
   const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target == null ? "" : ` of ${target.toFixed(0)}`} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
   $("run-progress").value = progress.share || 0;
+  $("run-progress").hidden = phase === "hand";
   tellIn("run-told", [
     progress.part != null && ["part", of(progress.part, progress.parts)],
     progress.layer != null && ["layer", of(progress.layer, progress.layers)],

@@ -38,15 +38,15 @@ export function saveMenu() {
     $(id).querySelector("small").textContent = why || otherwise;
   };
   onState(({ lacking, sliced, compared, given }) => {
-    tell("save-plan", lacking.parts, "the command line takes it with --plan");
+    tell("save-plan", lacking.parts, "how the model lies and is cut, to be dropped here again");
     tell("save-parts", lacking.parts, "zip of an STL each, a coloured 3MF and the plan");
     tell("save-pictures", lacking.parts, "zip of PNGs: the parts, the print order, every number of parts");
-    tell("save-gcode", lacking.slices, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
+    tell("save-gcode", lacking.slices, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "for the printer");
     for (const [kind, sections] of Object.entries(SECTIONS_OF)) {
       const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length;
-      const name = given[kind].split(/[\\/]/).at(-1), changed = `${name} with ${count} change${count === 1 ? "" : "s"}: --${kind} takes it, profiles save writes the same`;
+      const name = given[kind].split(/[\\/]/).at(-1), changed = `${name} with ${count} change${count === 1 ? "" : "s"}, to be dropped here again`;
       tell(`save-${kind}`, count ? "" : `nothing of ${name} is changed`, changed);
     }
-    tell("save-page", lacking.slices, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
+    tell("save-page", lacking.slices, `one HTML file to open anywhere${compared.length ? ", with the comparison" : ""}`);
   });
 }

@@ -1,13 +1,21 @@
-// Settings panel: the profile's own keys in groups, searched by a word; of all parts or of one; what is changed is marked.
+// Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
+// changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
 import { $, made } from "../../../../view/template/page.js";
 import { alike, putRows } from "./elements.js";
+import { keptInTab } from "./kept.js";
 import { ask, send } from "./line.js";
+import { settingRow } from "./setting-row.js";
 import { onState, store } from "./store.js";
+
+const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
+const KIND_OF = { machine: "machine", material: "material", process: "process", search: "process" };
+const kept = keptInTab("settings", { level: "simple", folded: [] });
 
 export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
-  let settings = [], missed = false; // missed: they have not come
+  const explained = new Set();
+  let settings = [], missed = false, changedOnly = false; // missed: they have not come
   const part = () => Number($("settings-part").value) || 0;
   const set = (key, value, typed) => {
     const of = part();
@@ -25,18 +33,35 @@ export function settingsPanel() {
     const beside = [...wrongs.values()].some(({ text }) => text === store.state.problem);
     if (beside && store.tab === "settings") $("problem").hidden = true;
   };
-  const shown = ({ key, meaning, about, changed }) => {
-    const words = $("search-settings").value.toLowerCase().split(/\s+/), text = `${key} ${meaning} ${about}`.toLowerCase();
-    return words.every((word) => text.includes(word)) && (changed || wrongs.has(key) || !$("only-changed").checked);
+  const sought = () => $("search-settings").value.toLowerCase().split(/\s+/).filter(Boolean).map(stem);
+  const shown = (setting) => {
+    const marked = setting.changed || wrongs.has(setting.key), words = sought();
+    if (changedOnly) return marked && hasWords(setting, words);
+    return words.length ? hasWords(setting, words) : marked || LEVELS.indexOf(setting.level) <= LEVELS.indexOf(kept.now.level);
   };
   const list = () => {
-    const rows = settings.filter(shown), changed = settings.filter((setting) => setting.changed).length;
-    $("settings-count").textContent = `${rows.length} of ${settings.length}, ${changed} changed`;
-    $("reset-settings").disabled = !changed;
-    putRows(rows.flatMap((setting, k) => {
-      const wrong = wrongs.get(setting.key), title = rows[k - 1]?.group === setting.group ? [] : [groupTitle(setting)];
-      return [...title, { id: setting.key, told: JSON.stringify([setting, wrong]), make: () => settingRow(setting, wrong, set, list) }];
+    const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0;
+    if (changedOnly && !changed.length) return showChanged(false);
+    $("settings-count").textContent = rows.length ? `${rows.length} of ${settings.length} settings` : "No setting has these words.";
+    $("only-changed").textContent = `${changed.length} changed`;
+    $("only-changed").disabled = !changed.length;
+    tellTakeBack(changed, part());
+    for (const level of LEVELS) $(`level-${level}`).setAttribute("aria-pressed", kept.now.level === level);
+    const groups = groupedBy(rows, ({ group }) => group);
+    putRows([...groups].flatMap(([group, own]) => {
+      const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
+      const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key)]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
+      return [title, ...(folded ? [] : own.map(row))];
     }), $("settings-list"));
+  };
+  const fold = (group, folded) => {
+    kept.keep({ folded: [...kept.now.folded.filter((name) => name !== group), ...(folded ? [group] : [])] });
+    list();
+  };
+  const showChanged = (only) => {
+    changedOnly = only;
+    $("only-changed").setAttribute("aria-pressed", only);
+    list();
   };
   const fetchAll = async () => {
     const asked = part(), answer = await fetch(`settings.json?part=${asked}`).catch(() => null);
@@ -58,9 +83,11 @@ export function settingsPanel() {
     $("settings-part").replaceChildren(...names.map((text, k) => made("option", { text, value: k, selected: k === chosen })));
   };
   $("search-settings").addEventListener("input", list);
-  $("only-changed").addEventListener("change", list);
+  $("only-changed").addEventListener("click", () => showChanged(!changedOnly));
+  for (const level of LEVELS) $(`level-${level}`).addEventListener("click", () => { kept.keep({ level }); list(); });
   $("settings-part").addEventListener("change", () => { wrongs.clear(); fetchAll(); });
   $("reset-settings").addEventListener("click", () => send(part() ? { do: "reset_part", part: part() } : { do: "reset" }));
+  for (const kind of new Set(Object.values(KIND_OF))) $(`reset-${kind}`).addEventListener("click", () => send({ do: "reset", kind }));
   $("copy-command").addEventListener("click", () => copyText($("command-line"), $("copy-command")));
   const ofSettings = ({ given, part_settings: own, parts, model, rotation, stops, copies } = {}) => [given, own, parts, model?.name, rotation, stops, copies];
   onState((state, before) => {
@@ -80,61 +107,38 @@ function showProfiles(profiles) {
   putRows(rows, $("profiles-list"));
 }
 
-function groupTitle({ group, about }) {
-  const text = `${group.split(":")[0]}: ${about[0].toLowerCase()}${about.slice(1)}`;
-  return { id: `group ${group}`, told: text, make: () => made("h3", { text }) };
+/** A word finds its plural, too, and the other way round. */
+const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); // a key stays whole
+
+/** The words by which a setting is found, those that say most first. */
+const textsOf = ({ key, label, title, synonyms, meaning, about }) => [`${label} ${key}`, synonyms, `${title} ${meaning} ${about}`].map((text) => text.toLowerCase());
+const hasWords = (setting, words) => words.every((word) => textsOf(setting).join(" ").includes(word));
+
+/** How late the words that are sought come: 0, where the label itself or the key has one. */
+const farFrom = (setting, words) => (words.length ? textsOf(setting).findIndex((text) => words.some((word) => text.includes(word))) : 0);
+
+function groupedBy(rows, nameOf) {
+  const groups = new Map();
+  for (const row of rows) groups.set(nameOf(row), [...(groups.get(nameOf(row)) || []), row]);
+  return groups;
 }
 
-/** A key that is broken between its words where it is too long for a line. */
-const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
-
-/** again(): called when a person leaves what was typed in, for what has been told meanwhile. */
-function settingRow(setting, wrong, set, again) {
-  const { key, meaning, kind, least, most, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
-  const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
-  const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
-  input.setAttribute("aria-describedby", told.id);
-  input.setAttribute("aria-invalid", Boolean(wrong));
-  const back = made("button", { type: "button", text: "↺", title: "As it was", ariaLabel: `${key} as it was`, hidden: !changed && !wrong, onclick: () => set(key, null) });
-  const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
-  const row = settingBox(setting, [made("label", {}, made("span", {}, ...breakable(key)), input, back), refused, told, named]);
-  input.addEventListener("input", () => { row.dataset.typing = kind; });
-  input.addEventListener("change", () => set(key, typedIn(input, kind, optional), typedAs(input, kind)));
-  for (const done of ["change", "blur"]) {
-    input.addEventListener(done, () => {
-      if (!row.dataset.typing) return;
-      delete row.dataset.typing;
-      if (done === "blur") again();
-    });
+/** Whose changes there are, with a button for each profile that has some, and one for all. */
+function tellTakeBack(changed, part) {
+  const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
+  for (const kind of new Set(Object.values(KIND_OF))) {
+    const count = counts.get(kind)?.length || 0;
+    $(`reset-${kind}`).textContent = `Those of the ${kind} (${count})`;
+    $(`reset-${kind}`).hidden = part > 0 || !count || counts.size < 2;
   }
-  return row;
+  $("reset-settings").textContent = part ? `Take back what part ${part} has of its own (${changed.length})` : counts.size === 1 ? `Take the changes of the ${[...counts.keys()][0]} back (${changed.length})` : `Take all changes back (${changed.length})`;
+  $("reset-settings").disabled = !changed.length;
 }
 
-function settingBox({ key, changed }, children) {
-  const row = made("div", { className: changed ? "setting changed" : "setting" }, ...children);
-  row.dataset.key = key;
-  return row;
-}
-
-function inputOf({ kind, choices, least, most }, value) {
-  const typed = value ?? "";
-  if (kind === "choice") return made("select", {}, ...choices.map((text) => made("option", { text, value: text, selected: String(text) === String(value) })));
-  if (kind === "boolean") return made("input", { type: "checkbox", checked: value });
-  if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: typed });
-  if (kind === "block" || kind === "rows") return made("textarea", { value: typed, rows: Math.min(Math.max(String(typed).split("\n").length, 2), 14), spellcheck: false, wrap: kind === "block" ? "off" : "soft" });
-  const limits = { ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) };
-  return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: typed, ...limits });
-}
-
-const typedAs = (input, kind) => (kind === "boolean" ? input.checked : input.value);
-
-/** What a person has typed or chosen, as --set takes it; null, for nothing where there must be something: as the profile has it. */
-function typedIn(input, kind, optional) {
-  if (kind === "boolean") return `${input.checked}`;
-  const text = kind === "block" ? input.value : input.value.trim();
-  if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // which TOML reads, too
-  if (!text) return optional ? "" : null;
-  return kind === "numbers" ? `[${text}]` : text;
+function groupTitle(own, folded, turn) {
+  const [{ group, title, about }] = own, told = JSON.stringify([title, own.length, folded]);
+  const button = () => made("button", { type: "button", title: `${about}.`, ariaExpanded: String(!folded), onclick: turn }, made("span", { text: title }), made("small", { text: own.length }));
+  return { id: `group ${group}`, told, make: () => made("h3", {}, button()) };
 }
 
 /** A text into the clipboard, or marked for the person to take where the browser allows no more. */

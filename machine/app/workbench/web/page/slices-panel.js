@@ -9,6 +9,7 @@ export function slicesPanel(showFinding) {
   $("slice").addEventListener("click", () => send({ do: "slice" }));
   $("again").addEventListener("click", () => { update({ looking: false }); $("tab-slices").click(); send({ do: "slice" }); });
   $("stop-slicing").addEventListener("click", () => send({ do: "stop" }));
+  $("verdict-print").addEventListener("click", () => $("tab-printing").click());
   $("look").addEventListener("click", () => update({ looking: !store.looking }));
   $("leave-print").addEventListener("click", () => { update({ looking: false }); $("look").focus(); });
   onState((state, before) => {
@@ -21,10 +22,23 @@ export function slicesPanel(showFinding) {
     document.body.classList.toggle("stale", stale);
     if (alike(sliced, before?.sliced)) return;
     if (!sliced) update({ looking: false });
-    tellIn("sliced-told", sliced ? [["takes", duration(sliced.time_s)], ["filament", `${(sliced.filament_mm / 1000).toFixed(2)} m`]] : []);
+    tellIn("sliced-told", sliced ? [["takes", duration(sliced.time_s)], ["filament", `${(sliced.filament_mm / 1000).toFixed(2)} m, ${sliced.filament_g.toFixed(1)} g`], ...(sliced.costs ? [["costs", sliced.costs]] : [])] : []);
+    if (sliced) showVerdict(sliced.verdict, showFinding);
     putTable($("joints"), sliced?.joints || [], JOINT_HEAD, () => (sliced?.joints || []).map(jointRow));
     showFindings(sliced, showFinding);
   });
+}
+
+/** Whether it can be printed, in one sentence, with a button for what a button can do. */
+function showVerdict({ kind, text, finding, remedy }, showFinding) {
+  $("verdict").className = `sliced ${kind}`;
+  $("verdict-told").textContent = `${text}.`;
+  $("verdict-remedy").hidden = !remedy;
+  $("verdict-remedy").textContent = remedy?.text || "";
+  $("verdict-remedy").onclick = () => send(remedy.command);
+  $("verdict-show").hidden = finding < 0;
+  $("verdict-show").onclick = () => showFinding(finding);
+  $("verdict-print").hidden = kind !== "ready";
 }
 
 /** Of every part how much is sliced; the whole as one bar where there is one part. */
@@ -89,6 +103,7 @@ function stopRow({ part, layer, height_mm: height, change }, remove) {
 const COSTS = [
   ["time", ({ time_s: seconds }) => roughly(seconds)],
   ["plastic", ({ filament_g: grams }) => `${grams.toFixed(1)} g`],
+  ["costs", ({ costs }) => costs],
   ["of it support", ({ support_mm3: volume }) => `${(volume / 1000).toFixed(2)} cm³`],
   ["scars of support", ({ support_area_mm2: area }) => mm2(area)],
   ["seams between parts", ({ seam_mm: long }) => `${long.toFixed(0)} mm`],
@@ -106,7 +121,7 @@ export function comparePanel() {
     if (alike(compared, before?.compared)) return;
     const [, standing, lying] = compared, shown = compared.filter((alternative) => alternative !== lying || lying.note !== standing.note);
     const head = made("tr", {}, made("td"), ...shown.map(({ name }) => made("th", { text: name, scope: "col" })));
-    const rows = COSTS.map(([name, of]) => made("tr", {}, made("th", { text: name, scope: "row" }), ...shown.map((alternative) => made("td", { text: alternative.time_s === null ? "–" : of(alternative) }))));
+    const priced = compared.some(({ costs }) => costs), rows = COSTS.filter(([name]) => priced || name !== "costs").map(([name, of]) => made("tr", {}, made("th", { text: name, scope: "row" }), ...shown.map((alternative) => made("td", { text: alternative.time_s === null ? "–" : of(alternative) }))));
     $("compared").replaceChildren(...(compared.length ? [made("thead", {}, head), made("tbody", {}, ...rows)] : []));
     listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
   });

@@ -253,7 +253,7 @@ class Heard:
     (ResumeOrder(Path("any.journal"), PrintRequest("sim")), "--port sim: a simulated printer ends with its print", False),
     (FollowOrder(PrintRequest("duet:127.0.0.1:9")), "duet:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9", False),
     (order("octoprint:127.0.0.1:9"), "octoprint:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9: is OctoPrint", False),
-    (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 errors, the first: X goes to 500 mm", True),
+    (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 error, the first: X goes to 500 mm", True),
     (replace(order("sim"), gcode=Path("gone.gcode")), "these slices are not there any more: slice what is to be printed", False),
 ])  # fmt: skip
 def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence: str, forcible: bool) -> None:
@@ -376,7 +376,9 @@ def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
         obey(page_of(prints_with_one()), {"do": "feed", "print": 1, "percent": percent})
 
 
-@pytest.mark.parametrize("name", sorted({*COMMANDS} - {"ports", "journals", "check", "go_on", "follow", "emergency", "take"}))
+@pytest.mark.parametrize(
+    "name", sorted({*COMMANDS} - {"ports", "journals", "check", "go_on", "follow", "hand", "emergency", "take"})
+)
 def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_at_once(name: str) -> None:
     prints = prints_with_one()
     with pytest.raises(PrinterError, match="another page commands this print"):

@@ -1,0 +1,98 @@
+"""Page words: a sentence of the program, which speaks to a terminal, as the workbench's page says it.
+
+Sentences are made once, below, and name options and keys; here alone they get the page's own fields and labels.
+"""
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from profiles.labels.labels import LABELS, group_title
+
+# The label of a key that a sentence names without its table: of several the process's own.
+_NAMES = [(*key.split("."), label.text) for key, label in LABELS.items() if not key.startswith("machine.")]
+_BARE = {name: text for section, name, text in sorted(_NAMES, key=lambda named: named[0] == "process") if "_" in name}
+_PAUSES = "under Copies and pauses"
+# Option or aside -> what the page has in its place; the first that fits goes first.
+RULES = (
+    (r" \(simulate lists all, --force goes on\)", " (tick Go on all the same to print it nevertheless)"),
+    (r"--force goes on", "tick Go on all the same to print it nevertheless"),
+    (r"; going on because of --force", "; going on all the same"),
+    (r" ?\(--force\)", ""),
+    (r"--parts (\d+): (the search found|the plan has|.* no more than)", r"\1 parts were asked for: \2"),
+    (r": --parts 1 prints it in one piece", ": take 1 under In how many parts"),
+    (r": --parts (\d+)", r": take \1 under In how many parts"),
+    (r"and --parts N takes it", "and another number can be taken under In how many parts"),
+    (r"--parts (is )?(\d+)", r"the number of parts \1\2"),
+    (r"--copies is", "Copies is"),
+    (r"--copies (\d+)", r"\1 copies"),
+    (r"--pause (\d+:[\d.]+(?:mm)?)(?=[, (]|$)", r"the pause at \1"),
+    (r"--filament-change (\d+:[\d.]+(?:mm)?)(?=[, (]|$)", r"the filament change at \1"),
+    (r"--(pause|filament-change) (\S+): ", rf"\2 {_PAUSES}: "),
+    (r"--part \d+:", "its own "),
+    (r"--ranker ([^:]*): ", r"Ranked as \1: "),
+    (r"give --set (\S+)=([\d.e+-]+)", r"set \1 to \2"),
+    (r": --set (\S+?)=\.\.\. sets it", ": set it for all parts"),
+    (r"--set (\S+?)=(\S+)", r"\1 = \2"),
+    (r"use --baud (\d+)", r"choose the baud rate \1"),
+    (r"try --baud", "try the baud rate"),
+    (r"is --baud the", "is the baud rate the"),
+    (r"its rate for --baud", "its baud rate"),
+    (r"--baud N tries another", "try another baud rate"),
+    (r"--sim-speed is", "the speed of the simulated printer is"),
+    (r"--port (\S+) is a", r"\1 is a"),
+    (r"--port sim: ", ""),
+    (r"send without --start hands a file over meanwhile", "tick Only hand the file over meanwhile"),
+    (r"(and )?name that( profile)? with --machine", r"\1name that\2 under Homed as in"),
+    (r"--machine must be one of those, as", "take a machine of those under Settings, as"),
+    (r"--machine gives", "Homed as in names"),
+    (r"; resume can be tried again|(?<=: when it has come to rest), resume can be tried again", ", try it again"),
+    (r": decompose --planes \S+ has it found", ": leave the part out of the plan and have it found by Find the others"),
+    (r" \((?:criterion [IV]+|\[\[keep\]\])\)", ""),
+    (r"--as-is keeps it", "Undo keeps it"),
+    (r"`profiles show` lists them", "Settings lists them"),
+    (r"\bmm2\b", "mm²"),
+    (r"\bmm3\b", "mm³"),
+)
+_RULES = [(re.compile(pattern), replacement) for pattern, replacement in RULES]
+_TINY = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?e-(?:0[4-9]|[1-9]\d)(?= mm| deg| °)")
+_KEY = re.compile(r"(?<![\w./\[-])(?:process|material|machine|search)(?:\.[a-z][a-z0-9_]*)+(?![\w.]*[\w])")
+_WORD = re.compile(r"(?<![\w./-])(?:" + "|".join(sorted(map(re.escape, _BARE), key=len, reverse=True)) + r")(?![\w/-])")
+
+
+def page_words(sentence: str) -> str:
+    """The sentence with the page's fields in the place of options, labels in that of keys, and nothing smaller than can be seen.
+
+    >>> page_words("process.walls is -3: it must be a whole number from 0 to 50")
+    'Walls is -3: it must be a whole number from 0 to 50'
+    >>> page_words("4 parts would save 21 mm2 of scars but take 12 min longer: --parts 4")
+    '4 parts would save 21 mm² of scars but take 12 min longer: take 4 under In how many parts'
+    """
+    for pattern, replacement in _RULES:
+        sentence = pattern.sub(replacement, sentence)
+    sentence = _KEY.sub(_label, _TINY.sub("less than 0.001", sentence))
+    if "placeholder" in sentence:  # of a block of G-code, which are called as keys
+        return sentence
+    return _WORD.sub(lambda word: _BARE[word[0]], sentence)
+
+
+def in_page_words(value: Any) -> Any:
+    """All sentences of plain values, in lists and tables, too, as the page says them; what is no text stays."""
+    if isinstance(value, str):
+        return page_words(value)
+    if isinstance(value, dict):
+        return {key: in_page_words(inner) for key, inner in value.items()}
+    return [in_page_words(inner) for inner in value] if isinstance(value, list | tuple) else value
+
+
+def with_page_words(table: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
+    """A table with the sentences of these keys as the page says them."""
+    return table | {key: in_page_words(table[key]) for key in keys if key in table}
+
+
+def _label(key: re.Match[str]) -> str:
+    label = LABELS.get(key[0])
+    if label is None:
+        return key[0]
+    table = key[0].rpartition(".")[0]
+    return f"{group_title(table)}: {label.text}" if table.count(".") else label.text

@@ -1,0 +1,212 @@
+"""At hand: a printer that a person heats and moves from a page, with nothing printed.
+
+The rules: nothing is homed while the table is tilted or nobody knows how it stands; the head is moved only after it was homed
+here, inside the machine's limits and above the table; heaters that nobody has asked anything of for half an hour go off, and so
+do all at the end unless the person says otherwise.
+"""
+
+from contextlib import ExitStack
+from math import inf
+from queue import Empty
+from time import monotonic, time
+
+import numpy as np
+
+from machine.app.printer.command_session import CommandSession, LeftError, StopError
+from machine.app.printer.compatibility import check_machine, check_speed, describe_answer, identify_printer
+from machine.app.printer.server_checks import check_no_server
+from machine.app.requests import SIMULATED
+from machine.app.workbench.printing.at_page import AtPage
+from machine.app.workbench.printing.checks import Checks
+from machine.app.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
+from machine.firmware import dialect_of
+from machine.gcode.blocks import filled_start
+from machine.kinematics.table import machine_points
+from machine.link.pending_commands import Command
+from machine.link.port import open_port
+from machine.simulator.simulator import SimulatedPrinter
+from mdp.pose import level
+from profiles.errors import MoveError, PrinterError
+from profiles.machine import Machine
+
+LOOK_S = 1.0  # between questions after temperatures and place
+IDLE_S = 1800.0
+LEVEL_DEG = 0.05  # M114 reports hundredths
+MOST_JOG_MM = 100.0
+JOG_MM_S = {"X": 50.0, "Y": 50.0, "Z": 10.0}
+HEATS = ("M104", "M109", "M140", "M190")
+
+
+def by_hand(order: HandOrder, person: AtPage, checks: Checks) -> State:
+    """Do what the person asks for until he lets go; how it ended."""
+    printing, machine = order.printing, order.profile.machine
+    check_speed(printing.sim_speed)
+    check_no_server(printing.port)
+    with ExitStack() as stack:
+        simulated = printing.port == SIMULATED
+        path = stack.enter_context(SimulatedPrinter(machine, printing.sim_speed or inf)).path if simulated else printing.port
+        wire = stack.enter_context(open_port(path, printing.baud))
+        answer = identify_printer(wire, printing.baud)
+        with checks.that(describe_answer(answer, printing.baud)):
+            check_machine(None if simulated else answer, machine, force=False)
+        session = CommandSession(wire, dialect_of(machine).longest_line)
+        person.interrupt = lambda word: session.order(StopError if word == Command.EMERGENCY_STOP else LeftError)
+        session.greet()
+        return Hand(order, session, checks).serve(person)
+
+
+class Hand:
+    """A session at a printer that is greeted."""
+
+    def __init__(self, order: HandOrder, session: CommandSession, checks: Checks) -> None:
+        self._profile, self._session, self._tell = order.profile, session, checks.reporter.tell
+        self._homed = False
+        self._problem = ""
+        self._began_s = self._asked_s = monotonic()
+        self._looked_s = -inf
+        self._moments = 0
+
+    def serve(self, person: AtPage) -> State:
+        """Until the person lets go, nobody is there any more, or nothing was asked for so long."""
+        keep_heat = idle = False
+        try:
+            while not person.lets_go():
+                try:
+                    command = person.by_hand.get_nowait()
+                except Empty:
+                    idle = monotonic() - self._asked_s > IDLE_S
+                    if idle:
+                        break
+                    self._listen()
+                    continue
+                self._asked_s = monotonic()
+                if command.does == HandDoes.LET_GO:
+                    keep_heat = command.keep_heat
+                    break
+                self._do(command)
+        except StopError:
+            raise self._session.stop() from None
+        except LeftError:
+            pass
+        except PrinterError as error:
+            off = self._session.give_up()
+            raise type(error)(f"{error}{'' if off else '; its heaters may still be on, look at the printer'}") from None
+        self._tell(phase="leaving")
+        return self._ended(keep_heat, idle)
+
+    def _ended(self, keep_heat: bool, idle: bool) -> State:
+        heated = self._session.heated()
+        if keep_heat:
+            return {"end": "done", "sentence": f"let go of; {heated} stays on" if heated else "let go of; no heater is on"}
+        if not self._session.switch_off():
+            raise PrinterError("the printer did not confirm that its heaters are off: look at it")
+        why = "nothing was asked for half an hour" if idle else "let go of"
+        return {"end": "done", "sentence": f"{why}; the heaters are off"}
+
+    def _listen(self) -> None:
+        self._session.listen()
+        if monotonic() - self._looked_s > LOOK_S:
+            self._look()
+
+    def _look(self) -> None:
+        """Ask after temperatures and place, and tell them."""
+        for command in ("M105", "M114"):
+            self._session.command(command)
+        self._looked_s = monotonic()
+        self._moments += 1
+        heat = self._session.heat
+        self._tell(
+            phase="hand",
+            progress={
+                "state": "in hand",
+                "share": None,
+                "left_s": None,
+                "message": self._problem,
+                "moment": self._moments,
+                "nozzle_c": heat.nozzle_c,
+                "nozzle_target_c": heat.nozzle_target_c,
+                "heat_s": time(),
+                "heat_is_old": False,
+                "bed_c": heat.bed_c,
+                "bed_target_c": heat.bed_target_c,
+                "at": {letter: place for letter, place in self._at().items() if letter != "E"},
+                "elapsed_s": monotonic() - self._began_s,
+                "homed": self._homed,
+                "feed_percent": 100,
+                "flow_percent": 100,
+            },
+        )
+
+    def _at(self) -> dict[str, float]:
+        return {} if self._session.position is None else dict(self._session.position.axes)
+
+    def _do(self, command: HandCommand) -> None:
+        """One command; what cannot be done is told, and nothing moves."""
+        try:
+            lines = self._lines(command)
+        except MoveError as error:
+            self._problem = str(error)
+        else:
+            self._problem = ""
+            for line in lines:
+                self._session.command(line)
+            self._homed = self._homed or command.does == HandDoes.HOME
+        self._look()
+
+    def _lines(self, command: HandCommand) -> list[str]:
+        material, machine = self._profile.material, self._profile.machine
+        if command.does == HandDoes.HEAT:
+            bed = [f"M140 S{material.bed_c:g}"] if machine.bed_limit_c > 0.0 else []
+            return [*bed, f"M104 S{material.first_layer_nozzle_c:g}"]
+        if command.does == HandDoes.COOL:
+            return ["M104 S0", "M140 S0"]
+        if command.does == HandDoes.JOG and not self._homed:
+            raise MoveError("the head is moved only once it was homed here: home it first")
+        self._session.command("M114")
+        check_level(machine, self._at(), homing=command.does == HandDoes.HOME)
+        if command.does == HandDoes.HOME:
+            return homing_lines(filled_start(self._profile))
+        target_mm = jog_target_mm(machine, self._at(), command.axis, command.by_mm)
+        return ["G21", "G90", f"G1 {command.axis}{target_mm:.3f} F{JOG_MM_S[command.axis] * 60.0:g}"]
+
+
+def check_level(machine: Machine, at: dict[str, float], *, homing: bool) -> None:
+    """Raises MoveError where the table is tilted, or the printer does not tell how it stands. One that has just been switched on
+    tells where its firmware believes itself then: it may be homed, for the page has asked whether the table is level."""
+    if not machine.tilts or (homing and _has_just_begun(machine, at)):
+        return
+    tilt = at.get(machine.tilt.letter)
+    if tilt is None:
+        raise MoveError("the printer does not tell how the table stands, so nothing is moved: level it at the machine")
+    if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG:
+        raise MoveError(f"the table is tilted, at {machine.tilt.letter}{tilt:.2f}: nothing is homed or moved before it is level")
+
+
+def _has_just_begun(machine: Machine, at: dict[str, float]) -> bool:
+    believed = zip(("X", "Y", "Z", machine.tilt.letter, machine.turn.letter), machine.home, strict=True)
+    return all(letter in at and abs(at[letter] - home) < LEVEL_DEG for letter, home in believed)
+
+
+def homing_lines(start: list[str]) -> list[str]:
+    """How a start block homes: its lines up to the last G28, without those that heat, and what calls the table level right after
+    it. Raises MoveError where it homes nothing."""
+    words = [line.upper().split() for line in start]
+    last = max((k for k, (code, *_) in enumerate(words) if code == "G28"), default=-1)
+    if last < 0:
+        raise MoveError("the start block of this machine homes nothing (G28): home it at the machine")
+    while last + 1 < len(words) and words[last + 1][0] == "G92" and not any(word.startswith("E") for word in words[last + 1]):
+        last += 1
+    return [line for line, (code, *_) in zip(start[: last + 1], words, strict=False) if code not in HEATS]
+
+
+def jog_target_mm(machine: Machine, at: dict[str, float], axis: str, by_mm: float) -> float:
+    """Where a jog ends. Raises MoveError outside the limits, or below the table."""
+    axes = {"X": machine.x, "Y": machine.y, "Z": machine.z}
+    if axis not in axes or axis not in at or not abs(by_mm) <= MOST_JOG_MM:
+        raise MoveError(f"X, Y and Z are moved by up to {MOST_JOG_MM:g} mm at a time")
+    target_mm, (least_mm, most_mm) = at[axis] + by_mm, axes[axis].limits_mm
+    if axis == "Z":
+        least_mm = max(least_mm, float(machine_points(machine, level(machine), np.zeros((1, 3)))[0, 2]))
+    if not least_mm <= target_mm <= most_mm:
+        raise MoveError(f"{axis} would be {target_mm:.2f} mm: {least_mm:g} to {most_mm:g} are allowed")
+    return target_mm

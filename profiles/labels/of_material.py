@@ -1,0 +1,35 @@
+"""Labels of a material."""
+
+from profiles.labels.label import Label, advanced, rare, simple
+
+MATERIAL: dict[str, Label] = {
+    "name": rare("Name of the material", "filament"),
+    "diameter_mm": simple("Filament diameter"),
+    "density_g_cm3": advanced("Density", "filament weight grams"),
+    "price_per_kg": simple("Price per kilogram", "filament cost spool money"),
+    "currency": simple("Currency of the price", "filament cost money euro dollar"),
+    "nozzle_c": simple("Nozzle temperature", "hotend extruder printing heat"),
+    "first_layer_nozzle_c": simple("First layer nozzle temperature", "initial layer hotend extruder heat"),
+    "homing_nozzle_c": advanced("Nozzle temperature while homing", "preheat ooze hotend"),
+    "standby_c": advanced("Nozzle temperature while paused", "standby idle hotend"),
+    "bed_c": simple("Bed temperature", "heatbed build plate heat"),
+    "fan": simple("Part fan, at most", "cooling fan speed maximum"),
+    "fan_least": simple("Part fan, at least", "cooling fan speed minimum"),
+    "fan_layer_time_s": advanced("Least fan in layers longer than", "cooling layer time"),
+    "fan_bridge": advanced("Part fan on bridges and overhangs", "cooling bridging bridges fan speed"),
+    "fan_infill_bridge": rare("Part fan over infill", "cooling internal bridge fan speed"),
+    "fan_off_layers": advanced("First layers without fan", "cooling disable fan no cooling initial"),
+    "fan_full_layer": advanced("Full fan from layer", "cooling full fan speed at layer"),
+    "interlayer_strength_mpa": rare("Strength across layers", "tensile bond"),
+    "cold_weld_factor": rare("Strength on cold plastic, as a share", "tensile bond weld"),
+    "bridge_longest_mm": advanced("Longest bridge of this material", "bridging supports"),
+    "flow": simple("Flow", "extrusion multiplier flow ratio"),
+    "retract_mm": simple("Retraction", "retract length retraction distance stringing oozing"),
+    "retract_speed_mm_s": advanced("Retraction speed", "retract deretraction"),
+    "wipe_mm": advanced("Wipe", "retract retraction wipe while retracting stringing"),
+    "coast_mm": advanced("Coasting", "coast end of path ooze"),
+    "retract_prime_extra_mm": advanced("Extra filament after a retraction", "retract extra restart length deretraction"),
+    "prime_extra_mm": advanced("Extra filament after a turn of the table", "retract restart length prime"),
+    "pressure_advance": advanced("Pressure advance", "linear advance K"),
+    "volumetric_limit_mm3_s": advanced("Most plastic melted", "maximum volumetric speed flow limit"),
+}

@@ -1,0 +1,128 @@
+"""Work that is kept by itself: what lies on a bench, written to a folder and opened again, or refused with a sentence."""
+
+import asyncio
+import errno
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from machine.app.requests import Given
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.session import keeping
+from machine.app.workbench.session.keeping import Keeping
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.work import kept_work
+from machine.app.workbench.work.kept_work import MOST_KEPT, RECORD, folders_kept, new_folder, read_work, write_work
+from machine.app.workbench.work.received import lock_folder
+from machine.app.workbench.work.worker_pool import WorkerPools
+from machine.planning.stops import parse_stops
+from mdp.plans.plan_file import PlannedPart
+from mdp.plans.reading import read_plan
+from mdp.save import stl
+from profiles.errors import PlanError
+from profiles.profile import load
+from tests.machine.app.workbench.models import model
+from tests.shapes import tee
+
+LOW, HIGH = PlannedPart((0.0, 0.0, 1.0), 10.0), PlannedPart((0.0, 0.0, 1.0), 30.0)
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    file = tmp_path / "tee \u732b.stl"
+    file.write_bytes(stl(tee()))
+    return Bench(
+        load(settings=["process.walls=4"]),
+        replace(model(), path=file, name=file.name),
+        cuts=(LOW, HIGH),
+        locked=frozenset({HIGH}),
+        given=Given(settings=("process.walls=4",)),
+        stops=parse_stops(["1:3"], ["2:1.5mm"]),
+        copies=1,
+    )
+
+
+def test_what_lies_on_a_bench_is_read_as_it_was_written(bench: Bench) -> None:
+    folder = new_folder()
+    write_work(folder, bench)
+    write_work(folder, bench)
+    work = read_work(folder)
+    assert (work.name, work.given, work.rotation) == ("tee \u732b.stl", bench.given, bench.rotation)
+    assert (work.locked, work.pauses, work.changes, work.parts) == ((1,), ("1:3",), ("2:1.5mm",), 3)
+    assert work.model is not None
+    assert work.model.read_bytes() == stl(tee())
+    assert work.plan is not None
+    assert read_plan(work.plan).parts == (LOW, HIGH)
+    assert len(list(folder.iterdir())) == 3  # record, plan, model
+
+
+def test_profiles_that_are_files_are_kept_with_their_names(bench: Bench, tmp_path: Path) -> None:
+    own = tmp_path / "mine.toml"
+    own.write_text("[material]\n")
+    folder = new_folder()
+    write_work(folder, replace(bench, given=Given(material=str(own))))
+    own.unlink()
+    work = read_work(folder)
+    assert work.own_names == {"material": "mine.toml"}
+    assert Path(work.given.material).read_text() == "[material]\n"
+
+
+def test_work_of_a_newer_version_is_refused_and_stays(bench: Bench) -> None:
+    folder = new_folder()
+    write_work(folder, bench)
+    (folder / RECORD).write_text(json.dumps({"version": 2}))
+    with pytest.raises(PlanError, match="kept by a newer tiltprint, which can open it; it stays in"):
+        read_work(folder)
+    (folder / RECORD).write_text('{"version": 1, "name"')
+    with pytest.raises(PlanError, match="is no work of a workbench, or damaged"):
+        read_work(folder)
+    assert folders_kept() == [folder]
+
+
+def test_the_newest_ten_are_kept_and_what_a_bench_writes_to_is_nobody_else_s(bench: Bench) -> None:
+    folders = [new_folder() for _ in range(MOST_KEPT + 2)]
+    for folder in folders:
+        write_work(folder, bench)
+    lock = lock_folder(folders[0])
+    assert lock is not None
+    assert len(folders_kept()) == MOST_KEPT
+    assert folders[0] not in folders_kept()
+    assert sum(folder.exists() for folder in folders) == MOST_KEPT + 1
+
+
+def test_a_full_disk_is_told_once_and_what_was_kept_before_is_still_there(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(keeping, "AFTER_S", 0.0)
+
+    async def change_twice() -> tuple[list[str], Path]:
+        session = Session(bench.profile, bench.given, WorkerPools())
+        told = []
+        session.do("open", bench)
+        await _settled(session.keeping)
+        (kept,) = kept_work.kept_folder().iterdir()
+        monkeypatch.setattr(shutil, "copyfile", _full)
+        for copies in (2, 3):
+            (kept / RECORD).with_suffix(".half").unlink(missing_ok=True)
+            for file in kept.glob("model-*"):
+                file.rename(file.with_suffix(".gone"))
+            session.do("copies", replace(session.bench, copies=copies))
+            await _settled(session.keeping)
+            told.append(session.problem)
+        session.close()
+        return told, kept
+
+    told, kept = asyncio.run(change_twice())
+    assert told == ["this work cannot be kept for after a crash: no space left on device; Save keeps its plan", ""]
+    assert read_work(kept).copies == 1
+
+
+def _full(*_: object) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+async def _settled(kept: Keeping) -> None:
+    while kept.behind:
+        await asyncio.sleep(0.01)

@@ -1,0 +1,53 @@
+"""What a page tells of its prints beside their figures: the tab's title, the browser's notice, the graph of temperatures."""
+
+from tests.machine.fake_page import needs_node, on_fake_page
+
+PAGE = """
+    const said = [];
+    globalThis.Notification = class { constructor(text) { said.push(text); } static requestPermission() { said.push("asked"); } };
+    Notification.permission = "granted";
+    printPanel();
+    const known = { name: "box", port: "sim", checks: [], words: [], said: [], holder: modules["page/prints-line"].OWN_PAGE };
+    const heats = { nozzle_c: 200, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, at: {}, elapsed_s: 5 };
+    const tell = (phase, share, more = {}) => {
+      const print = { ...known, number: 1, phase, progress: { state: "printing", share, heat_s: 0, ...heats }, ...more };
+      fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [print] });
+    };
+    fake.sockets[0].open();
+"""
+
+
+@needs_node
+def test_the_title_of_the_tab_tells_how_much_is_printed_and_nothing_when_it_is_over() -> None:
+    told = on_fake_page(
+        f"{PAGE} const titles = []; tell('printing', 0.429); titles.push(document.title);"
+        " tell('over', 1, { end: 'done', sentence: 'the print is done' }); titles.push(document.title); return titles;"
+    )
+    assert told == ["42 % – tiltprint", "tiltprint"]
+
+
+@needs_node
+def test_the_browser_says_once_that_a_print_of_this_page_is_over() -> None:
+    over = "tell('over', 1, { end: 'done', sentence: 'the print is done' });"
+    assert on_fake_page(f"{PAGE} tell('printing', 0.5); {over} {over} return said;") == ["box: the print is done"]
+    assert on_fake_page(f"{PAGE} known.holder = 'another page'; tell('printing', 0.5); {over} return said;") == []
+    assert on_fake_page(f"{PAGE} {over} return said;") == []  # it was over before this page was there
+
+
+@needs_node
+def test_the_browser_is_asked_whether_it_may_only_when_a_print_begins() -> None:
+    act = "Notification.permission = 'default'; tell('ready', 0); const before = [...said]; $('begin').fire('click');"
+    assert on_fake_page(f"{PAGE} {act} return [before, said];") == [[], ["asked"]]
+
+
+@needs_node
+def test_temperatures_of_ten_minutes_are_lines_with_the_newest_at_the_right_edge() -> None:
+    samples = "[{ at_s: 0, nozzle: 0, bed: null }, { at_s: 300, nozzle: 100, bed: 60, nozzleTarget: 200 }]"
+    lines = on_fake_page(f"return modules['page/temperature-graph'].heatLines({samples}, 300);")
+    assert lines["most"] == 200
+    assert lines["lines"] == {
+        "nozzle": "M150.0 80.0L300.0 40.0",
+        "bed": "M300.0 56.0",
+        "nozzleTarget": "M300.0 0.0",
+        "bedTarget": "",
+    }

@@ -1,0 +1,27 @@
+"""Quantities: what a print costs, where its material has a price."""
+
+import pytest
+
+from machine.gcode.settings import foot
+from machine.quantities import price, price_in_words, price_json
+from profiles.profile import load
+
+PRICED = load(settings=["material.price_per_kg=25", "material.currency=EUR", "material.density_g_cm3=1.25"])
+TEN_GRAMS_MM = 8000.0 / (3.141592653589793 * 1.75**2 / 4)  # 8 cm3
+
+
+def test_filament_costs_what_a_kilogram_costs_by_its_weight() -> None:
+    assert price(TEN_GRAMS_MM, PRICED.material) == pytest.approx(0.25)
+    assert price_in_words(TEN_GRAMS_MM, PRICED.material) == "0.25 EUR"
+    assert price_json(TEN_GRAMS_MM, PRICED.material) == {"cost": pytest.approx(0.25), "currency": "EUR"}
+
+
+def test_without_a_price_nothing_is_told_of_it_not_even_in_the_file() -> None:
+    assert (price(1.0, load().material), price_in_words(1.0, load().material), price_json(1.0, load().material)) == (None, "", {})
+    assert not [line for line in foot(load(), 1.0, 1.0) if "cost = " in line or "price" in line or "currency" in line]
+
+
+def test_a_file_tells_the_cost_in_the_words_that_print_hosts_look_for() -> None:
+    lines = list(foot(PRICED, TEN_GRAMS_MM, 1.0))
+    assert "; filament cost = 0.25" in lines
+    assert "; material.price_per_kg = 25.0" in lines
