@@ -20,10 +20,16 @@ LEAST_NORMAL, MOST_NORMAL = 1e-6, 1e6
 def add_plane(bench: Bench, asked: Asked) -> Cuts:
     """The plane `normal`, `offset_mm` for a new part printed after part `after`, without that as the last one."""
     cuts = bench.cuts or ()
-    index = whole({"after": len(cuts) + 1, **asked}, "after", 1, len(cuts) + 1) - 1
+    index = added_part(bench, asked) - 2
     if len(cuts) + 2 > MOST_PARTS:
         raise PlanError(f"there are {len(cuts) + 1} parts: {MOST_PARTS} are allowed")
     return *cuts[:index], _plane(asked), *cuts[index:]
+
+
+def added_part(bench: Bench, asked: Asked) -> int:
+    """The number that the new part has."""
+    most = len(bench.cuts or ()) + 1
+    return whole({"after": most, **asked}, "after", 1, most) + 1
 
 
 def move_plane(bench: Bench, asked: Asked) -> Cuts:

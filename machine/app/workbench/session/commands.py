@@ -7,12 +7,13 @@ from typing import Any
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.changes import lay, lock, reset_part, set_part, stand, take, turn
-from machine.app.workbench.bench.planes import Cuts, add_plane, move_plane, remove_plane, reorder
+from machine.app.workbench.bench.planes import Cuts, add_plane, added_part, check_unlocked, move_plane, remove_plane, reorder
 from machine.app.workbench.bench.settings import with_name, with_typed
 from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
 from machine.app.workbench.bench.values import Asked, text_or_none
 from machine.app.workbench.session.finding import search_way
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.session.trials import Place
 from profiles.errors import PlanError
 
 
@@ -60,6 +61,16 @@ def _planes(word: str, edit: Callable[[Bench, Asked], Cuts], instead: Callable[[
     return Command(Need.MODEL, lambda session, asked: session.trials.take(word, lambda bench: edit(bench, asked), instead(asked)))
 
 
+def _place(word: str, edit: Callable[[Bench, Asked], Cuts], part: Callable[[Bench, Asked], int]) -> Command:
+    """part: the number of the part whose plane is put somewhere."""
+
+    def act(session: Session, asked: Asked) -> Work:
+        place = Place(asked, lambda bench: part(bench, asked))
+        return session.trials.take(word, lambda bench: edit(bench, asked), place=place)
+
+    return Command(Need.MODEL, act)
+
+
 def _marks(task: str) -> Command:
     return Command(Need.MODEL, lambda session, asked: session.marking.take(task, asked))
 
@@ -90,6 +101,7 @@ def _too_early(asked: Asked) -> str:
 
 COMMANDS: dict[str, Command] = {
     "demo": Command(Need.NOTHING, lambda session, asked: session.open_demo(str(asked.get("name")))),
+    "dismiss": Command(Need.NOTHING, lambda session, asked: None),
     "undo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.undo())),
     "redo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.redo())),
     "set": Command(Need.NOTHING, _set),
@@ -104,8 +116,8 @@ COMMANDS: dict[str, Command] = {
     "stop": Command(Need.NOTHING, _stop),
     "take": _change("take another number of parts", take),
     "try": Command(Need.MODEL, lambda session, asked: session.trials.move(move_plane(session.bench, asked))),
-    "add": _planes("add a plane", add_plane),
-    "move": _planes("move a plane", move_plane),
+    "add": _place("add a plane", add_plane, added_part),
+    "move": _place("move a plane", move_plane, check_unlocked),
     "remove": _planes("remove a plane", remove_plane),
     "reorder": _planes("print a part at another time", reorder, _too_early),
     "neck": Command(Need.MODEL, lambda session, asked: session.trials.take_neck(asked)),
@@ -122,7 +134,7 @@ COMMANDS: dict[str, Command] = {
 
 def obey(session: Session, asked: Asked) -> None:
     """Do what a page asks for, `{"do": NAME, ...}`, or begin with it. Raises UserError for what cannot be done."""
-    session.problem = ""
+    session.forget_problem()
     name, ask = asked.get("do"), asked.get("ask")
     command = COMMANDS.get(name) if isinstance(name, str) else None
     if command is None:

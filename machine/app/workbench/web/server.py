@@ -14,6 +14,7 @@ from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import settings_list
 from machine.app.workbench.bench.values import is_small_number
 from machine.app.workbench.printing.prints import Prints
+from machine.app.workbench.session.base import hear_from
 from machine.app.workbench.session.commands import Need, check_need
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
@@ -99,6 +100,7 @@ def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request]
         session = workbench.sessions.get(request.path_params["session"])
         if session is None:
             return Response(f"{CLOSED}\n", 404)
+        hear_from(request.query_params.get("page"))
         try:
             check_need(session, need)
             return await act(session, request)

@@ -31,6 +31,7 @@ def snapshot(session: Session) -> dict[str, Any]:
     return {
         "version": session.version,
         "problem": session.problem,
+        "problems": session.problems,
         "answers": session.answers,
         "busy": session.busy,
         "preparing": session.readiness.preparing > 0,
@@ -57,7 +58,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "trial": _trial(session),
         "zones": _zones(bench),
         "marks": marks_key(bench),
-        "refused": asdict(session.trials.refused) if session.problem and session.trials.refused else None,
+        "refused": _refused(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
@@ -103,6 +104,12 @@ def _trial(session: Session) -> dict[str, Any] | None:
         return None
     _, cuts, trial = session.trials.trial
     return {"cuts": _cuts(cuts), **asdict(trial)}
+
+
+def _refused(session: Session) -> dict[str, Any] | None:
+    """The planes that were refused last, as long as the page that wanted them is told why."""
+    refused = session.trials.refused
+    return asdict(refused) if refused is not None and refused.page in session.problems else None
 
 
 def _cuts(cuts: Cuts) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ from machine.app.workbench.work.models import mark_faces, rank_resting, read_mod
 from machine.app.workbench.work.pieces import draw_pieces, make_pictures
 from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
 from machine.app.workbench.work.standing import stand
-from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
+from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, nearest, try_cuts
 
 TASKS: dict[str, Callable[..., Any]] = {
     task.__name__: task
@@ -33,5 +33,6 @@ TASKS: dict[str, Callable[..., Any]] = {
         make_ready,
         try_cuts,
         near_neck,
+        nearest,
     )
 } | {"mark": lambda tell, *given: mark(*given), "unmark": lambda tell, *given: unmark(*given)}

@@ -46,6 +46,11 @@ def near_neck(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ..
     return _trials(number, bench).neck(_planes(cuts), part, reach_mm)
 
 
+def nearest(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], part: int) -> Plane | None:
+    """The plane of a part shifted to the nearest place where all can be cut, as `Trials.nearest` finds it."""
+    return _trials(number, bench).nearest(_planes(cuts), part)
+
+
 def _trials(number: int, bench: Bench) -> Trials:
     global _ready
     if _ready is None or _ready[0] != number:
