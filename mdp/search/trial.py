@@ -88,6 +88,8 @@ class Trials:
     def nearest(self, planes: Sequence[Plane], number: int) -> Plane | None:
         """The plane of the part of a number at the nearest place along its normal where all planes can be cut, else leaning by a
         few degrees; None: there is none among the likely ones. planes as in attempt."""
+        if not self.attempt(planes).refused:
+            return planes[number - 2]
         if not self._cut_later(planes, number):
             return None
         apart_mm = APART_SHARE * float(np.ptp(self._problem.mesh.vertices @ planes[number - 2].normal))

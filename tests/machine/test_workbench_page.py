@@ -173,9 +173,38 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
     browser.wait("!$('problem').hidden")
     assert "misses the model" in browser.value("$('problem').textContent")
     browser.wait(f"Math.abs(Number($('plane-offset').value) - {moved}) < 0.01 && !$('handles').hidden")
+    browser.click("#dismiss")
+    browser.wait("!$('trouble').checkVisibility()")
+    drag_slider(browser, "plane-offset", 39.95, "change")  # 0.05 mm below the top
+    browser.wait("$('put-near').checkVisibility()")
+    browser.click("#put-near")
+    browser.wait("$('plane-offset').value === '39.60' && $('problem').hidden")
+    assert browser.value("$('plane-moved').textContent").startswith("It stands 0.35 mm farther down than asked for")
     browser.value("$('hand-tilt-a').focus()")
     browser.key("ArrowUp")
     browser.wait("Math.abs(Number($('plane-tilt').value) - 1) < 0.11")
+
+
+def test_a_plane_dragged_where_it_cannot_be_cut_stays_at_the_last_place_where_it_can(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("[data-view=front]")
+    browser.click("#fit")
+    browser.click("#add")
+    browser.wait("!$('handles').hidden && $('plane-told').textContent")
+    x, y = browser.value(
+        "(() => { const b = $('hand-along').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+    )
+    browser.hold((x, y), (x, y - 30))
+    browser.wait("$('plane-told').textContent.includes('mm of seams') && Number($('plane-offset').value) > 20.5")
+    allowed, figures = browser.value("[$('plane-offset').value, $('parts-list').textContent]")
+    browser._send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y - 900, button="left", buttons=1)
+    browser.wait("$('plane-told').textContent.includes('misses the model')")
+    assert browser.value("[$('plane-offset').value, $('parts-list').textContent]") == [allowed, figures]
+    browser.release((x, y - 900))
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane' && $('problem').hidden")
+    browser.wait(f"$('plane-offset').value === '{allowed}' && $('plane-told').textContent.includes('mm of seams')")
+    assert browser.value("document.documentElement.dataset.obstacle") == ""
 
 
 def test_a_setting_is_found_by_a_word_changed_and_marked(browser: Browser, bench: Running) -> None:

@@ -32,6 +32,18 @@ def added_part(bench: Bench, asked: Asked) -> int:
     return whole({"after": most, **asked}, "after", 1, most) + 1
 
 
+def added_anywhere(bench: Bench, asked: Asked) -> list[tuple[Cuts, int]]:
+    """The planes with the new one in every place of the print order, the one asked for first, each with its part's number."""
+    wanted = added_part(bench, asked)
+    numbers = sorted(range(2, len(bench.cuts or ()) + 3), key=lambda number: abs(number - wanted))
+    return [(add_plane(bench, {**asked, "after": number - 1}), number) for number in numbers]
+
+
+def moved_alone(bench: Bench, asked: Asked) -> list[tuple[Cuts, int]]:
+    """The planes with that of `part` moved, and its number."""
+    return [(move_plane(bench, asked), check_unlocked(bench, asked))]
+
+
 def move_plane(bench: Bench, asked: Asked) -> Cuts:
     """The plane of `part` becomes `normal`, `offset_mm`."""
     return _replaced(bench, asked, _plane(asked))

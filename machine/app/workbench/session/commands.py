@@ -7,7 +7,7 @@ from typing import Any
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.changes import lay, lock, reset_part, set_part, stand, take, turn
-from machine.app.workbench.bench.planes import Cuts, add_plane, added_part, check_unlocked, move_plane, remove_plane, reorder
+from machine.app.workbench.bench.planes import Cuts, added_anywhere, move_plane, moved_alone, remove_plane, reorder
 from machine.app.workbench.bench.settings import with_name, with_typed
 from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
 from machine.app.workbench.bench.values import Asked, text_or_none
@@ -61,12 +61,12 @@ def _planes(word: str, edit: Callable[[Bench, Asked], Cuts], instead: Callable[[
     return Command(Need.MODEL, lambda session, asked: session.trials.take(word, lambda bench: edit(bench, asked), instead(asked)))
 
 
-def _place(word: str, edit: Callable[[Bench, Asked], Cuts], part: Callable[[Bench, Asked], int]) -> Command:
-    """part: the number of the part whose plane is put somewhere."""
+def _place(word: str, orders: Callable[[Bench, Asked], list[tuple[Cuts, int]]]) -> Command:
+    """orders: the planes with that which is put somewhere, in the print orders that will do, the wanted one first."""
 
     def act(session: Session, asked: Asked) -> Work:
-        place = Place(asked, lambda bench: part(bench, asked))
-        return session.trials.take(word, lambda bench: edit(bench, asked), place=place)
+        place = Place(asked, lambda bench: orders(bench, asked))
+        return session.trials.take(word, lambda bench: place.orders(bench)[0][0], place=place)
 
     return Command(Need.MODEL, act)
 
@@ -116,8 +116,8 @@ COMMANDS: dict[str, Command] = {
     "stop": Command(Need.NOTHING, _stop),
     "take": _change("take another number of parts", take),
     "try": Command(Need.MODEL, lambda session, asked: session.trials.move(move_plane(session.bench, asked))),
-    "add": _place("add a plane", add_plane, added_part),
-    "move": _place("move a plane", move_plane, check_unlocked),
+    "add": _place("add a plane", added_anywhere),
+    "move": _place("move a plane", moved_alone),
     "remove": _planes("remove a plane", remove_plane),
     "reorder": _planes("print a part at another time", reorder, _too_early),
     "neck": Command(Need.MODEL, lambda session, asked: session.trials.take_neck(asked)),

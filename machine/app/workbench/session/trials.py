@@ -7,11 +7,10 @@ from math import hypot, inf
 
 from machine.app.workbench.bench.bench import Bench, with_cuts
 from machine.app.workbench.bench.planes import Cuts, check_unlocked, snap
-from machine.app.workbench.bench.values import Asked, vector_of
+from machine.app.workbench.bench.values import Asked
 from machine.app.workbench.session.base import SessionBase, asking
 from machine.app.workbench.session.readiness import Readiness
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlannedPart
 from mdp.search.neck import REACH_DEG, REACH_SHARE
 from mdp.search.obstacle import Obstacle
 from mdp.search.trial import Trial
@@ -22,11 +21,11 @@ REST_S = 0.1  # of a hand, until what it holds is looked at more closely
 
 @dataclass(frozen=True)
 class Place:
-    """Where a person wants a plane: what was asked, and the number of its part on a bench. Where that says `near`, the nearest
-    place along its normal where it can be cut will do."""
+    """Where a person wants a plane: what was asked, and the planes of a bench with it, each time with the number of its part, in
+    the print orders that will do, the wanted one first. Where it says `near`, the nearest place where it can be cut will do."""
 
     asked: Asked
-    part: Callable[[Bench], int]
+    orders: Callable[[Bench], list[tuple[Cuts, int]]]
 
     @property
     def near(self) -> bool:
@@ -69,7 +68,7 @@ class PlaneTrials:
             cuts = edit(bench)
             trial = await self.attempt(bench, cuts)
             if trial.refused and place is not None and place.near:
-                cuts, trial = await self._nearest(bench, cuts, trial, place.part(bench))
+                cuts, trial = await self._nearest(bench, place.orders(bench)) or (cuts, trial)
             if trial.refused:
                 self.settle()
                 raise self._refusal(trial, instead, place)
@@ -94,19 +93,15 @@ class PlaneTrials:
         if self._session.bench.shaped == bench.shaped:
             instead = f"the neck near the plane of part {number} is no place for a cut: "
             there = {"do": "move", "part": number, "normal": neck.normal.tolist(), "offset_mm": neck.offset_mm}
-            place = Place(there, lambda bench: number)
+            place = Place(there, lambda now: [(snap(now, asked, neck), number)])
             await self.take("snap to the neck", lambda now: snap(now, asked, neck), instead, place)
 
-    async def _nearest(self, bench: Bench, cuts: Cuts, refused: Trial, part: int) -> tuple[Cuts, Trial]:
-        """The planes with that of a part at the nearest place, and their trial; as they are where there is none."""
+    async def _nearest(self, bench: Bench, orders: list[tuple[Cuts, int]]) -> tuple[Cuts, Trial] | None:
+        """The planes with the one that is put somewhere at the nearest place, and their trial; None: there is none."""
         with self._session.waiting("looking for the nearest place that can be cut"):
             async with self._trying:
-                plane: Plane | None = await self._readiness.ask("nearest", bench, cuts, part)
-        if plane is None:
-            return cuts, refused
-        put = PlannedPart(vector_of(plane.normal), float(plane.offset_mm))
-        there = *cuts[: part - 2], put, *cuts[part - 1 :]
-        return there, await self.attempt(bench, there)
+                nearest: Cuts | None = await self._readiness.ask("nearest", bench, orders)
+        return None if nearest is None else (nearest, await self.attempt(bench, nearest))
 
     def _refusal(self, trial: Trial, instead: str, place: Place | None) -> PlanError:
         """Why planes cannot be cut; what is known of that is kept."""

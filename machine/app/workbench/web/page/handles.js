@@ -6,7 +6,7 @@ import { $ } from "../../../../view/template/page.js";
 import { putAt } from "./elements.js";
 import { alongWay, gripOf } from "./grip.js";
 import { apartNow } from "./pieces.js";
-import { choosePart, holdPlane, isLocked, planeNow, planesNow, putPlane } from "./planes.js";
+import { holdPlane, isLocked, leavePlane, planeNow, planesNow, putPlane } from "./planes.js";
 import { store, subscribe } from "./store.js";
 import { sectionOf } from "./triangles.js";
 
@@ -33,7 +33,7 @@ export function handlesOf(picture) {
     const normal = unit(turned(rotated(cross(axes[tilts], plane.normal), angle), plane.normal));
     return { normal, offset_mm: dot(normal, centre) };
   };
-  const taken = ({ tilts }) => ({ plane: planeNow(), about: section, tilts });
+  const taken = ({ tilts }) => ({ plane: store.hand?.wanted || planeNow(), about: section, tilts });
   const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * section.radius_mm);
   const put = () => { if (store.hand) putPlane(store.hand.plane); };
   KNOBS.forEach((knob) => gripOf($(knob.id), {
@@ -43,7 +43,7 @@ export function handlesOf(picture) {
     },
     move: (held, event) => holdPlane(moved(held, held.along(event))),
     put,
-    drop: () => choosePart(store.part),
+    drop: leavePlane,
     step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
     stepped: put,
   }));

@@ -6,19 +6,20 @@ import { $, needsKey, notice } from "../../../../view/template/page.js";
 import { tabsOf } from "../../../../view/template/tabs.js";
 import { benchesPanel } from "./benches.js";
 import { clicksOf, press } from "./clicks.js";
-import { withWholeOptions } from "./elements.js";
 import { handlesOf } from "./handles.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { marksPanel } from "./marks-panel.js";
 import { modelPanel, sizePanel } from "./model-panel.js";
 import { fetchModel, modelOf, pedestalOf } from "./model.js";
 import { obstacleOf } from "./obstacle.js";
+import { partsList } from "./parts-list.js";
 import { partsPanel } from "./parts-panel.js";
 import { pictureOf } from "./picture.js";
 import { apartPanel } from "./pieces.js";
 import { planesPanel } from "./planes-panel.js";
 import { printFrame } from "./print-frame.js";
 import { printPanel } from "./print-panel.js";
+import { problemLine } from "./problem.js";
 import { ringsOf } from "./rings.js";
 import { saveMenu } from "./save-menu.js";
 import { settingsPanel } from "./settings-panel.js";
@@ -40,11 +41,13 @@ function main() {
   });
   tabsOf((tab) => update({ tab }));
   onState(tellState);
+  problemLine();
   benchesPanel();
   modelPanel();
   sizePanel();
   partsPanel();
   planesPanel(picture);
+  partsList();
   marksPanel(picture);
   stopsPanel();
   slicesPanel(printFrame().showFinding);
@@ -73,7 +76,7 @@ function main() {
   root.dataset.state = picture ? "ready" : "failed";
 }
 
-function tellState({ model, problem, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
+function tellState({ model, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
   const root = document.documentElement;
   document.title = model ? `${model.name} – tiltprint` : "tiltprint";
   $("title").textContent = model ? model.name : "tiltprint";
@@ -83,8 +86,6 @@ function tellState({ model, problem, busy, undo, redo, search, slicing, preparin
   document.body.classList.toggle("no-model", !model);
   document.body.classList.toggle("has-model", Boolean(model));
   $("drop").hidden = Boolean(model);
-  if ($("problem").textContent !== problem) $("problem").replaceChildren(...withWholeOptions(problem)); // read aloud once
-  $("problem").hidden = !problem;
   for (const [id, word] of [["undo", undo], ["redo", redo]]) {
     $(id).disabled = !word;
     $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);

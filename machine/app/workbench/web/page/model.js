@@ -3,6 +3,7 @@
 import { $, made, notice } from "../../../../view/template/page.js";
 import { alike, mm2, swatch } from "./elements.js";
 import { AGAIN_MS } from "./line.js";
+import { fadedColours } from "./pieces.js";
 import { planesNow } from "./planes.js";
 import { onState, store, subscribe, update } from "./store.js";
 import { overhanging, standingBy, trianglesFrom } from "./triangles.js";
@@ -59,9 +60,9 @@ export function modelOf(picture) {
 /** Parts in their colours where they are looked at, else red faces; the row of the front under the hand before it is taken, whatever is told
  * meanwhile. */
 function look(picture, red) {
-  const { state: { search, parts, colours }, tab, row } = store;
+  const { state: { search, parts, colours }, tab, row, part } = store;
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;
-  picture.cut(cut ? planes : null, colours);
+  picture.cut(cut ? planes : null, row || search ? colours : fadedColours(colours, part));
   picture.red(cut ? null : red);
   const entries = cut ? colours.slice(0, planes.length + 1).slice(0, MOST_NAMED).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`)) : [];
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));
