@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
+from mdp.mesh import Mesh
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.conftest import WINDOW
@@ -16,6 +17,7 @@ from tests.shapes import ball, tee
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
 FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
+UNITS = ["in metres", "in inches", "in centimetres"]  # that make it a size to print, the likeliest first
 IDLE = "document.documentElement.dataset.busy === ''"
 
 
@@ -135,6 +137,30 @@ def test_red_follows_the_model_while_it_turns_and_the_server_says_the_same(brows
     assert before > 500.0
 
 
+def test_a_model_of_a_size_that_no_printer_makes_is_asked_for_its_unit_and_opened_in_it(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    choose(browser, "tiny.stl", stl(Mesh(tee().vertices * 0.004, tee().faces)))
+    browser.wait("$('units').childElementCount === 3")
+    question = "tiny.stl: its largest extent is 0.16 mm, less than 1 mm: which unit are its coordinates in?"
+    assert browser.value("$('problem').textContent") == question
+    assert browser.value("[...$('units').children].map((button) => button.textContent)") == UNITS
+    browser.click("#units button")
+    browser.wait("$('title').textContent === 'tiny.stl' && $('scale').value === '100000' && $('size-z').value === '160.00'")
+    assert browser.value("$('problem').hidden && $('tiny').hidden")
+    browser.click("#undo")
+    browser.wait("$('title').textContent === 'tee.stl' && $('scale').value === '100'")
+
+
+def test_a_typed_angle_turns_the_model_and_its_size_is_that_of_how_it_stands(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "typed.stl", stl(tee()))
+    browser.click("#tab-model")
+    drag_slider(browser, "turn-x-typed", 90, "input")
+    assert "40.0 × 40.0 × 10.0 mm" in browser.value("$('model-told').textContent")  # while it turns
+    drag_slider(browser, "turn-x-typed", 90, "change")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay the model down' && $('turn-x-typed').value === '0'")
+    browser.wait("$('model-told').textContent.includes('40.0 × 40.0 × 10.0 mm') && $('size-z').value === '10.00'")
+
+
 def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "tee.stl", stl(tee()))
     browser.click("#tab-model")
@@ -142,6 +168,7 @@ def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: 
     browser.click("#fit")
     browser.click("#lay")
     browser.wait("$('rings').hasAttribute('hidden')")  # one of them goes through the middle
+    browser.wait("modules['page/store'].store.facets?.facets.length === 6")  # of the hull of a T; no part of its arms' undersides
     browser.press(
         *browser.value(
             "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"

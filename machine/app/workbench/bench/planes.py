@@ -4,17 +4,14 @@ The edits take the bench, on which a model lies, and what is asked, and give the
 sense.
 """
 
-from math import hypot
-
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.bench.values import MOST_MM, Asked, number, vector, vector_of, whole
+from machine.app.workbench.bench.values import MOST_MM, Asked, number, unit_vector, vector_of, whole
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 
 Cuts = tuple[PlannedPart, ...]
-LEAST_NORMAL, MOST_NORMAL = 1e-6, 1e6
 
 
 def add_plane(bench: Bench, asked: Asked) -> Cuts:
@@ -85,8 +82,4 @@ def _replaced(bench: Bench, asked: Asked, *instead: PlannedPart) -> Cuts:
 
 
 def _plane(asked: Asked) -> PlannedPart:
-    normal = vector(asked, "normal")
-    length = hypot(*normal)
-    if not LEAST_NORMAL <= length <= MOST_NORMAL:
-        raise PlanError(f"normal is {asked['normal']}: a direction of a length of about 1 is expected")
-    return PlannedPart(vector_of(value / length for value in normal), number(asked, "offset_mm", -MOST_MM, MOST_MM))
+    return PlannedPart(unit_vector(asked, "normal"), number(asked, "offset_mm", -MOST_MM, MOST_MM))

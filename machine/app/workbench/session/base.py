@@ -33,8 +33,9 @@ class SessionBase(Observable):
     """All from the event loop; the pages wait for `changed`.
 
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
-    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; quick, long, hand: its
-    tasks in the pools; received: the files of its pages; followers: called after every change of the bench.
+    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; stopped: what became
+    of work that was stopped last; quick, long, hand: its tasks in the pools; received: the files of its pages; followers: called
+    after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -42,7 +43,7 @@ class SessionBase(Observable):
         self.history = History(Step("", bench))
         self.problems: dict[str, str] = {}
         self.answers: dict[str, str] = {}
-        self.busy = ""
+        self.busy = self.stopped = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
         self.received = Received()
@@ -118,6 +119,7 @@ class SessionBase(Observable):
         """Go on with another history; a step forth tells what it has taken away."""
         forth = history.before[-1:] == (self.history.now,)
         self.problems.clear()  # they told of what lay there before
+        self.stopped = ""
         for sentence in (lost, history.now.lost if forth else ""):
             self.add_problem(sentence)
         self.become(history)

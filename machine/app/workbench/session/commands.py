@@ -90,9 +90,8 @@ def _reset(session: Session, asked: Asked) -> Work:
 
 
 def _stop(session: Session, asked: Asked) -> None:
-    session.finding.stop()
-    session.slicing.stop()
-    session.comparing.stop()
+    told = session.finding.stop(), session.slicing.stop(), session.comparing.stop()
+    session.stopped = " ".join(filter(None, told))
 
 
 def _too_early(asked: Asked) -> str:
@@ -101,6 +100,7 @@ def _too_early(asked: Asked) -> str:
 
 COMMANDS: dict[str, Command] = {
     "demo": Command(Need.NOTHING, lambda session, asked: session.open_demo(str(asked.get("name")))),
+    "unit": Command(Need.NOTHING, lambda session, asked: session.open_in_unit(asked.get("unit"))),
     "dismiss": Command(Need.NOTHING, lambda session, asked: None),
     "undo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.undo())),
     "redo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.redo())),
@@ -135,6 +135,7 @@ COMMANDS: dict[str, Command] = {
 def obey(session: Session, asked: Asked) -> None:
     """Do what a page asks for, `{"do": NAME, ...}`, or begin with it. Raises UserError for what cannot be done."""
     session.forget_problem()
+    session.stopped = ""
     name, ask = asked.get("do"), asked.get("ask")
     command = COMMANDS.get(name) if isinstance(name, str) else None
     if command is None:

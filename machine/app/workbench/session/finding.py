@@ -50,17 +50,20 @@ class Finding:
             self.search = Search(bench, Searched(WAITING if self._session.long.pool.full else "beginning"))
             self._task = self._session.start(self._find(bench, way))
 
-    def stop(self) -> None:
-        """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known."""
+    def stop(self) -> str:
+        """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known.
+        What became of it, as a sentence; "" where there was none."""
         search, self.search = self.search, None
         if search is None or self._task is None:
-            return
+            return ""
         self._task.cancel()
         self._session.start(self._session.long.warm())
         best = search.searched.best
-        if best is not None and best.planes:
-            self._session.do("stop the search", with_front(self._session.bench, [replace(best, chosen=True)]))
-            self._pricing = self._session.start(self._price(self._session.bench))
+        if best is None or not best.planes:
+            return "The search was stopped before it had cut anything: all is as it was."
+        self._session.do("stop the search", with_front(self._session.bench, [replace(best, chosen=True)]))
+        self._pricing = self._session.start(self._price(self._session.bench))
+        return f"The search was stopped, and the best so far is taken: {best.parts} parts."
 
     async def _find(self, bench: Bench, way: SearchWay) -> None:
         def follow(searched: Searched) -> None:

@@ -67,6 +67,7 @@ def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
         route("model/{key}", _model),
         route("marks/{key}", _marks),
         route("pedestal/{key}", _pedestal),
+        route("facets/{key}", _facets),
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
         route("left/{number:int}", uploads.open_left, "POST"),
@@ -138,6 +139,13 @@ async def _pedestal(session: Session, request: Request) -> Response:
     if standing is None or session.standing.pedestal_key != request.path_params["key"]:
         return Response(status_code=204)
     return Response(standing.pedestal, media_type="application/octet-stream")
+
+
+async def _facets(session: Session, request: Request) -> Response:
+    model = session.bench.model
+    if model is None or model.key != request.path_params["key"]:
+        return Response(status_code=204)
+    return Response(await session.quick.run("rest_facets", model), media_type="application/json")
 
 
 async def _pieces(session: Session, request: Request) -> Response:

@@ -34,6 +34,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "problems": session.problems,
         "answers": session.answers,
         "busy": session.busy,
+        "stopped": session.stopped,
         "preparing": session.readiness.preparing > 0,
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": history.now.word if history.before else "",
@@ -59,6 +60,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "zones": _zones(bench),
         "marks": marks_key(bench),
         "refused": _refused(session),
+        "units": _units(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
@@ -110,6 +112,12 @@ def _refused(session: Session) -> dict[str, Any] | None:
     """The planes that were refused last, as long as the page that wanted them is told why."""
     refused = session.trials.refused
     return asdict(refused) if refused is not None and refused.page in session.problems else None
+
+
+def _units(session: Session) -> dict[str, Any] | None:
+    """The units of which one is that of a model, as long as the page that wanted it is asked."""
+    waits = session.unscaled
+    return {"page": waits.page, "words": list(waits.units)} if waits is not None and waits.page in session.problems else None
 
 
 def _cuts(cuts: Cuts) -> list[dict[str, Any]]:

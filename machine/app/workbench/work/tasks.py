@@ -6,7 +6,7 @@ from typing import Any
 
 from machine.app.workbench.bench.marks import mark, unmark
 from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, measure_plan, price_row
-from machine.app.workbench.work.models import mark_faces, rank_resting, read_model
+from machine.app.workbench.work.models import mark_faces, rank_resting, read_model, rest_facets
 from machine.app.workbench.work.pieces import draw_pieces, make_pictures
 from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
 from machine.app.workbench.work.standing import stand
@@ -17,6 +17,7 @@ TASKS: dict[str, Callable[..., Any]] = {
     for task in (
         read_model,
         rank_resting,
+        rest_facets,
         find_parts,
         measure_plan,
         price_row,

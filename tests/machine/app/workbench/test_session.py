@@ -250,3 +250,25 @@ def test_a_plane_that_is_refused_is_put_at_the_nearest_place_when_that_is_asked_
 
     session = when_done(work)
     assert (session.bench.cuts, session.problem) == ((PlannedPart(UP, 30.0),), "")
+
+
+def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is_done() -> None:
+    told = []
+
+    async def work(session: Session) -> None:
+        for best in (None, FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0)):
+            obey(session, {"do": "search"})
+            await asyncio.sleep(0)
+            assert session.finding.search is not None
+            session.finding.search = Search(session.bench, Searched("stage 1", best))
+            obey(session, {"do": "stop"})
+            told.append(session.stopped)
+        obey(session, {"do": "dismiss"})
+        told.append(session.stopped)
+
+    when_done(work)
+    assert told == [
+        "The search was stopped before it had cut anything: all is as it was.",
+        "The search was stopped, and the best so far is taken: 2 parts.",
+        "",
+    ]

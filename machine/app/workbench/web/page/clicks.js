@@ -1,7 +1,7 @@
 // Clicks: what the next click on the model is for, and what it does.
 
 import { $, notice } from "../../../../view/template/page.js";
-import { send } from "./line.js";
+import { layFacet } from "./facets.js";
 import { markAt, markWord } from "./marks-panel.js";
 import { openMenu } from "./parts-list.js";
 import { apartNow, pieceMet, shiftsOf } from "./pieces.js";
@@ -12,7 +12,7 @@ import { faceMet, placeMet } from "./triangles.js";
 const STILL_PIXELS = 4; // a hand that moves less only clicks
 const BUTTONS = { lay: "lay", snap: "snap", faces: "mark-faces", box: "mark-box" };
 const WANTED = {
-  lay: () => "Click the face that is to lie on the platform.", snap: () => "Click the face whose plane it is to take.",
+  lay: () => "Click a lit face: it can rest on that.", snap: () => "Click the face whose plane it is to take.",
   faces: () => `Click where there is to be ${markWord()}; Esc ends it.`, box: () => (store.corner ? "Now the opposite corner." : "Click a corner of the box."),
 };
 
@@ -44,17 +44,15 @@ function partMet(event, picture) {
   return spot ? partAt(spot.place) : 0;
 }
 
-/** A click on the model: the face is laid down, or the plane takes its place, or a mark is put there when that was asked for; else a part is
+/** A click on the model: the facet is laid down, or the plane takes its place, or a mark is put there when that was asked for; else a part is
  * chosen, or, beside the model, none. */
 export function press(event, picture) {
   const { clicks, tab } = store;
   if (!clicks || apartNow()) return void (tab === "parts" && choosePart(partMet(event, picture)));
+  if (clicks === "lay") return layFacet(picture, event);
   const spot = met(event, picture);
   if (!spot) return;
-  if (clicks === "lay") {
-    update({ clicks: "" });
-    send({ do: "lay", face: spot.face });
-  } else if (clicks === "snap") snapTo(spot.face, picture);
+  if (clicks === "snap") snapTo(spot.face, picture);
   else markAt(spot.place);
 }
 

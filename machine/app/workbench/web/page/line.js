@@ -40,9 +40,10 @@ let line = null, asked = new Map(), count = 0; // asked: what is called when a c
 const page = crypto.randomUUID(); // this page's name, which no other one has
 
 /** A state as this page tells it: what others were refused is theirs to see. */
-const toldHere = (state) => ({
-  ...state, problem: state.problems[page] || state.problems[""] || "", refused: [page, ""].includes(state.refused?.page) ? state.refused : null,
-});
+function toldHere(state) {
+  const own = (told) => ([page, ""].includes(told?.page) ? told : null);
+  return { ...state, problem: state.problems[page] || state.problems[""] || "", refused: own(state.refused), units: own(state.units) };
+}
 
 /** The page's line to its bench: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD. */
 export function openLine(follow, stands) {

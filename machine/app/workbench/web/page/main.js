@@ -6,6 +6,8 @@ import { $, needsKey, notice } from "../../../../view/template/page.js";
 import { tabsOf } from "../../../../view/template/tabs.js";
 import { benchesPanel } from "./benches.js";
 import { clicksOf, press } from "./clicks.js";
+import { elapsedTimes } from "./elapsed.js";
+import { facetsOf } from "./facets.js";
 import { handlesOf } from "./handles.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { marksPanel } from "./marks-panel.js";
@@ -42,6 +44,8 @@ function main() {
   tabsOf((tab) => update({ tab }));
   onState(tellState);
   problemLine();
+  elapsedTimes();
+  onState(({ stopped }) => notice(stopped, "stopped"));
   benchesPanel();
   modelPanel();
   sizePanel();
@@ -64,6 +68,7 @@ function main() {
     wallsOf(picture);
     obstacleOf(picture);
     handlesOf(picture);
+    facetsOf(picture);
     pedestalOf(picture);
     handle($("canvas"), camera, { changed: picture.ask, pressed: (event) => press(event, picture) });
     viewsOf(camera, picture, ringPlaces);

@@ -1,5 +1,6 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal.
 
+import { sub } from "../../../../view/template/math.js";
 import { $, made, notice } from "../../../../view/template/page.js";
 import { alike, mm2, swatch } from "./elements.js";
 import { AGAIN_MS } from "./line.js";
@@ -42,13 +43,15 @@ export function modelOf(picture) {
   subscribe(({ state, triangles, turning }, before) => {
     if (!triangles) return;
     const began = performance.now(), { limit, platform_mm: platform, pedestal_mm: lift, overhang_mm2: area } = state, rotation = turning || state.rotation;
-    const stands = JSON.stringify([rotation, limit, platform, lift]), stoodOtherwise = stands !== stood || triangles !== before.triangles;
+    const how = JSON.stringify([rotation, limit, platform, lift]), stoodOtherwise = how !== stood || triangles !== before.triangles;
     if (stoodOtherwise) {
-      stood = stands;
+      stood = how;
       const found = overhanging(triangles, rotation[2], limit, platform);
       red = found.red;
       if (turning || area === null) $("overhang").textContent = mm2(found.area);
-      picture?.stand(standingBy(rotation, triangles.vertices, lift));
+      const stands = standingBy(rotation, triangles.vertices, lift), [least, most] = stands.box;
+      picture?.stand(stands);
+      update({ seen: { size_mm: sub(most, least) } });
     }
     if (picture) look(picture, red);
     if (!stoodOtherwise) return;

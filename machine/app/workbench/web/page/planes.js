@@ -46,7 +46,7 @@ function handNow() {
 export function holdPlane(wanted) {
   const hand = handNow();
   send({ do: "try", part: hand.part, ...wanted });
-  update({ hand: { ...hand, wanted, plane: hand.why ? hand.plane : wanted, since_ms: performance.now() } });
+  update({ hand: { ...hand, wanted, plane: hand.why ? hand.plane : wanted, put: false, since_ms: performance.now() } });
 }
 
 /** What a hand holds after a trial of its plane: where it cannot be cut, it stays at the last place where it can. */
