@@ -17,6 +17,9 @@ from tests.shapes import ball, tee
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
 FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
+SHARES_DRAWN = """[...$('laid').querySelectorAll('canvas')].map((canvas) => {
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  return data.filter((_, k) => k % 4 === 3).reduce((sum, alpha) => sum + (alpha > 0), 0) / (canvas.width * canvas.height); })"""
 UNITS = ["in metres", "in inches", "in centimetres"]  # that make it a size to print, the likeliest first
 IDLE = "document.documentElement.dataset.busy === ''"
 
@@ -117,6 +120,10 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.value("$('ranker').value = 'learned'")
     browser.click("#find")
     browser.wait("$('front-notes').textContent.includes('it is laid down on its front (turned 90 about x): in one piece')")
+    assert browser.value("$('laid').textContent") == "as it stoodas it lies now"
+    browser.wait(f"{SHARES_DRAWN}.every((share) => share > 0.05 && share < 0.9)")  # of both small pictures
+    browser.click("#undo")
+    browser.wait("!$('laid').checkVisibility()")
 
 
 def test_red_follows_the_model_while_it_turns_and_the_server_says_the_same(browser: Browser, bench: Running) -> None:

@@ -10,6 +10,7 @@ from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench,
 from machine.app.workbench.session.base import WAITING, SessionBase
 from machine.app.workbench.work.cutting import Found, Searched, SearchWay
 from profiles.errors import PlanError
+from profiles.frozen import Vector
 
 BY_DEFAULT = SearchWay()
 
@@ -31,11 +32,12 @@ def search_way(asked: dict[str, Any]) -> SearchWay:
 
 
 class Finding:
-    """search: the one under way; notes: of the last one."""
+    """search: the one under way; notes: of the last one; laid: how it found the model turned, and how it has turned it."""
 
     def __init__(self, session: SessionBase) -> None:
         self.search: Search | None = None
         self.notes: tuple[str, ...] = ()
+        self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
         self._session = session
         self._task: asyncio.Task[None] | None = None
         self._pricing: asyncio.Task[None] | None = None  # of the best of a search that was stopped
@@ -76,6 +78,7 @@ class Finding:
             self.notes = outcome.notes
             now = self._session.bench
             laid = now if outcome.turn is None else with_rotation(now, (outcome.turn @ np.array(now.rotation)).tolist())
+            self.laid = None if laid is now else (now.rotation, laid.rotation)
             self._session.do("find parts", with_front(laid, outcome.front))
         finally:
             if self.search is not None and self.search.bench is bench:

@@ -63,6 +63,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "units": _units(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
+        "laid": _laid(session),
         "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
         "priced": bench.priced,
@@ -112,6 +113,12 @@ def _refused(session: Session) -> dict[str, Any] | None:
     """The planes that were refused last, as long as the page that wanted them is told why."""
     refused = session.trials.refused
     return asdict(refused) if refused is not None and refused.page in session.problems else None
+
+
+def _laid(session: Session) -> dict[str, Any] | None:
+    """How the last search has found the model turned and how it has turned it, as long as its parts lie there."""
+    laid, bench = session.finding.laid, session.bench
+    return {"before": laid[0], "after": laid[1]} if laid is not None and bench.rows and bench.rotation == laid[1] else None
 
 
 def _units(session: Session) -> dict[str, Any] | None:

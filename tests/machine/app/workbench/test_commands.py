@@ -23,7 +23,9 @@ PAGE = resources.files("machine.app.workbench.web").joinpath("page")
 
 def bare(bench: Bench) -> Any:
     """A session on whose bench nothing is sliced, and which can do nothing."""
-    return SimpleNamespace(bench=bench, stopped="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED))
+    return SimpleNamespace(
+        bench=bench, stopped="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED)
+    )
 
 
 @pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))

@@ -27,6 +27,7 @@ import { saveMenu } from "./save-menu.js";
 import { settingsPanel } from "./settings-panel.js";
 import { comparePanel, slicesPanel, stopsPanel } from "./slices-panel.js";
 import { onState, store, subscribe, update } from "./store.js";
+import { thumbnailsOf } from "./thumbnails.js";
 import { wallsOf } from "./walls.js";
 
 function main() {
@@ -61,6 +62,7 @@ function main() {
   printPanel();
   clicksOf(picture);
   modelOf(picture);
+  thumbnailsOf(picture);
   apartPanel(picture);
   if (picture) {
     const ringPlaces = ringsOf(picture);

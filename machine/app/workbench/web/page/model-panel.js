@@ -1,6 +1,6 @@
 // Model panel: the file, how it is turned, what overhangs then, the ways it rests, and how large it stands on the platform.
 
-import { $, made } from "../../../../view/template/page.js";
+import { $ } from "../../../../view/template/page.js";
 import { leftFiles, takeFiles } from "./benches.js";
 import { alike, listIn, mm2, tellIn } from "./elements.js";
 import { send } from "./line.js";
@@ -29,7 +29,7 @@ export function modelPanel() {
   dropping();
   leftFiles();
   onState((state, before) => {
-    const { model, rotation, resting, overhang_mm2: area } = state;
+    const { model, rotation, overhang_mm2: area } = state;
     if (JSON.stringify(rotation) !== JSON.stringify(before?.rotation)) {
       TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; });
     }
@@ -38,7 +38,6 @@ export function modelPanel() {
     listIn("model-notes", model.notes);
     tellTiny(state);
     if (area !== null) $("overhang").textContent = mm2(area);
-    if (JSON.stringify(resting) !== JSON.stringify(before?.resting)) showResting(resting);
   });
   subscribe(tellModel);
 }
@@ -51,11 +50,6 @@ function tellTiny({ model }) {
   $("tiny").hidden = most >= TINY_MM || !words.length;
   $("tiny-told").textContent = `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?`;
   unitButtons($("tiny-units"), words, (unit) => send({ do: "set", key: "process.scale", value: String(Number((store.state.scale * UNITS[unit]).toPrecision(9))) }));
-}
-
-function showResting(resting) {
-  $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) =>
-    made("button", { type: "button", onclick: () => send({ do: "stand", rotation }) }, made("span", { text: words }), made("small", { text: mm2(area) }))));
 }
 
 /** A file may be dropped anywhere on the page. */
