@@ -72,7 +72,7 @@ def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) ->
         firefox.click("[data-view=top]")
         firefox.click("#fit")
         firefox.click("#lay")
-        firefox.wait("document.documentElement.dataset.busy === '' && $('lay').getAttribute('aria-pressed') === 'true'")
+        firefox.wait("modules['page/store'].store.facets && $('lay').getAttribute('aria-pressed') === 'true'")
         firefox.press(*middle(firefox, "canvas"))
         firefox.wait(done("lay a face down"))
         assert firefox.value("$('overhang').textContent") == "0.0 mm²"  # upside down a T needs no support

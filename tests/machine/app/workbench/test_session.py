@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -256,6 +257,7 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
     told = []
 
     async def work(session: Session) -> None:
+        session.long.warm = partial(asyncio.sleep, 0)  # type: ignore[method-assign]
         for best in (None, FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0)):
             obey(session, {"do": "search"})
             await asyncio.sleep(0)
@@ -263,6 +265,7 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
             session.finding.search = Search(session.bench, Searched("stage 1", best))
             obey(session, {"do": "stop"})
             told.append(session.stopped)
+            await settled(session)
         obey(session, {"do": "dismiss"})
         told.append(session.stopped)
 

@@ -10,6 +10,7 @@ import { onState, store, subscribe, update } from "./store.js";
 import { overhanging, standingBy, trianglesFrom } from "./triangles.js";
 
 const MISSING = "The model has not come from tiltprint, so it is not drawn; it is asked for again with the next news.";
+const MANY_FACES = 100000; // to fetch and draw them takes a moment, which is told
 const MOST_NAMED = 24; // parts, in the legend
 let key = ""; // of the model that is there, or comes
 
@@ -17,9 +18,10 @@ let key = ""; // of the model that is there, or comes
 export async function fetchModel(model, picture, again) {
   if ((model?.key || "") === key) return;
   key = model?.key || "";
-  update({ triangles: null });
+  update({ triangles: null, seen: null });
   let triangles = null;
   if (model?.drawn) {
+    if (model.faces > MANY_FACES) notice(`${model.faces.toLocaleString("en")} faces are on their way into the picture …`, "model");
     const answer = await fetch(`model/${model.key}`).catch(() => null), content = answer?.ok ? await answer.arrayBuffer().catch(() => null) : null;
     if (key !== model.key) return;
     if (!content) {
