@@ -158,6 +158,15 @@ def test_a_model_of_a_size_that_no_printer_makes_is_asked_for_its_unit_and_opene
     browser.wait("$('title').textContent === 'tee.stl' && $('scale').value === '100'")
 
 
+def test_work_that_takes_longer_than_a_moment_tells_how_long_it_is_under_way(browser: Browser, bench: Running) -> None:
+    browser.open(bench.address)
+    browser.wait(f"document.documentElement.dataset.version && {IDLE}")
+    under_way = "(({ store, update }) => update({ state: { ...store.state, busy: 'reading big.stl' } }))(modules['page/store'])"
+    browser.value(under_way)
+    assert browser.value("[$('summary').textContent, $('summary').dataset.elapsed]") == ["reading big.stl …", ""]
+    browser.wait("/^ [2-9]s$/.test($('summary').dataset.elapsed)")
+
+
 def test_a_typed_angle_turns_the_model_and_its_size_is_that_of_how_it_stands(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "typed.stl", stl(tee()))
     browser.click("#tab-model")
