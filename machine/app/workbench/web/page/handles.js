@@ -14,10 +14,17 @@ const REACH = 1.12; // of a section's radius at which the knobs of the tilt stan
 const STEP_MM = 0.5, STEP_DEG = 1;
 const KNOBS = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
 
+let last = { of: "", triangles: null, section: null }; // of a large model it takes a moment, and most news change nothing of it
+
 /** Middle and reach of what the chosen plane cuts, where planes are looked at; null: nothing. */
 export function sectionNow(picture) {
   const plane = store.tab === "parts" && !apartNow() && store.triangles && store.state.model && picture ? planeNow() : null;
-  return plane && sectionOf(store.triangles, plane, planesNow().slice(store.part - 1), picture.matrix());
+  if (!plane) return null;
+  const of = JSON.stringify([plane, planesNow().slice(store.part - 1), picture.matrix()]);
+  if (of !== last.of || store.triangles !== last.triangles) {
+    last = { of, triangles: store.triangles, section: sectionOf(store.triangles, plane, planesNow().slice(store.part - 1), picture.matrix()) };
+  }
+  return last.section;
 }
 
 export function handlesOf(picture) {
@@ -52,8 +59,9 @@ export function handlesOf(picture) {
     if (!$("handles").hidden) for (const knob of KNOBS) putAt($(knob.id), picture.placeOf(placeOf(knob)));
   });
   subscribe(() => {
+    const before = section;
     section = sectionNow(picture);
-    picture.plane(section && { ...planeNow(), ...section });
+    if (section !== before) picture.plane(section && { ...planeNow(), ...section });
     if (!section) $("handles").hidden = true;
   });
 }
