@@ -22,6 +22,15 @@ MANY_FACES = 500_000  # more make no better print: at 0.2 mm an edge they are an
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
 
 
+class SizeError(MeshError):
+    """A size that no printer makes. question: that as somebody asks it who can scale the model; units: those that its coordinates
+    may be in instead of mm, the likeliest first, each with what it is scaled by then."""
+
+    def __init__(self, sentence: str, question: str, units: dict[str, float]) -> None:
+        super().__init__(sentence)
+        self.question, self.units = question, units
+
+
 def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0)) -> tuple[Mesh, tuple[str, ...]]:
     """The solid of a model file, and a short sentence for every repair that was made.
 
@@ -36,6 +45,8 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
             surfaces = [Surface(surface.vertices * scale, surface.faces, surface.colours) for surface in surfaces]
         solid, notes = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
+    except SizeError as error:
+        raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     mesh = _place_on_platform(solid, rotate_deg)
@@ -93,10 +104,12 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
     fitting = [unit for unit in OTHER_UNITS if LEAST_MM <= size_mm * unit <= MOST_MM]
     if not fitting:
         raise MeshError(f"its largest extent is {size_mm:.4g} mm, {bound}: no common unit makes that a size to print")
-    factor = min(fitting, key=lambda unit: abs(np.log(size_mm * unit / TYPICAL_MM)))
-    raise MeshError(
-        f"its largest extent is {size_mm:.4g} mm, {bound}; "
-        f"if its coordinates are {OTHER_UNITS[factor]}, give --set process.scale={scale * factor:g}"
+    fitting.sort(key=lambda unit: abs(np.log(size_mm * unit / TYPICAL_MM)))
+    extent, likeliest = f"its largest extent is {size_mm:.4g} mm, {bound}", fitting[0]
+    raise SizeError(
+        f"{extent}; if its coordinates are {OTHER_UNITS[likeliest]}, give --set process.scale={scale * likeliest:g}",
+        f"{extent}: which unit are its coordinates in?",
+        {OTHER_UNITS[unit]: scale * unit for unit in fitting},
     )
 
 

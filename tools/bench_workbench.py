@@ -134,7 +134,7 @@ def in_page(running: Running, moves: int) -> tuple[list[float], list[float]]:
         browser.wait(f"{SCREEN}.shown")
         turns = [_turned(browser, k) for k in range(moves, -1, -1)]
         browser.click("#tab-parts")
-        browser.click("#planes input[value='2']")
+        browser.click("#parts-list input[value='2']")
         browser.wait("!$('handles').hidden")
         x, y = browser.value("(() => { const { x, y } = $('hand-along').getBoundingClientRect(); return [x + 15, y + 15]; })()")
         browser.hold((x, y))

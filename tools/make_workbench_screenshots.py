@@ -35,7 +35,7 @@ STEPS = (
     Step("model"),
     Step("finding", ("#tab-parts", "#find"), "document.documentElement.hasAttribute('data-searching')"),
     Step("parts", (), FOUND),
-    Step("plane", ("#planes tbody tr:last-child input",), "!document.getElementById('plane').hidden"),
+    Step("plane", ("#parts-list tbody tr:last-child input",), "!document.getElementById('plane').hidden"),
     Step("settings", ("#tab-settings",), "document.querySelectorAll('[data-key]').length > 100"),
     Step("slicing", ("#tab-slices", "#slice"), "document.getElementById('slice').disabled"),
     Step("sliced", (), SLICED),

@@ -87,6 +87,27 @@ def resting_orientations(mesh: Mesh, angle_deg: float) -> list[Orientation]:
     return sorted((orientation for orientation in _on_facets(mesh, angle_deg) if orientation.stable), key=_rank)
 
 
+@dataclass(frozen=True, eq=False)
+class RestingFacet:
+    """A facet of a model's convex hull on which it rests: its outward normal (3,), and the corners of its triangles (k, 3, 3),
+    mm."""
+
+    normal: Floats
+    corners: Floats
+
+
+def resting_facets(mesh: Mesh) -> list[RestingFacet]:
+    """The facets of the hull, its triangles grouped by plane, that the model rests on without tipping over, largest first."""
+    hull, directions = convex_hull(mesh.vertices), np.concatenate([_facets(mesh), UP[None]])
+    directions = directions[_rests(mesh, directions)]
+    if len(directions) == 0:
+        return []
+    along = hull.normals @ -directions.T
+    nearest = np.where(along.max(axis=1) >= cos(radians(SAME_FACET_DEG)), along.argmax(axis=1), -1)
+    groups = [(-direction, hull.vertices[hull.faces[nearest == k]]) for k, direction in enumerate(directions)]
+    return [RestingFacet(normal, corners) for normal, corners in groups if len(corners)]
+
+
 @cached_with_mesh
 def measure_upright(mesh: Mesh, angle_deg: float) -> Orientation:
     """The model as it stands."""

@@ -7,7 +7,7 @@ that stays whole. That a cut gains little, makes a small part or a long seam is 
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import cos, radians, sin
+from math import ceil, cos, floor, radians, sin
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from profiles.errors import PlanError
 EQUAL_MM2 = 1e-6
 SHIFT_MM, MOST_SHIFTS = 0.1, 10  # how the planes beside one that cannot be cut are shifted, of each lean
 LEANS_DEG = (0.0, 1.0, 3.0)
+MOST_PLACES = 400  # along a normal that are looked at for the nearest one to a plane
+FARTHER_LEANS_DEG = (*LEANS_DEG, 10.0, 30.0)  # on a model with steps all the way up only these miss them
 OUT_OF_REACH = "what it stands on is out of reach"
 MOST_SHOWN = 8  # colours in a message
 
@@ -122,6 +124,25 @@ def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
         for place in np.argsort(np.abs(shifts[column]), kind="stable"):
             if checked.reason[place] == Reason.FEASIBLE:
                 yield Plane(normals[row[place]], float(offsets[row[place], column[place]]))
+
+
+def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
+    """The planes that the sweep finds nothing against, over the whole height of what remains: first those of the same normal, the
+    nearest first, then those that lean by a few degrees."""
+    vertices = node.remainder.mesh.vertices
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # a plane that leans, leans about it
+    for lean_deg in FARTHER_LEANS_DEG:
+        for normal in _leaning(plane.normal, lean_deg):
+            heights = vertices @ normal
+            low, high = float(heights.min()), float(heights.max())
+            step_mm = max(SHIFT_MM, (high - low) / MOST_PLACES)
+            offsets: Floats = np.arange(floor(low / step_mm) + 1, ceil(high / step_mm)) * np.float64(step_mm)
+            own = problem.settings.model_copy(update={"offset_step_mm": step_mm})
+            reason = check(node.remainder, _limits(problem, normal[None]), own, np.zeros(len(offsets), np.int32), offsets).reason
+            free = offsets[reason == Reason.FEASIBLE]
+            for offset_mm in free[np.argsort(np.abs(free - normal @ middle), kind="stable")]:
+                yield Plane(normal, float(offset_mm))
 
 
 def _leaning(normal: Floats, lean_deg: float) -> Floats:

@@ -9,18 +9,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
+import numpy as np
+
 from mdp.cost.part_forecast import ModelForecast, PartForecast
 from mdp.mesh import Mesh
 from mdp.overhang import UP
 from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
-from mdp.search.by_hand import Refusal, cut_or_refuse, refusal
+from mdp.search.by_hand import Refusal, cut_or_refuse, planes_near, refusal
 from mdp.search.neck import find_neck
 from mdp.search.node import Node
 from mdp.search.obstacle import Obstacle, find_refused
 from mdp.search.problem import Problem
 from mdp.zone import NO_ZONES, Zones
 from profiles.profile import Profile
+
+MOST_TRIED = 16  # places for a plane that the sweep finds nothing against
+APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were refused
 
 Key = tuple[float, float, float, float]
 
@@ -76,15 +81,38 @@ class Trials:
     def neck(self, planes: Sequence[Plane], number: int, reach_mm: float) -> Plane | None:
         """The neck near the plane of the part of a number, of what the parts printed after it leave; None: there is none, or
         those cannot be cut off. planes as in attempt."""
-        later = planes[number - 1 :][::-1]
-        self._keep_alike(later)
-        if any(self._cut_off(plane) is not None for plane in later[len(self._cut) :]):
+        if not self._cut_later(planes, number):
             return None
         return find_neck(self._node.remainder.mesh, self._node.seam_weights, planes[number - 2], reach_mm)
+
+    def nearest(self, planes: Sequence[Plane], number: int) -> Plane | None:
+        """The plane of the part of a number at the nearest place along its normal where all planes can be cut, else leaning by a
+        few degrees; None: there is none among the likely ones. planes as in attempt."""
+        if not self.attempt(planes).refused:
+            return planes[number - 2]
+        if not self._cut_later(planes, number):
+            return None
+        apart_mm = APART_SHARE * float(np.ptp(self._problem.mesh.vertices @ planes[number - 2].normal))
+        refused: list[Plane] = []
+        for plane in planes_near(self._problem, self._node, planes[number - 2]):
+            if any(plane.normal is other.normal and abs(plane.offset_mm - other.offset_mm) < apart_mm for other in refused):
+                continue
+            if not self.attempt((*planes[: number - 2], plane, *planes[number - 1 :])).refused:
+                return plane
+            refused.append(plane)
+            if len(refused) == MOST_TRIED:
+                break
+        return None
 
     @property
     def _node(self) -> Node:
         return self._cut[-1][1] if self._cut else self._problem.root
+
+    def _cut_later(self, planes: Sequence[Plane], number: int) -> bool:
+        """Cut off the parts printed after that of a number; whether that can be done."""
+        later = planes[number - 1 :][::-1]
+        self._keep_alike(later)
+        return all(self._cut_off(plane) is None for plane in later[len(self._cut) :])
 
     def _keep_alike(self, order: Sequence[Plane]) -> None:
         """Forget the cuts from the first on that is not one of these."""

@@ -31,10 +31,10 @@ def test_what_the_page_prints_the_command_line_prints_from_its_plan(tmp_path: Pa
         browser.wait(f"document.documentElement.dataset.shown && $('title').textContent === {json.dumps(model.name)} && {IDLE}")
 
         find_as_it_lies(browser)
-        browser.wait("document.querySelectorAll('#planes input[type=radio]').length >= 2")
-        browser.click("#planes input[type=checkbox]:not(:checked)")
+        browser.wait("document.querySelectorAll('#parts-list input[type=radio]').length >= 2")
+        browser.click("#parts-list input[type=checkbox]:not(:checked)")
         browser.wait("$('undo').getAttribute('aria-label').startsWith('undo: lock')")
-        browser.click("#planes tr:last-child input[type=radio]")
+        browser.click("#parts-list tr:last-child input[type=radio]")
         browser.wait("!$('plane').hidden && !$('handles').hidden")
         before = float(browser.value("$('plane-offset').value"))
         browser.value("$('hand-along').focus()")

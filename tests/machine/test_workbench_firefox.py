@@ -72,7 +72,7 @@ def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) ->
         firefox.click("[data-view=top]")
         firefox.click("#fit")
         firefox.click("#lay")
-        firefox.wait("document.documentElement.dataset.busy === '' && $('lay').getAttribute('aria-pressed') === 'true'")
+        firefox.wait("modules['page/store'].store.facets && $('lay').getAttribute('aria-pressed') === 'true'")
         firefox.press(*middle(firefox, "canvas"))
         firefox.wait(done("lay a face down"))
         assert firefox.value("$('overhang').textContent") == "0.0 mm²"  # upside down a T needs no support
@@ -109,8 +109,9 @@ def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mar
         firefox.wait("Math.abs(Number($('plane-tilt').value) - 1) < 0.11")
         firefox.value("document.activeElement.blur()")
     put(firefox, "$('plane-tilt')", 30)
-    firefox.wait("$('plane-tilt').value === '30.0' && $('planes').dataset.shown.includes('0.866')")  # its cosine: it is there
-    firefox.click("#planes input[type=checkbox]")
+    cuts = "JSON.stringify(modules['page/store'].store.state.cuts)"
+    firefox.wait(f"$('plane-tilt').value === '30.0' && {cuts}.includes('0.866')")  # its cosine: the bench has it
+    firefox.click("#parts-list input[type=checkbox]")
     firefox.wait("$('plane-offset').disabled && !$('find-others').disabled")
     put(firefox, "$('mark-kind')", "no_support")
     firefox.click("#mark-middle")
@@ -118,8 +119,8 @@ def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mar
     locked = firefox.value("JSON.stringify([$('plane-offset').value, $('plane-tilt').value])")
     firefox.click("#find-others")
     firefox.wait(f"{FOUND} && {done('find parts')}")
-    assert firefox.value("document.querySelectorAll('#planes input[type=checkbox]:checked').length") == 1
-    firefox.click("#planes tr:has([type=checkbox]:checked) input[type=radio]")
+    assert firefox.value("document.querySelectorAll('#parts-list input[type=checkbox]:checked').length") == 1
+    firefox.click("#parts-list tr:has([type=checkbox]:checked) input[type=radio]")
     firefox.wait("!$('plane').hidden")
     assert firefox.value("JSON.stringify([$('plane-offset').value, $('plane-tilt').value])") == locked
     assert firefox.complaints == []

@@ -21,6 +21,9 @@ SLIPPED = """(({ add, scaled, sub, unit }, { faceMet }) => { let seed = 7;
     const on = add(scaled(a, along), scaled(b, 1 - along)), from = scaled(place(), 100);
     return faceMet({ corners: [a, b, c, b, a, d].flat(), count: 2 }, from, unit(sub(on, from)));
   }).filter((face) => face < 0).length; })(modules["template/math"], modules["page/triangles"])"""
+MENU = ["Remove", "Lock", "Print earlier", "Print later", "Settings of this part"]
+MENU_OF = """((part) => document.querySelector(`#parts-list tr:has([value="${part}"])`)
+  .dispatchEvent(new MouseEvent("contextmenu", { bubbles: true, cancelable: true, clientX: 50, clientY: 50 })))"""
 TURNED = "$('undo').getAttribute('aria-label') === 'undo: turn the model'"
 
 
@@ -91,10 +94,10 @@ def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser:
     open_model(browser, bench, "apart.stl", stl(tee()))
     find_as_it_lies(browser)
     browser.wait("document.documentElement.dataset.pieces === '2'")
-    first, second = browser.value("[...$('parts-list').querySelectorAll('td.words')].map((cell) => cell.textContent)")
+    first, second = browser.value("[...$('parts-list').querySelectorAll('.words')].map((cell) => cell.textContent)")
     assert first == "straight up"
     assert "° to the " in second
-    force = browser.value("$('parts-list').querySelectorAll('tbody tr')[1].cells[3].textContent")
+    force = browser.value("$('parts-list').querySelectorAll('tbody tr')[1].cells[5].textContent")
     assert force.endswith(" N")
     assert browser.value("$('joint-told').textContent").startswith("The joint of part 2, the weakest, has ")
     assert f"breaks at about {force}, pushed sideways" in browser.value("$('joint-told').textContent")
@@ -108,7 +111,19 @@ def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser:
     heights = (top + share * height for share in np.arange(0.05, 0.95, 0.05))
     met = next(chosen for y in heights if (chosen := part_at(browser, left + width / 2, y)))
     assert met == "2"  # from above downwards the part that was lifted off comes first
-    assert browser.value("$('planes').querySelector(':checked').value") == "2"
+    assert browser.value("$('parts-list').querySelector(':checked').value") == "2"
+    browser.click("#parts-list input[value='1']")
+    browser.value(f"{MENU_OF}(2)")
+    assert browser.value("[...$('part-menu').children].map((entry) => entry.textContent)") == MENU
+    browser.click("#part-menu button:nth-child(2)")
+    browser.wait("$('parts-list').querySelectorAll('[type=checkbox]:checked').length === 1 && $('part-menu').hidden")
+    browser.key("Delete")
+    browser.wait("$('problem').textContent === 'the plane of part 2 is locked: unlock it first'")
+    browser.click("#undo")
+    browser.wait("$('problem').hidden && $('parts-list').querySelectorAll('[type=checkbox]:checked').length === 0")
+    browser.key("Delete")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: remove a plane'")
+    assert browser.value("$('parts-list').querySelectorAll('tbody tr').length") == 1
 
 
 def test_another_bench_has_a_page_of_its_own_and_is_closed_in_the_list(browser: Browser, bench: Running) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
+from mdp.mesh import Mesh
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.conftest import WINDOW
@@ -16,6 +17,10 @@ from tests.shapes import ball, tee
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
 FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
+SHARES_DRAWN = """[...$('laid').querySelectorAll('canvas')].map((canvas) => {
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  return data.filter((_, k) => k % 4 === 3).reduce((sum, alpha) => sum + (alpha > 0), 0) / (canvas.width * canvas.height); })"""
+UNITS = ["in metres", "in inches", "in centimetres"]  # that make it a size to print, the likeliest first
 IDLE = "document.documentElement.dataset.busy === ''"
 
 
@@ -115,6 +120,10 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.value("$('ranker').value = 'learned'")
     browser.click("#find")
     browser.wait("$('front-notes').textContent.includes('it is laid down on its front (turned 90 about x): in one piece')")
+    assert browser.value("$('laid').textContent") == "as it stoodas it lies now"
+    browser.wait(f"{SHARES_DRAWN}.every((share) => share > 0.05 && share < 0.9)")  # of both small pictures
+    browser.click("#undo")
+    browser.wait("!$('laid').checkVisibility()")
 
 
 def test_red_follows_the_model_while_it_turns_and_the_server_says_the_same(browser: Browser, bench: Running) -> None:
@@ -135,6 +144,39 @@ def test_red_follows_the_model_while_it_turns_and_the_server_says_the_same(brows
     assert before > 500.0
 
 
+def test_a_model_of_a_size_that_no_printer_makes_is_asked_for_its_unit_and_opened_in_it(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    choose(browser, "tiny.stl", stl(Mesh(tee().vertices * 0.004, tee().faces)))
+    browser.wait("$('units').childElementCount === 3")
+    question = "tiny.stl: its largest extent is 0.16 mm, less than 1 mm: which unit are its coordinates in?"
+    assert browser.value("$('problem').textContent") == question
+    assert browser.value("[...$('units').children].map((button) => button.textContent)") == UNITS
+    browser.click("#units button")
+    browser.wait("$('title').textContent === 'tiny.stl' && $('scale').value === '100000' && $('size-z').value === '160.00'")
+    assert browser.value("$('problem').hidden && $('tiny').hidden")
+    browser.click("#undo")
+    browser.wait("$('title').textContent === 'tee.stl' && $('scale').value === '100'")
+
+
+def test_work_that_takes_longer_than_a_moment_tells_how_long_it_is_under_way(browser: Browser, bench: Running) -> None:
+    browser.open(bench.address)
+    browser.wait(f"document.documentElement.dataset.version && {IDLE}")
+    under_way = "(({ store, update }) => update({ state: { ...store.state, busy: 'reading big.stl' } }))(modules['page/store'])"
+    browser.value(under_way)
+    assert browser.value("[$('summary').textContent, $('summary').dataset.elapsed]") == ["reading big.stl …", ""]
+    browser.wait("/^ [2-9]s$/.test($('summary').dataset.elapsed)")
+
+
+def test_a_typed_angle_turns_the_model_and_its_size_is_that_of_how_it_stands(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "typed.stl", stl(tee()))
+    browser.click("#tab-model")
+    drag_slider(browser, "turn-x-typed", 90, "input")
+    assert "40.0 × 40.0 × 10.0 mm" in browser.value("$('model-told').textContent")  # while it turns
+    drag_slider(browser, "turn-x-typed", 90, "change")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay the model down' && $('turn-x-typed').value === '0'")
+    browser.wait("$('model-told').textContent.includes('40.0 × 40.0 × 10.0 mm') && $('size-z').value === '10.00'")
+
+
 def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "tee.stl", stl(tee()))
     browser.click("#tab-model")
@@ -142,6 +184,7 @@ def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: 
     browser.click("#fit")
     browser.click("#lay")
     browser.wait("$('rings').hasAttribute('hidden')")  # one of them goes through the middle
+    browser.wait("modules['page/store'].store.facets?.facets.length === 6")  # of the hull of a T; no part of its arms' undersides
     browser.press(
         *browser.value(
             "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
@@ -173,9 +216,39 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
     browser.wait("!$('problem').hidden")
     assert "misses the model" in browser.value("$('problem').textContent")
     browser.wait(f"Math.abs(Number($('plane-offset').value) - {moved}) < 0.01 && !$('handles').hidden")
+    browser.click("#dismiss")
+    browser.wait("!$('trouble').checkVisibility()")
+    drag_slider(browser, "plane-offset", 39.95, "change")  # 0.05 mm below the top
+    browser.wait("$('put-near').checkVisibility()")
+    browser.click("#put-near")
+    browser.wait("$('plane-offset').value === '39.60' && $('problem').hidden")
+    assert browser.value("$('plane-moved').textContent").startswith("It stands 0.35 mm farther down than asked for")
     browser.value("$('hand-tilt-a').focus()")
     browser.key("ArrowUp")
     browser.wait("Math.abs(Number($('plane-tilt').value) - 1) < 0.11")
+
+
+def test_a_plane_dragged_where_it_cannot_be_cut_stays_at_the_last_place_where_it_can(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("[data-view=front]")
+    browser.click("#fit")
+    browser.click("#add")
+    browser.wait("!$('handles').hidden && $('plane-told').textContent")
+    x, y = browser.value(
+        "(() => { const b = $('hand-along').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+    )
+    browser.hold((x, y), (x, y - 30))
+    browser.wait("document.documentElement.dataset.triedMs > 0 && Number($('plane-offset').value) > 20.5")
+    shown = "[$('plane-offset').value, ...[...$('parts-list').rows[2].cells].slice(1, 5).map((cell) => cell.textContent)]"
+    allowed = browser.value(shown)
+    browser._send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y - 900, button="left", buttons=1)
+    browser.wait("$('plane-told').textContent.includes('misses the model')")
+    assert browser.value(shown) == allowed
+    browser.release((x, y - 900))
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane' && $('problem').hidden")
+    browser.wait(f"$('plane-offset').value === '{allowed[0]}' && $('plane-told').textContent.includes('mm of seams')")
+    assert browser.value("document.documentElement.dataset.obstacle") == ""
 
 
 def test_a_setting_is_found_by_a_word_changed_and_marked(browser: Browser, bench: Running) -> None:

@@ -152,10 +152,10 @@ def test_the_head_is_drawn_where_it_would_touch_and_goes_with_the_plane(browser:
         page.do("add", normal=[0, 0, 1], offset_mm=10.0)
         page.until(lambda state: state["parts"] == 2)
         looked_at(browser, bench, "tee.stl")
-        browser.click("#planes input[type=radio]")
+        browser.click("#parts-list input[value='2']")
         page.do("move", part=2, normal=[0.6, 0, 0.8], offset_mm=5.0)
         browser.wait("document.documentElement.dataset.obstacle")
-        assert page.until(lambda state: state["refused"])["refused"]["touch"] is not None
+        assert page.until(lambda state: state["refused"])["refused"]["obstacle"]["touch"] is not None
         assert browser.value("document.documentElement.dataset.obstacle") == "head"
         page.do("move", part=2, normal=[0, 0, 1], offset_mm=11.0)
         browser.wait("document.documentElement.dataset.obstacle === ''")
@@ -177,7 +177,7 @@ def test_a_model_on_a_pedestal_is_drawn_on_it_and_has_the_figures_of_the_search(
         assert (trial["support_area_mm2"], trial["seam_mm"]) == pytest.approx((row.support_area_mm2, row.seam_mm))
         looked_at(browser, bench, "tee.stl")
         browser.wait(f"document.documentElement.dataset.pedestal === '{page.state['pedestal']}'")
-        browser.click("#planes input[value='2']")
+        browser.click("#parts-list input[value='2']")
         browser.wait("!$('handles').hidden")  # the plane meets the model, which is 40 mm tall, 38 mm above the pedestal
         page.do("set", key="search.pedestal_mm", value=None)
         assert page.until(lambda state: not state["pedestal_mm"])["cuts"][0]["offset_mm"] == 38.0

@@ -8,7 +8,7 @@ import pytest
 
 from mdp.mesh import Mesh
 from mdp.model_file import locate
-from mdp.read import MANY_FACES, read_mesh, too_fine
+from mdp.read import MANY_FACES, SizeError, read_mesh, too_fine
 from profiles.errors import MeshError
 from tests.mdp import files
 from tests.mdp.files import refusal, save
@@ -42,6 +42,13 @@ def test_an_absurd_size_is_refused_with_the_scale_that_fits(tmp_path: Path, size
     sentence = refusal(files.written(tmp_path / "box.off", files.placed(size_mm, size_mm / 2, size_mm / 2)))
     assert f"largest extent is {size_mm:.4g} mm" in sentence
     assert hint in sentence
+
+
+def test_the_units_that_fit_are_told_with_their_scale_the_likeliest_first(tmp_path: Path) -> None:
+    with pytest.raises(SizeError) as refused:
+        read_mesh(files.written(tmp_path / "box.off", files.placed(0.16, 0.1, 0.1)))
+    assert refused.value.units == {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0}
+    assert refused.value.question.endswith("its largest extent is 0.16 mm, less than 1 mm: which unit are its coordinates in?")
 
 
 def test_a_scale_brings_a_model_in_metres_to_size(tmp_path: Path) -> None:

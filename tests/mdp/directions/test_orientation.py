@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.directions.orientation import best_orientation, resting_orientations, risky_areas
+from mdp.directions.orientation import best_orientation, resting_facets, resting_orientations, risky_areas
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.pose import about, unit
@@ -121,3 +121,12 @@ def test_what_is_known_of_a_mesh_is_worked_out_once_and_keeps_the_mesh_from_nobo
     del mesh
     gc.collect()
     assert left() is None
+
+
+def test_a_tee_rests_on_six_facets_of_its_hull_and_not_on_the_undersides_of_its_arms() -> None:
+    lean = np.array([0.8944, 0.0, -0.4472])  # from the foot to the end of an arm
+    expected = [(0, -1, 0), (0, 1, 0), (0, 0, 1), lean * (-1, 1, 1), lean, (0, 0, -1)]
+    facets = resting_facets(tee())
+    assert np.array([facet.normal for facet in facets]) == pytest.approx(np.array(expected), abs=1e-4)
+    front = facets[0].corners
+    assert (front.shape, set(front[..., 1].ravel().tolist())) == ((4, 3, 3), {-5.0})

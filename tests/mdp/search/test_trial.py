@@ -1,5 +1,6 @@
 """Planes tried by hand: the same figures as the cuts have, whatever was tried before, and why a plane is refused."""
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
@@ -9,7 +10,7 @@ from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.by_plan import cut_by_plan
 from mdp.search.trial import Trials
 from profiles.profile import load
-from tests.shapes import box, hollow_tee, tee
+from tests.shapes import box, hollow_tee, standing, tee
 
 PROFILE = load(settings=["search.directions=60"])
 ARMS = (Plane(np.array([1.0, 0.0, 0.0]), 8.0), Plane(np.array([-1.0, 0.0, 0.0]), 8.0))
@@ -135,3 +136,27 @@ def test_a_sliver_is_marked_on_the_surface_that_it_would_be_cut_off() -> None:
     assert "a sliver 0.2 mm thin" in tried.refused
     assert tried.obstacle is not None
     assert tried.obstacle.places_mm[0][2] == 40.0
+
+
+@pytest.mark.parametrize(("wanted_mm", "nearest_mm"), [(30.0, 29.9), (0.05, 0.3), (60.0, 39.6), (20.0, 20.0)])
+def test_a_plane_is_shifted_to_the_nearest_place_where_it_can_be_cut(wanted_mm: float, nearest_mm: float) -> None:
+    up = np.array([0.0, 0.0, 1.0])
+    nearest = trials(tee()).nearest([Plane(up, wanted_mm)], 2)
+    assert nearest is not None
+    assert (nearest.normal.tolist(), nearest.offset_mm) == ([0.0, 0.0, 1.0], pytest.approx(nearest_mm))
+
+
+def test_where_no_level_plane_can_be_cut_the_nearest_one_leans() -> None:
+    outline = [(0, 0), (40, 0), *((40 - 0.5 * k, 0.25 * (k + step)) for k in range(40) for step in (0, 1)), (0, 10)]
+    stairs = standing(m3.Manifold.extrude(m3.CrossSection([outline]), 20).rotate((90, 0, 0)))
+    tried = Trials(stairs, PROFILE)  # no step is as high as search.fragile_mm
+    level = Plane(np.array([0.0, 0.0, 1.0]), 5.0)
+    nearest = tried.nearest([level], 2)
+    assert nearest is not None
+    assert nearest.normal[2] < 1.0
+    assert tried.attempt([nearest]).refused == ""
+
+
+def test_where_other_planes_are_refused_no_place_helps() -> None:
+    outside = Plane(np.array([1.0, 0.0, 0.0]), 25.0)
+    assert trials(tee()).nearest((Plane(np.array([0.0, 0.0, 1.0]), 30.0), outside), 2) is None

@@ -12,8 +12,8 @@ import numpy as np
 from machine.app.workbench.bench.bench import Bench, laid_down, with_parts, with_rotation
 from machine.app.workbench.bench.part_settings import with_part_setting, without_part_settings
 from machine.app.workbench.bench.planes import planned_part
-from machine.app.workbench.bench.values import Asked, number, rotation_rows, text_or_none, whole
-from mdp.mesh import Floats, Mesh
+from machine.app.workbench.bench.values import Asked, number, rotation_rows, text_or_none, unit_vector, whole
+from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.errors import PlanError
 from profiles.profile import Profile
@@ -37,13 +37,8 @@ def stand(bench: Bench, asked: Asked) -> Bench:
 
 
 def lay(bench: Bench, asked: Asked) -> Bench:
-    """Lay the face of a number down on the platform."""
-    assert bench.model is not None
-    face, mesh = whole(asked, "face", 0, bench.model.faces - 1), bench.model.mesh()
-    (normal,) = Mesh(mesh.vertices[mesh.faces[face]], np.array([[0, 1, 2]])).normals
-    if not normal.any():
-        raise PlanError(f"face {face} has no area, so nothing can be laid on it")
-    return with_rotation(bench, _rounded(laid_down(bench, normal)))
+    """Lay the model down on a side of this outward `normal`, in its own frame."""
+    return with_rotation(bench, _rounded(laid_down(bench, np.array(unit_vector(asked, "normal")))))
 
 
 def take(bench: Bench, asked: Asked) -> Bench:

@@ -4,26 +4,41 @@ The edits take the bench, on which a model lies, and what is asked, and give the
 sense.
 """
 
-from math import hypot
-
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.bench.values import MOST_MM, Asked, number, vector, vector_of, whole
+from machine.app.workbench.bench.values import MOST_MM, Asked, number, unit_vector, vector_of, whole
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 
 Cuts = tuple[PlannedPart, ...]
-LEAST_NORMAL, MOST_NORMAL = 1e-6, 1e6
 
 
 def add_plane(bench: Bench, asked: Asked) -> Cuts:
     """The plane `normal`, `offset_mm` for a new part printed after part `after`, without that as the last one."""
     cuts = bench.cuts or ()
-    index = whole({"after": len(cuts) + 1, **asked}, "after", 1, len(cuts) + 1) - 1
+    index = added_part(bench, asked) - 2
     if len(cuts) + 2 > MOST_PARTS:
         raise PlanError(f"there are {len(cuts) + 1} parts: {MOST_PARTS} are allowed")
     return *cuts[:index], _plane(asked), *cuts[index:]
+
+
+def added_part(bench: Bench, asked: Asked) -> int:
+    """The number that the new part has."""
+    most = len(bench.cuts or ()) + 1
+    return whole({"after": most, **asked}, "after", 1, most) + 1
+
+
+def added_anywhere(bench: Bench, asked: Asked) -> list[tuple[Cuts, int]]:
+    """The planes with the new one in every place of the print order, the one asked for first, each with its part's number."""
+    wanted = added_part(bench, asked)
+    numbers = sorted(range(2, len(bench.cuts or ()) + 3), key=lambda number: abs(number - wanted))
+    return [(add_plane(bench, {**asked, "after": number - 1}), number) for number in numbers]
+
+
+def moved_alone(bench: Bench, asked: Asked) -> list[tuple[Cuts, int]]:
+    """The planes with that of `part` moved, and its number."""
+    return [(move_plane(bench, asked), check_unlocked(bench, asked))]
 
 
 def move_plane(bench: Bench, asked: Asked) -> Cuts:
@@ -67,8 +82,4 @@ def _replaced(bench: Bench, asked: Asked, *instead: PlannedPart) -> Cuts:
 
 
 def _plane(asked: Asked) -> PlannedPart:
-    normal = vector(asked, "normal")
-    length = hypot(*normal)
-    if not LEAST_NORMAL <= length <= MOST_NORMAL:
-        raise PlanError(f"normal is {asked['normal']}: a direction of a length of about 1 is expected")
-    return PlannedPart(vector_of(value / length for value in normal), number(asked, "offset_mm", -MOST_MM, MOST_MM))
+    return PlannedPart(unit_vector(asked, "normal"), number(asked, "offset_mm", -MOST_MM, MOST_MM))

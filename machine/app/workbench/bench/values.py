@@ -1,6 +1,7 @@
 """Values: what a page has sent with a command, checked one by one; each raises PlanError with a sentence for what it is not."""
 
 from collections.abc import Iterable
+from math import hypot
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -12,6 +13,7 @@ Asked = dict[str, Any]  # a command `{"do": NAME, ...}` as it comes from a page
 MOST_MM = 1e5
 MOST_NUMBER = 1e300  # an int of a page may be longer than any float
 ROTATION_ERROR = 1e-6
+LEAST_LENGTH, MOST_LENGTH = 1e-6, 1e6  # of a direction
 
 
 def is_number(value: Any) -> TypeGuard[int | float]:
@@ -49,6 +51,15 @@ def vector(asked: Asked, key: str, most: float = MOST_NUMBER) -> Vector:
     if max(map(abs, value)) > most:
         raise PlanError(f"{key} is {value}: {-most:g} to {most:g} is allowed")
     return vector_of(value)
+
+
+def unit_vector(asked: Asked, key: str) -> Vector:
+    """A direction, whose length is made 1."""
+    value = vector(asked, key)
+    length = hypot(*value)
+    if not LEAST_LENGTH <= length <= MOST_LENGTH:
+        raise PlanError(f"{key} is {asked[key]}: a direction of a length of about 1 is expected")
+    return vector_of(x / length for x in value)
 
 
 def vector_of(values: Iterable[float]) -> Vector:

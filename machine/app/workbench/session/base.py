@@ -4,6 +4,7 @@ import asyncio
 import sys
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -19,22 +20,30 @@ WAITING = "waiting until the work of other benches is done"
 LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
 LONGEST_ASK = 80  # letters of the name of a command
 MOST_ANSWERS = 20  # the pages are told what became of so many commands with a name, the last ones
+MOST_PROBLEMS = 20  # pages that are each told what could not be done last
+asking: ContextVar[str] = ContextVar("asking", default="")  # the page that is obeyed, or worked for; "": it has no name
+
+
+def hear_from(page: object) -> None:
+    """All that the running task does from now on, and begins, is for the page of this name, if it is one."""
+    asking.set(page if isinstance(page, str) and len(page) <= LONGEST_ASK else "")
 
 
 class SessionBase(Observable):
     """All from the event loop; the pages wait for `changed`.
 
-    problem: what could not be done last; answers: to the last commands that a page gave a name, by that: why they were refused,
-    "" for those that are done; busy: what the pages wait for; quick, long, hand: its tasks in the pools; received: the files of
-    its pages; followers: called after every change of the bench; endings: as the session closes, its files still there.
+    problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
+    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; stopped: what became
+    of work that was stopped last; quick, long, hand: its tasks in the pools; received: the files of its pages; followers: called
+    after every change of the bench; endings: as the session closes, its files still there.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
         super().__init__()
         self.history = History(Step("", bench))
-        self.problem = ""
+        self.problems: dict[str, str] = {}
         self.answers: dict[str, str] = {}
-        self.busy = ""
+        self.busy = self.stopped = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
         self.endings: list[Callable[[], None]] = []
@@ -46,6 +55,11 @@ class SessionBase(Observable):
     def bench(self) -> Bench:
         """What lies on the workbench now."""
         return self.history.now.bench
+
+    @property
+    def problem(self) -> str:
+        """What could not be done last, whoever wanted it; "": all could."""
+        return next(reversed(self.problems.values()), "")
 
     def close(self) -> None:
         """End all work; its files go, and its pages are told."""
@@ -81,12 +95,18 @@ class SessionBase(Observable):
         return task
 
     def refuse(self, error: Exception) -> str:
-        """Tell the pages what could not be done, a bug with the log that it got; the sentence."""
-        self.problem = str(error) if isinstance(error, UserError) else bug_in_words(error, sys.argv)
-        if len(self.problem) > LONGEST_SENTENCE:
-            self.problem = f"{self.problem[:LONGEST_SENTENCE]} ..."
+        """Tell the page that wanted it what could not be done, a bug with the log that it got; the sentence."""
+        sentence = str(error) if isinstance(error, UserError) else bug_in_words(error, sys.argv)
+        if len(sentence) > LONGEST_SENTENCE:
+            sentence = f"{sentence[:LONGEST_SENTENCE]} ..."
+        self._tell_problem(sentence)
         self.notify()
-        return self.problem
+        return sentence
+
+    def forget_problem(self) -> None:
+        """Tell the page whose command is obeyed no more what could not be done, nor what all are told."""
+        for page in (asking.get(), ""):
+            self.problems.pop(page, None)
 
     def answer(self, ask: object, refusal: str = "") -> None:
         """Tell the pages what became of a command, the one that gave it by the name that it gave it, if it did."""
@@ -101,14 +121,21 @@ class SessionBase(Observable):
     def advance(self, history: History, lost: str = "") -> None:
         """Go on with another history; a step forth tells what it has taken away."""
         forth = history.before[-1:] == (self.history.now,)
-        self.problem = ""
+        self.problems.clear()  # they told of what lay there before
+        self.stopped = ""
         for sentence in (lost, history.now.lost if forth else ""):
             self.add_problem(sentence)
         self.become(history)
 
     def add_problem(self, sentence: str) -> None:
         """Tell a sentence beside what is told already."""
-        self.problem = "; ".join(filter(None, (self.problem, sentence)))
+        if sentence:
+            self._tell_problem("; ".join(filter(None, (self.problems.get(asking.get(), ""), sentence))))
+
+    def _tell_problem(self, sentence: str) -> None:
+        page = asking.get()
+        self.problems.pop(page, None)  # the newest is the last
+        self.problems = dict([*self.problems.items(), (page, sentence)][-MOST_PROBLEMS:])
 
     def amend(self, bench: Bench, better: Bench) -> None:
         """What lies on the bench, if it is still this, known better; no step of its own."""

@@ -7,12 +7,13 @@ from typing import Any
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.changes import lay, lock, reset_part, set_part, stand, take, turn
-from machine.app.workbench.bench.planes import Cuts, add_plane, move_plane, remove_plane, reorder
+from machine.app.workbench.bench.planes import Cuts, added_anywhere, move_plane, moved_alone, remove_plane, reorder
 from machine.app.workbench.bench.settings import with_name, with_typed, without_settings
 from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
 from machine.app.workbench.bench.values import Asked, text_or_none
 from machine.app.workbench.session.finding import search_way
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.session.trials import Place
 from profiles.errors import PlanError
 
 
@@ -60,6 +61,16 @@ def _planes(word: str, edit: Callable[[Bench, Asked], Cuts], instead: Callable[[
     return Command(Need.MODEL, lambda session, asked: session.trials.take(word, lambda bench: edit(bench, asked), instead(asked)))
 
 
+def _place(word: str, orders: Callable[[Bench, Asked], list[tuple[Cuts, int]]]) -> Command:
+    """orders: the planes with that which is put somewhere, in the print orders that will do, the wanted one first."""
+
+    def act(session: Session, asked: Asked) -> Work:
+        place = Place(asked, lambda bench: orders(bench, asked))
+        return session.trials.take(word, lambda bench: place.orders(bench)[0][0], place=place)
+
+    return Command(Need.MODEL, act)
+
+
 def _marks(task: str) -> Command:
     return Command(Need.MODEL, lambda session, asked: session.marking.take(task, asked))
 
@@ -81,9 +92,8 @@ def _reset(session: Session, asked: Asked) -> Work:
 
 
 def _stop(session: Session, asked: Asked) -> None:
-    session.finding.stop()
-    session.slicing.stop()
-    session.comparing.stop()
+    told = session.finding.stop(), session.slicing.stop(), session.comparing.stop()
+    session.stopped = " ".join(filter(None, told))
 
 
 def _too_early(asked: Asked) -> str:
@@ -92,6 +102,8 @@ def _too_early(asked: Asked) -> str:
 
 COMMANDS: dict[str, Command] = {
     "demo": Command(Need.NOTHING, lambda session, asked: session.open_demo(str(asked.get("name")))),
+    "unit": Command(Need.NOTHING, lambda session, asked: session.open_in_unit(asked.get("unit"))),
+    "dismiss": Command(Need.NOTHING, lambda session, asked: None),
     "undo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.undo())),
     "redo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.redo())),
     "set": Command(Need.NOTHING, _set),
@@ -106,8 +118,8 @@ COMMANDS: dict[str, Command] = {
     "stop": Command(Need.NOTHING, _stop),
     "take": _change("take another number of parts", take),
     "try": Command(Need.MODEL, lambda session, asked: session.trials.move(move_plane(session.bench, asked))),
-    "add": _planes("add a plane", add_plane),
-    "move": _planes("move a plane", move_plane),
+    "add": _place("add a plane", added_anywhere),
+    "move": _place("move a plane", moved_alone),
     "remove": _planes("remove a plane", remove_plane),
     "reorder": _planes("print a part at another time", reorder, _too_early),
     "neck": Command(Need.MODEL, lambda session, asked: session.trials.take_neck(asked)),
@@ -124,7 +136,8 @@ COMMANDS: dict[str, Command] = {
 
 def obey(session: Session, asked: Asked) -> None:
     """Do what a page asks for, `{"do": NAME, ...}`, or begin with it. Raises UserError for what cannot be done."""
-    session.problem = ""
+    session.forget_problem()
+    session.stopped = ""
     name, ask = asked.get("do"), asked.get("ask")
     command = COMMANDS.get(name) if isinstance(name, str) else None
     if command is None:

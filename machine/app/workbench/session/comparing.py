@@ -30,10 +30,12 @@ class Comparing:
             self.text = WAITING if self._session.long.pool.full else "comparing"
             self._task = self._session.start(self._compare(self._session.bench))
 
-    def stop(self) -> None:
-        """End the comparison."""
-        if self._task is not None:
-            self._task.cancel()
+    def stop(self) -> str:
+        """End the comparison. What became of it, as a sentence; "" where nothing was compared."""
+        if not self.text or self._task is None:
+            return ""
+        self._task.cancel()
+        return "The comparison was stopped: nothing of it is kept."
 
     async def _compare(self, bench: Bench) -> None:
         def follow(text: str) -> None:

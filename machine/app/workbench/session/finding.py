@@ -10,6 +10,7 @@ from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench,
 from machine.app.workbench.session.base import WAITING, SessionBase
 from machine.app.workbench.work.cutting import Found, Searched, SearchWay
 from profiles.errors import PlanError
+from profiles.frozen import Vector
 
 BY_DEFAULT = SearchWay()
 
@@ -31,11 +32,12 @@ def search_way(asked: dict[str, Any]) -> SearchWay:
 
 
 class Finding:
-    """search: the one under way; notes: of the last one."""
+    """search: the one under way; notes: of the last one; laid: how it found the model turned, and how it has turned it."""
 
     def __init__(self, session: SessionBase) -> None:
         self.search: Search | None = None
         self.notes: tuple[str, ...] = ()
+        self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
         self._session = session
         self._task: asyncio.Task[None] | None = None
         self._pricing: asyncio.Task[None] | None = None  # of the best of a search that was stopped
@@ -50,17 +52,20 @@ class Finding:
             self.search = Search(bench, Searched(WAITING if self._session.long.pool.full else "beginning"))
             self._task = self._session.start(self._find(bench, way))
 
-    def stop(self) -> None:
-        """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known."""
+    def stop(self) -> str:
+        """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known.
+        What became of it, as a sentence; "" where there was none."""
         search, self.search = self.search, None
         if search is None or self._task is None:
-            return
+            return ""
         self._task.cancel()
         self._session.start(self._session.long.warm())
         best = search.searched.best
-        if best is not None and best.planes:
-            self._session.do("stop the search", with_front(self._session.bench, [replace(best, chosen=True)]))
-            self._pricing = self._session.start(self._price(self._session.bench))
+        if best is None or not best.planes:
+            return "The search was stopped before it had cut anything: all is as it was."
+        self._session.do("stop the search", with_front(self._session.bench, [replace(best, chosen=True)]))
+        self._pricing = self._session.start(self._price(self._session.bench))
+        return f"The search was stopped, and the best so far is taken: {best.parts} parts."
 
     async def _find(self, bench: Bench, way: SearchWay) -> None:
         def follow(searched: Searched) -> None:
@@ -73,6 +78,7 @@ class Finding:
             self.notes = outcome.notes
             now = self._session.bench
             laid = now if outcome.turn is None else with_rotation(now, (outcome.turn @ np.array(now.rotation)).tolist())
+            self.laid = None if laid is now else (now.rotation, laid.rotation)
             self._session.do("find parts", with_front(laid, outcome.front))
         finally:
             if self.search is not None and self.search.bench is bench:

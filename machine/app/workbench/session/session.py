@@ -23,8 +23,8 @@ from machine.app.workbench.bench.bench import (
 )
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.bench.settings import check_block, profile_as_given
-from machine.app.workbench.session.base import SessionBase
+from machine.app.workbench.bench.settings import check_block, profile_as_given, with_typed
+from machine.app.workbench.session.base import SessionBase, asking
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.keeping import Keeping
@@ -35,7 +35,7 @@ from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
 from machine.app.workbench.work.kept_work import KeptWork
-from machine.app.workbench.work.models import Resting
+from machine.app.workbench.work.models import Resting, Unscaled
 from machine.app.workbench.work.worker_pool import WorkerPools
 from machine.planning.stops import parse_stops
 from mdp.directions.turns import turned_by
@@ -43,7 +43,7 @@ from mdp.model_file import locate
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import MANY_FACES
-from profiles.errors import PlanError
+from profiles.errors import MeshError, PlanError
 from profiles.profile import Profile
 
 
@@ -58,9 +58,28 @@ class OpenBench:
     work: str
 
 
+@dataclass(frozen=True)
+class OfUnknownUnit:
+    """A model that waits for the word what its coordinates are in: the page that wanted it, its file and name, and the units that
+    may be, each with what it is scaled by then."""
+
+    page: str
+    path: Path
+    name: str
+    units: dict[str, float]
+
+
+class _UnscaledError(MeshError):
+    """The model on the bench, or that comes there, has a size that no printer makes."""
+
+    def __init__(self, unscaled: Unscaled) -> None:
+        super().__init__(unscaled.sentence)
+        self.unscaled = unscaled
+
+
 class Session(SessionBase):
     """A bench with all work on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
-    this one too."""
+    this one too; unscaled: the model that waits for its unit."""
 
     def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
         super().__init__(Bench(profile, given=given), pools)
@@ -76,6 +95,7 @@ class Session(SessionBase):
         self._ranking: asyncio.Task[None] | None = None
         self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
+        self.unscaled: OfUnknownUnit | None = None
 
     def warm(self) -> None:
         """Load the program's heavy parts while nobody waits."""
@@ -83,7 +103,8 @@ class Session(SessionBase):
             self.start(tasks.warm())
 
     async def open_model(self, path: Path, name: str) -> None:
-        """Put the model of a file on the bench. Raises UserError as the command line tells it."""
+        """Put the model of a file on the bench. Raises UserError as the command line tells it; where its size is none that a
+        printer makes, a page is asked for its unit."""
         self.readiness.load()
         if self._ranking is not None and self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self._ranking.cancel()  # it would be waited for
@@ -91,8 +112,29 @@ class Session(SessionBase):
             read_for, model = None, None
             while model is None or _reads(self.bench.profile) != read_for:  # another scale may be set meanwhile
                 read_for = _reads(self.bench.profile)
-                model = await self._read(path, name, self.bench.profile)
+                try:
+                    model = await self._read(path, name, self.bench.profile)
+                except _UnscaledError as error:
+                    self.unscaled = OfUnknownUnit(asking.get(), path, name, error.unscaled.units)
+                    raise MeshError(error.unscaled.question if asking.get() else error.unscaled.sentence) from None
             self.do(f"open {name}", with_model(self.bench, model))
+        self._begin_ranking(model)
+
+    async def open_in_unit(self, unit: object) -> None:
+        """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
+        waits, bench = self.unscaled, self.bench
+        if waits is None or not isinstance(unit, str) or unit not in waits.units:
+            raise PlanError(
+                f"unit is {unit!r}: {', '.join(waits.units) if waits else 'nothing, for no model waits for one,'} is allowed"
+            )
+        given = with_typed(bench.given, "process.scale", f"{waits.units[unit]:g}", bench.profile)
+        scaled = with_profile(bench, given, profile_as_given(given, bench.profile))
+        with self.waiting(f"reading {waits.name}"):
+            model = await self._read(waits.path, waits.name, scaled.profile)
+        if self.bench is not bench:
+            raise PlanError(f"open {waits.name}: what lies on the workbench has changed meanwhile, so it was not done")
+        self.unscaled = None
+        self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
         self._begin_ranking(model)
 
     async def open_demo(self, name: str) -> None:
@@ -194,7 +236,9 @@ class Session(SessionBase):
 
     async def _read(self, path: Path, name: str, profile: Profile) -> Model:
         """The model of a file, whose mesh stays as long as anybody has it."""
-        model: Model = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file())
+        model: Model | Unscaled = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file())
+        if isinstance(model, Unscaled):
+            raise _UnscaledError(model)
         finalize(model, model.mesh_file.unlink, missing_ok=True)
         return model
 

@@ -82,11 +82,13 @@ class Slicing:
             self.under_way = SlicingUnderWay(bench, self._count, begins)
             self._task = self._session.start(self._slice(self.under_way))
 
-    def stop(self) -> None:
-        """End the slicing."""
-        self.under_way = None
-        if self._task is not None:
-            self._task.cancel()
+    def stop(self) -> str:
+        """End the slicing. What became of it, as a sentence; "" where nothing was sliced."""
+        under_way, self.under_way = self.under_way, None
+        if under_way is None or self._task is None:
+            return ""
+        self._task.cancel()
+        return "Slicing was stopped: " + ("the slices from before stay." if self.latest() else "there are no slices.")
 
     async def _slice(self, begun: SlicingUnderWay) -> None:
         walls: dict[int, bytes] = {}

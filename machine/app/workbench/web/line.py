@@ -8,6 +8,7 @@ from weakref import WeakKeyDictionary
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from machine.app.workbench.session.base import hear_from
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.snapshot import snapshot
@@ -24,7 +25,11 @@ GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
 async def talk(session: Session, socket: WebSocket) -> None:
     """State out, commands in, until either side goes. A page that reads nothing holds up nobody but itself."""
     await socket.accept()
-    await until_either_ends(tell(session, lambda: snapshot(session), socket), _hear(session, socket))
+    try:
+        await until_either_ends(tell(session, lambda: snapshot(session), socket), _hear(session, socket))
+    finally:
+        if not session.closed:
+            session.trials.settle()  # of a plane that the page had in its hand
 
 
 async def refuse_closed(socket: WebSocket) -> None:
@@ -76,6 +81,7 @@ async def _hear(session: Session, socket: WebSocket) -> None:
         text, asked = await receive(socket), dict[str, Any]()
         try:
             asked = parsed(text, MOST_COMMAND)
+            hear_from(asked.get("page"))
             obey(session, asked)
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
             session.answer(asked.get("ask"), session.refuse(error))

@@ -15,6 +15,7 @@ from machine.app.workbench.bench.page_words import page_words
 from machine.app.workbench.bench.settings import settings_list
 from machine.app.workbench.bench.values import is_small_number
 from machine.app.workbench.printing.prints import Prints
+from machine.app.workbench.session.base import hear_from
 from machine.app.workbench.session.commands import Need, check_need
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
@@ -68,6 +69,7 @@ def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
         route("model/{key}", _model),
         route("marks/{key}", _marks),
         route("pedestal/{key}", _pedestal),
+        route("facets/{key}", _facets),
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
         route("left/{number:int}", uploads.open_left, "POST"),
@@ -103,6 +105,7 @@ def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request]
         session = workbench.sessions.get(request.path_params["session"])
         if session is None:
             return Response(f"{CLOSED}\n", 404)
+        hear_from(request.query_params.get("page"))
         try:
             check_need(session, need)
             return await act(session, request)
@@ -140,6 +143,13 @@ async def _pedestal(session: Session, request: Request) -> Response:
     if standing is None or session.standing.pedestal_key != request.path_params["key"]:
         return Response(status_code=204)
     return Response(standing.pedestal, media_type="application/octet-stream")
+
+
+async def _facets(session: Session, request: Request) -> Response:
+    model = session.bench.model
+    if model is None or model.key != request.path_params["key"]:
+        return Response(status_code=204)
+    return Response(await session.quick.run("rest_facets", model), media_type="application/json")
 
 
 async def _pieces(session: Session, request: Request) -> Response:

@@ -41,8 +41,10 @@ def _state(session: Session) -> dict[str, Any]:
     return {
         "version": session.version,
         "problem": session.problem,
+        "problems": session.problems,
         "answers": session.answers,
         "busy": session.busy,
+        "stopped": session.stopped,
         "preparing": session.readiness.preparing > 0,
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": history.now.word if history.before else "",
@@ -67,9 +69,11 @@ def _state(session: Session) -> dict[str, Any]:
         "trial": _trial(session),
         "zones": _zones(bench),
         "marks": marks_key(bench),
-        "refused": asdict(session.trials.refused) if session.problem and session.trials.refused else None,
+        "refused": _refused(session),
+        "units": _units(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
+        "laid": _laid(session),
         "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
         "priced": bench.priced,
@@ -113,6 +117,24 @@ def _trial(session: Session) -> dict[str, Any] | None:
         return None
     _, cuts, trial = session.trials.trial
     return {"cuts": _cuts(cuts), **asdict(trial)}
+
+
+def _refused(session: Session) -> dict[str, Any] | None:
+    """The planes that were refused last, as long as the page that wanted them is told why."""
+    refused = session.trials.refused
+    return asdict(refused) if refused is not None and refused.page in session.problems else None
+
+
+def _laid(session: Session) -> dict[str, Any] | None:
+    """How the last search has found the model turned and how it has turned it, as long as its parts lie there."""
+    laid, bench = session.finding.laid, session.bench
+    return {"before": laid[0], "after": laid[1]} if laid is not None and bench.rows and bench.rotation == laid[1] else None
+
+
+def _units(session: Session) -> dict[str, Any] | None:
+    """The units of which one is that of a model, as long as the page that wanted it is asked."""
+    waits = session.unscaled
+    return {"page": waits.page, "words": list(waits.units)} if waits is not None and waits.page in session.problems else None
 
 
 def _cuts(cuts: Cuts) -> list[dict[str, Any]]:

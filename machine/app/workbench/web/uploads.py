@@ -94,7 +94,8 @@ class Uploads:
             elif not self.profiles.take(path, session):
                 await session.open_plan(path)
         finally:
-            if not taken:  # refused, or a text, of which nothing more is read
+            waits = session.unscaled is not None and session.unscaled.path == path
+            if not taken and not waits:  # refused, or a text, of which nothing more is read
                 remove_file(path)
         return JSONResponse({})
 

@@ -61,26 +61,32 @@ class Found:
 def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
     """What a search as `decompose` makes it has found. Raises RankerError."""
     ranker_named(way.ranker)
+    assert bench.model is not None
+    tell(Searched(f"reading {bench.model.faces:,} faces"))
     mesh, name, profile, locked = turned_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
     price, best = pricing(profile.of_all_parts), None
 
     def search(lying: Mesh) -> Decomposition:
+        otherwise = "" if lying is mesh else "laid down otherwise: "
+        tell(Searched(f"{otherwise}measuring overhangs and seams of {len(lying.faces):,} faces", best))
+
         def show(progress: Progress) -> None:
             nonlocal best
             if progress.stage == 0:
                 compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text, best)))
+                tell(Searched(f"{otherwise}looking for the first cut along {profile.search.directions:,} directions", best))
                 return
             left = f"{100 * progress.best_share:.1f} % of the overhangs left"
             if lying is mesh:
                 best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
-            otherwise = "" if lying is mesh else "laid down otherwise: "
             tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
 
         return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, by_hand=locked, price=price)
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if way.orient and untouched and lies_freely(profile):
+        tell(Searched(f"weighing the ways in which {len(mesh.faces):,} faces may lie"))
         lying = lay_down(mesh, profile, pricing, search)
         turn = None if lying.orientation is None else lying.orientation.rotation
         decomposition = lying.decomposition

@@ -1,5 +1,6 @@
 """Models: reading one, the ways in which it rests, and the faces that are marked on it, as tasks of the workbench."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,11 +11,13 @@ from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.work.processes import Tell
-from mdp.directions.orientation import in_words, side_in_words
-from mdp.read import read_mesh
+from mdp.directions.orientation import in_words, resting_facets, side_in_words
+from mdp.read import SizeError, read_mesh
 from mdp.search.laying import distinct_orientations
 from profiles.errors import MeshError
 from profiles.profile import Profile
+
+FACET_DIGITS = 4  # of the mm of a facet's corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +30,22 @@ class Resting:
     height_mm: float
 
 
-def read_model(tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path) -> Model:
+@dataclass(frozen=True)
+class Unscaled:
+    """A model of a size that no printer makes: see mdp.read.SizeError."""
+
+    sentence: str
+    question: str
+    units: dict[str, float]
+
+
+def read_model(tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path) -> Model | Unscaled:
     """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
     try:
         mesh, notes = read_mesh(path, profile.process.scale, profile.process.rotate_deg)
+    except SizeError as error:
+        sentence, question = (text.replace(str(path), name) for text in (str(error), error.question))
+        return Unscaled(sentence, question, error.units)
     except MeshError as error:
         raise MeshError(str(error).replace(str(path), name)) from None
     return Model.stored(name, path, mesh, mesh_file, notes)
@@ -48,6 +63,15 @@ def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, .
         )
         for orientation in distinct_orientations(model.mesh(), profile)
     )
+
+
+def rest_facets(tell: Tell, model: Model) -> bytes:
+    """The facets of a model's hull that it rests on, as JSON in its own frame: `normal`, `corners` (nine numbers a triangle)."""
+    facets = [
+        {"normal": facet.normal.tolist(), "corners": np.round(facet.corners, FACET_DIGITS).ravel().tolist()}
+        for facet in resting_facets(model.mesh())
+    ]
+    return json.dumps(facets).encode()
 
 
 def mark_faces(tell: Tell, bench: Bench) -> bytes:

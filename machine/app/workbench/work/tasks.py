@@ -6,17 +6,18 @@ from typing import Any
 
 from machine.app.workbench.bench.marks import mark, unmark
 from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, measure_plan, price_row
-from machine.app.workbench.work.models import mark_faces, rank_resting, read_model
+from machine.app.workbench.work.models import mark_faces, rank_resting, read_model, rest_facets
 from machine.app.workbench.work.pieces import draw_pieces, make_pictures
 from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
 from machine.app.workbench.work.standing import stand
-from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
+from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, nearest, try_cuts
 
 TASKS: dict[str, Callable[..., Any]] = {
     task.__name__: task
     for task in (
         read_model,
         rank_resting,
+        rest_facets,
         find_parts,
         measure_plan,
         price_row,
@@ -33,5 +34,6 @@ TASKS: dict[str, Callable[..., Any]] = {
         make_ready,
         try_cuts,
         near_neck,
+        nearest,
     )
 } | {"mark": lambda tell, *given: mark(*given), "unmark": lambda tell, *given: unmark(*given)}

@@ -10,6 +10,8 @@ import numpy as np
 
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.planes import Cuts
+from machine.app.workbench.bench.values import vector_of
 from machine.app.workbench.work.cutting import turned_mesh
 from machine.app.workbench.work.processes import Tell
 from mdp.cut import convex_hull
@@ -18,6 +20,7 @@ from mdp.plans.plan_file import PlannedPart
 from mdp.search.trial import Trial, Trials
 from profiles.profile import load
 
+UNTILTED = 1.0 - 1e-9  # cosine between two normals that are the same but for rounding
 _ready: tuple[int, Trials] | None = None  # of the bench that this process has heard of last
 
 
@@ -44,6 +47,21 @@ def try_cuts(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...
 def near_neck(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> Plane | None:
     """The neck near the plane of a part, as `Trials.neck` finds it."""
     return _trials(number, bench).neck(_planes(cuts), part, reach_mm)
+
+
+def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]]) -> Cuts | None:
+    """Planes in the order in which that of one part, whose number goes with them, is least shifted until all can be cut, as
+    `Trials.nearest` finds it; None: that is not so in any."""
+    trials, best = _trials(number, bench), None
+    for cuts, part in orders:
+        wanted, plane = cuts[part - 2].plane, trials.nearest(_planes(cuts), part)
+        if plane is None or wanted is None:
+            continue
+        leans, far_mm = float(plane.normal @ wanted.normal) < UNTILTED, abs(plane.offset_mm - wanted.offset_mm)
+        if best is None or (leans, far_mm) < best[0]:
+            put = PlannedPart(vector_of(plane.normal), float(plane.offset_mm))
+            best = (leans, far_mm), (*cuts[: part - 2], put, *cuts[part - 1 :])
+    return None if best is None else best[1]
 
 
 def _trials(number: int, bench: Bench) -> Trials:

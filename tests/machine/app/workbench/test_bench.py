@@ -40,7 +40,7 @@ def test_a_face_that_is_laid_down_looks_down() -> None:
     mesh = branch()
     start = history(Bench(PROFILE, model("branch.stl", mesh)))
     for face in (0, 40, 200):
-        rotation = np.array(changed(start, lay, face=face).now.bench.rotation)
+        rotation = np.array(changed(start, lay, normal=mesh.normals[face].tolist()).now.bench.rotation)
         assert rotation @ mesh.normals[face] == pytest.approx([0, 0, -1], abs=1e-12)
         assert np.linalg.det(rotation) == pytest.approx(1.0)
 
@@ -87,7 +87,7 @@ def test_a_plan_has_the_planes_in_print_order() -> None:
         (turn, {"axis": "x", "deg": 10**400}, "deg is 1000"),
         (turn, {"axis": "x", "deg": True}, "deg is True"),
         (turn, {"axis": "x", "deg": float("nan")}, "deg is nan: -360 to 360 is allowed"),
-        (lay, {"face": 28}, "face is 28: 0 to 27 is allowed"),
+        (lay, {"normal": [0, 0, 0]}, "normal is .0, 0, 0.: a direction of a length of about 1 is expected"),
         (stand, {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "its rows are no rotation"),
         (stand, {"rotation": [[1, 0], [0, 1]]}, "three rows of three numbers"),
         (stand, {"rotation": [[1, 0, 0], [0, 1, 0], None]}, "rotation: three numbers are expected"),

@@ -15,7 +15,7 @@ from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
 
-WITHOUT_A_MODEL = {"demo", "undo", "redo", "set", "reset", "profile", "stop"}
+WITHOUT_A_MODEL = {"demo", "undo", "redo", "set", "reset", "profile", "stop", "dismiss", "unit"}
 UNSLICED = "what is on the workbench is not sliced yet: slice it first"
 DOCS = Path(__file__).parents[4] / "docs" / "workbench.md"
 PAGE = resources.files("machine.app.workbench.web").joinpath("page")
@@ -23,7 +23,9 @@ PAGE = resources.files("machine.app.workbench.web").joinpath("page")
 
 def bare(bench: Bench) -> Any:
     """A session on whose bench nothing is sliced, and which can do nothing."""
-    return SimpleNamespace(bench=bench, problem="", slicing=SimpleNamespace(lacking=lambda: UNSLICED))
+    return SimpleNamespace(
+        bench=bench, stopped="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED)
+    )
 
 
 @pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))

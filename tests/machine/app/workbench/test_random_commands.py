@@ -66,7 +66,7 @@ class Anything:
             "redo": lambda n: {},
             "turn": lambda n: {"axis": self.choice("xyzw"), "deg": self.choice((90, 17.3, 1e9))},
             "stand": lambda n: {"rotation": self.rotation()},
-            "lay": lambda n: {"face": 9 * n},
+            "lay": lambda n: {"normal": [n - 2, 1, 2 * n]},
             "take": lambda n: {"parts": n},
             "lock": lambda n: {"part": n, "locked": self.choice((True, False))},
             "set_part": lambda n: {"part": n, "key": self.choice(OF_A_PART), "value": self.choice(("4", "rear", None))},

@@ -140,7 +140,13 @@ def test_a_model_that_a_person_has_turned_locked_or_marked_stays_as_it_lies(benc
             page.do("add", normal=[1, 0, 0], offset_mm=8.0)
             page.until(lambda state: state["undo"] == "add a plane")
             page.do("lock", part=2, locked=True)
-        before = page.until(lambda state: state["undo"] and state["undo"] != "add a plane")
+        words = {
+            "turned": "turn the model",
+            "set": "set search.objective",
+            "marked": "mark: no seam here",
+            "locked": "lock a plane",
+        }
+        before = page.until(lambda state: state["undo"] == words[kept])
         page.do("search")
         found = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
         assert found["rotation"] == before["rotation"]
@@ -214,8 +220,8 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
     assert bench.ask("print.gcode")[0] == 422
     with bench.line() as page:
         bench.send(folder / "tee.stl")
-        page.do("add", normal=[1, 0, 0], offset_mm=8.0)
-        page.until(lambda state: state["parts"] == 2)
+        page.do("add", normal=[1, 0, 0], offset_mm=8.0, ask="added to be sliced")
+        page.until(lambda state: "added to be sliced" in state["answers"])
         page.do("slice")
         sliced = page.until(lambda state: state["sliced"] and not state["slicing"])["sliced"]
         (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import with_profile
+from machine.app.workbench.session.base import hear_from
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.finding import Search
 from machine.app.workbench.session.session import Session
@@ -202,3 +204,74 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
     session = when_done(work)
     assert session.slicing.done is not None
     assert session.slicing.done.bench is session.bench
+
+
+def test_what_a_page_is_refused_no_other_page_is_told_and_its_next_step_takes_it_back() -> None:
+    told = []
+
+    async def work(session: Session) -> None:
+        for page, part in (("mine", 7), ("yours", 8)):
+            hear_from(page)
+            obey(session, {"do": "move", "part": part, "normal": [*UP], "offset_mm": 1})
+            await settled(session)
+        told.append(dict(session.problems))
+        hear_from("mine")
+        obey(session, {"do": "dismiss"})
+        told.append(dict(session.problems))
+        hear_from("yours")
+        obey(session, {"do": "add", "normal": [*UP], "offset_mm": 20})
+        await settled(session)
+        told.append(dict(session.problems))
+
+    when_done(work)
+    mine, yours = (f"part is {part}: there is none yet" for part in (7, 8))
+    assert told == [{"mine": mine, "yours": yours}, {"yours": yours}, {}]
+
+
+def test_a_plane_that_is_refused_is_put_at_the_nearest_place_when_that_is_asked_for() -> None:
+    def bounded(session: Session) -> None:
+        async def answer(task: str, *given: Any, **more: Any) -> Any:
+            if task == "nearest":
+                (cuts, part), *_ = given[2]
+                return (*cuts[: part - 2], PlannedPart(UP, 30.0), *cuts[part - 1 :])
+            high = task == "try_cuts" and any(cut.offset_mm > 30.0 for cut in given[2])
+            return Trial((), 2, "too high") if high else Trial(()) if task == "try_cuts" else None
+
+        session.hand.run = answer  # type: ignore[method-assign]
+
+    async def work(session: Session) -> None:
+        bounded(session)
+        obey(session, {"do": "add", "normal": [*UP], "offset_mm": 33})
+        await settled(session)
+        assert session.problem == "part 2 cannot be cut off: too high"
+        assert session.trials.refused is not None
+        assert session.trials.refused.near == {"do": "add", "normal": [*UP], "offset_mm": 33, "near": True}
+        obey(session, session.trials.refused.near)
+        await settled(session)
+
+    session = when_done(work)
+    assert (session.bench.cuts, session.problem) == ((PlannedPart(UP, 30.0),), "")
+
+
+def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is_done() -> None:
+    told = []
+
+    async def work(session: Session) -> None:
+        session.long.warm = partial(asyncio.sleep, 0)  # type: ignore[method-assign]
+        for best in (None, FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0)):
+            obey(session, {"do": "search"})
+            await asyncio.sleep(0)
+            assert session.finding.search is not None
+            session.finding.search = Search(session.bench, Searched("stage 1", best))
+            obey(session, {"do": "stop"})
+            told.append(session.stopped)
+            await settled(session)
+        obey(session, {"do": "dismiss"})
+        told.append(session.stopped)
+
+    when_done(work)
+    assert told == [
+        "The search was stopped before it had cut anything: all is as it was.",
+        "The search was stopped, and the best so far is taken: 2 parts.",
+        "",
+    ]

@@ -1,16 +1,18 @@
 // Clicks: what the next click on the model is for, and what it does.
 
 import { $, notice } from "../../../../view/template/page.js";
-import { send } from "./line.js";
+import { layFacet } from "./facets.js";
 import { markAt, markWord } from "./marks-panel.js";
+import { openMenu } from "./parts-list.js";
 import { apartNow, pieceMet, shiftsOf } from "./pieces.js";
 import { choosePart, partAt, snapTo } from "./planes.js";
 import { store, subscribe, update } from "./store.js";
 import { faceMet, placeMet } from "./triangles.js";
 
+const STILL_PIXELS = 4; // a hand that moves less only clicks
 const BUTTONS = { lay: "lay", snap: "snap", faces: "mark-faces", box: "mark-box" };
 const WANTED = {
-  lay: () => "Click the face that is to lie on the platform.", snap: () => "Click the face whose plane it is to take.",
+  lay: () => "Click a lit face: it can rest on that.", snap: () => "Click the face whose plane it is to take.",
   faces: () => `Click where there is to be ${markWord()}; Esc ends it.`, box: () => (store.corner ? "Now the opposite corner." : "Click a corner of the box."),
 };
 
@@ -19,6 +21,7 @@ export function clicksOf(picture) {
     $(id).addEventListener("click", () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }));
     if (clicks !== "lay" && clicks !== "snap") $(id).disabled = !picture;
   }
+  if (picture) menuOf($("canvas"), picture);
   $("mark-kind").addEventListener("change", () => update({ corner: null }));
   subscribe((now, before) => {
     if (now.clicks && now.tab !== before.tab) update({ clicks: "", corner: null });
@@ -27,19 +30,38 @@ export function clicksOf(picture) {
   });
 }
 
-/** A click on the model: the face is laid down, or the plane takes its place, or a mark is put there when that was asked for; else a part is
- * chosen. */
+/** Where an event meets the model, {face, place}, in the frame of the platform; null: nowhere. */
+function met(event, picture) {
+  const { triangles } = store, [from, along] = picture.ray(event), face = triangles ? faceMet(triangles, from, along) : -1;
+  return face < 0 ? null : { face, place: picture.carried(placeMet(triangles, face, from, along)) };
+}
+
+/** The part that is seen where an event is; 0: none. */
+function partMet(event, picture) {
+  const { tab, state, pieces, apart } = store;
+  if (apartNow()) return pieceMet(pieces, shiftsOf(pieces, apart), picture.sight(event));
+  const spot = tab === "parts" && state.parts ? met(event, picture) : null;
+  return spot ? partAt(spot.place) : 0;
+}
+
+/** A click on the model: the facet is laid down, or the plane takes its place, or a mark is put there when that was asked for; else a part is
+ * chosen, or, beside the model, none. */
 export function press(event, picture) {
-  const { triangles, clicks, tab, state, pieces, apart } = store;
-  if (!triangles) return;
-  if (apartNow()) return choosePart(pieceMet(pieces, shiftsOf(pieces, apart), picture.sight(event)));
-  const [from, along] = picture.ray(event), face = faceMet(triangles, from, along);
-  if (face < 0) return;
-  const place = picture.carried(placeMet(triangles, face, from, along));
-  if (clicks === "lay") {
-    update({ clicks: "" });
-    send({ do: "lay", face });
-  } else if (clicks === "snap") snapTo(face, picture);
-  else if (clicks) markAt(place);
-  else if (tab === "parts" && state.parts > 1) choosePart(partAt(place));
+  const { clicks, tab } = store;
+  if (!clicks || apartNow()) return void (tab === "parts" && choosePart(partMet(event, picture)));
+  if (clicks === "lay") return layFacet(picture, event);
+  const spot = met(event, picture);
+  if (!spot) return;
+  if (clicks === "snap") snapTo(spot.face, picture);
+  else markAt(spot.place);
+}
+
+/** The right button, where it does not move the view: the menu of the part that is there. */
+function menuOf(canvas, picture) {
+  let at = null; // where it was pressed
+  canvas.addEventListener("pointerdown", (event) => { at = event.button === 2 ? [event.clientX, event.clientY] : null; });
+  canvas.addEventListener("pointerup", (event) => {
+    const still = event.button === 2 && at && Math.hypot(event.clientX - at[0], event.clientY - at[1]) < STILL_PIXELS, part = still ? partMet(event, picture) : 0;
+    if (part) openMenu(part, event.clientX, event.clientY);
+  });
 }

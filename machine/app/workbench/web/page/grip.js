@@ -1,6 +1,7 @@
 // Grip: what in the picture a hand, a finger or arrow keys take hold of, follow and let go.
 
 import { add } from "../../../../view/template/math.js";
+import { $ } from "../../../../view/template/page.js";
 
 const ARROWS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 };
 
@@ -35,6 +36,10 @@ export function gripOf(element, { take, move, put, drop, step, stepped = () => {
   const letGo = () => { if (stepping) [stepping] = [false, stepped()]; };
   element.addEventListener("keyup", (event) => { if (event.key in ARROWS) letGo(); });
   element.addEventListener("blur", letGo);
+  element.addEventListener("wheel", (event) => { // the view is zoomed here, too
+    event.preventDefault();
+    $("canvas").dispatchEvent(new WheelEvent("wheel", event));
+  }, { passive: false });
 }
 
 const LEAST_PIXELS = 0.5; // of a mm along a way: seen head on, what is held would jump

@@ -6,7 +6,7 @@ import { $ } from "../../../../view/template/page.js";
 import { putAt } from "./elements.js";
 import { alongWay, gripOf } from "./grip.js";
 import { apartNow } from "./pieces.js";
-import { choosePart, holdPlane, isLocked, planeNow, planesNow, putPlane } from "./planes.js";
+import { holdPlane, isLocked, leavePlane, planeNow, planesNow, putPlane } from "./planes.js";
 import { store, subscribe } from "./store.js";
 import { sectionOf } from "./triangles.js";
 
@@ -14,10 +14,17 @@ const REACH = 1.12; // of a section's radius at which the knobs of the tilt stan
 const STEP_MM = 0.5, STEP_DEG = 1;
 const KNOBS = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
 
+let last = { of: "", triangles: null, section: null }; // of a large model it takes a moment, and most news change nothing of it
+
 /** Middle and reach of what the chosen plane cuts, where planes are looked at; null: nothing. */
 export function sectionNow(picture) {
   const plane = store.tab === "parts" && !apartNow() && store.triangles && store.state.model && picture ? planeNow() : null;
-  return plane && sectionOf(store.triangles, plane, planesNow().slice(store.part - 1), picture.matrix());
+  if (!plane) return null;
+  const of = JSON.stringify([plane, planesNow().slice(store.part - 1), picture.matrix()]);
+  if (of !== last.of || store.triangles !== last.triangles) {
+    last = { of, triangles: store.triangles, section: sectionOf(store.triangles, plane, planesNow().slice(store.part - 1), picture.matrix()) };
+  }
+  return last.section;
 }
 
 export function handlesOf(picture) {
@@ -33,7 +40,7 @@ export function handlesOf(picture) {
     const normal = unit(turned(rotated(cross(axes[tilts], plane.normal), angle), plane.normal));
     return { normal, offset_mm: dot(normal, centre) };
   };
-  const taken = ({ tilts }) => ({ plane: planeNow(), about: section, tilts });
+  const taken = ({ tilts }) => ({ plane: store.hand?.wanted || planeNow(), about: section, tilts });
   const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * section.radius_mm);
   const put = () => { if (store.hand) putPlane(store.hand.plane); };
   KNOBS.forEach((knob) => gripOf($(knob.id), {
@@ -43,7 +50,7 @@ export function handlesOf(picture) {
     },
     move: (held, event) => holdPlane(moved(held, held.along(event))),
     put,
-    drop: () => choosePart(store.part),
+    drop: leavePlane,
     step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
     stepped: put,
   }));
@@ -52,8 +59,9 @@ export function handlesOf(picture) {
     if (!$("handles").hidden) for (const knob of KNOBS) putAt($(knob.id), picture.placeOf(placeOf(knob)));
   });
   subscribe(() => {
+    const before = section;
     section = sectionNow(picture);
-    picture.plane(section && { ...planeNow(), ...section });
+    if (section !== before) picture.plane(section && { ...planeNow(), ...section });
     if (!section) $("handles").hidden = true;
   });
 }

@@ -37,7 +37,13 @@ export const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSign
   ({ status }) => (status === 404 ? "replaced" : "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
 
 let line = null, asked = new Map(), count = 0; // asked: what is called when a command is answered, by its name
-const page = crypto.randomUUID(); // in the names of commands, for no other page has it
+const page = crypto.randomUUID(); // this page's name, which no other one has
+
+/** A state as this page tells it: what others were refused is theirs to see. */
+function toldHere(state) {
+  const own = (told) => ([page, ""].includes(told?.page) ? told : null);
+  return { ...state, problem: state.problems[page] || state.problems[""] || "", refused: own(state.refused), units: own(state.units) };
+}
 
 /** The page's line to its bench: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD. */
 export function openLine(follow, stands) {
@@ -48,11 +54,11 @@ export function openLine(follow, stands) {
       answered?.(refusal);
     }
   };
-  line = lineAt("line", (state) => { follow(state); answer(state); }, stands);
+  line = lineAt("line", (state) => { follow(toldHere(state)); answer(state); }, stands);
 }
 
 /** A command; what becomes of it is seen by the next states. */
-export const send = (command) => { if (line?.isOpen()) line.send(command); };
+export const send = (command) => { if (line?.isOpen()) line.send({ ...command, page }); };
 
 /** The same; answered(refusal) is called after the state by which it is done ("") or refused. */
 export function ask(command, answered) {
@@ -63,7 +69,7 @@ export function ask(command, answered) {
 }
 
 /** Sends a file of the person's to a bench; what is wrong with it comes back by the line, also where it is not taken to its end. */
-export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name })}`, { method: "POST", body: file }).catch(() => {});
+export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name, page })}`, { method: "POST", body: file }).catch(() => {});
 
 /** Has the browser save what the server makes at an address. */
 export async function save(address) {

@@ -7,7 +7,8 @@ import { tabsOf } from "../../../../view/template/tabs.js";
 import { axesOf } from "./axes.js";
 import { benchesPanel } from "./benches.js";
 import { clicksOf, press } from "./clicks.js";
-import { withWholeOptions } from "./elements.js";
+import { elapsedTimes } from "./elapsed.js";
+import { facetsOf } from "./facets.js";
 import { handlesOf } from "./handles.js";
 import { keptLook } from "./kept-look.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
@@ -15,6 +16,7 @@ import { marksPanel } from "./marks-panel.js";
 import { modelPanel, sizePanel } from "./model-panel.js";
 import { fetchModel, modelOf, pedestalOf } from "./model.js";
 import { obstacleOf } from "./obstacle.js";
+import { partsList } from "./parts-list.js";
 import { partsPanel } from "./parts-panel.js";
 import { pictureOf } from "./picture.js";
 import { apartPanel } from "./pieces.js";
@@ -22,11 +24,13 @@ import { planesPanel } from "./planes-panel.js";
 import { printFrame } from "./print-frame.js";
 import { titleOfModel } from "./print-news.js";
 import { printPanel } from "./print-panel.js";
+import { problemLine } from "./problem.js";
 import { ringsOf } from "./rings.js";
 import { saveMenu } from "./save-menu.js";
 import { settingsPanel } from "./settings-panel.js";
 import { comparePanel, slicesPanel, stopsPanel } from "./slices-panel.js";
 import { onState, store, subscribe, update } from "./store.js";
+import { thumbnailsOf } from "./thumbnails.js";
 import { wallsOf } from "./walls.js";
 
 function main() {
@@ -45,11 +49,15 @@ function main() {
   tabsOf((tab) => update({ tab }));
   const look = keptLook(camera, picture);
   onState(tellState);
+  problemLine();
+  elapsedTimes();
+  onState(({ stopped }) => notice(stopped, "stopped"));
   benchesPanel();
   modelPanel();
   sizePanel();
   partsPanel();
   planesPanel(picture);
+  partsList();
   marksPanel(picture);
   stopsPanel();
   slicesPanel(printFrame(camera, picture).showFinding);
@@ -59,6 +67,7 @@ function main() {
   printPanel();
   clicksOf(picture);
   modelOf(picture);
+  thumbnailsOf(picture);
   apartPanel(picture);
   if (picture) {
     const ringPlaces = ringsOf(picture);
@@ -66,6 +75,7 @@ function main() {
     wallsOf(picture);
     obstacleOf(picture);
     handlesOf(picture);
+    facetsOf(picture);
     pedestalOf(picture);
     handle($("canvas"), camera, { changed: picture.ask, pressed: (event) => press(event, picture) });
     viewsOf(camera, picture, ringPlaces);
@@ -79,7 +89,7 @@ function main() {
   root.dataset.state = picture ? "ready" : "failed";
 }
 
-function tellState({ model, problem, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
+function tellState({ model, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
   const root = document.documentElement;
   titleOfModel(model ? model.name : "");
   $("title").textContent = model ? model.name : "tiltprint";
@@ -89,8 +99,6 @@ function tellState({ model, problem, busy, undo, redo, search, slicing, preparin
   document.body.classList.toggle("no-model", !model);
   document.body.classList.toggle("has-model", Boolean(model));
   $("drop").hidden = Boolean(model);
-  if ($("problem").textContent !== problem) $("problem").replaceChildren(...withWholeOptions(problem)); // read aloud once
-  $("problem").hidden = !problem;
   for (const [id, word] of [["undo", undo], ["redo", redo]]) {
     $(id).disabled = !word;
     $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);

@@ -1,10 +1,11 @@
 // Model panel: the file, how it is turned, what overhangs then, the ways it rests, and how large it stands on the platform.
 
-import { $, made } from "../../../../view/template/page.js";
+import { $ } from "../../../../view/template/page.js";
 import { leftFiles, takeFiles } from "./benches.js";
 import { alike, listIn, mm2, tellIn } from "./elements.js";
 import { send } from "./line.js";
-import { onState, store, update } from "./store.js";
+import { unitButtons } from "./problem.js";
+import { onState, store, subscribe, update } from "./store.js";
 import { turnedFurther } from "./triangles.js";
 
 const TURNS = ["x", "y", "z"];
@@ -12,11 +13,14 @@ const TURNS = ["x", "y", "z"];
 export function modelPanel() {
   $("file").addEventListener("change", () => { takeFiles([...$("file").files]); $("file").value = ""; });
   $("demo").addEventListener("change", () => { if ($("demo").value) send({ do: "demo", name: $("demo").value }); });
-  const by = () => TURNS.map((axis) => Number($(`turn-${axis}`).value));
-  const tellTurn = () => TURNS.forEach((axis, k) => { $(`turn-${axis}-told`).textContent = `${by()[k]}°`; });
+  const by = () => TURNS.map((axis) => Number($(`turn-${axis}-typed`).value));
+  const turn = () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); };
   for (const axis of TURNS) {
-    $(`turn-${axis}`).addEventListener("input", () => { tellTurn(); update({ turning: turnedFurther(store.state.rotation, by()) }); });
-    $(`turn-${axis}`).addEventListener("change", () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); });
+    const slider = $(`turn-${axis}`), typed = $(`turn-${axis}-typed`);
+    const follow = (from, to) => () => { to.value = from.value; update({ turning: turnedFurther(store.state.rotation, by()) }); };
+    slider.addEventListener("input", follow(slider, typed));
+    typed.addEventListener("input", follow(typed, slider));
+    for (const input of [slider, typed]) input.addEventListener("change", turn);
   }
   document.querySelectorAll("[data-turn]").forEach((button) => button.addEventListener("click", () => {
     send({ do: "turn", axis: button.dataset.turn, deg: Number(button.dataset.deg) });
@@ -24,26 +28,28 @@ export function modelPanel() {
   $("as-read").addEventListener("click", () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }));
   dropping();
   leftFiles();
-  onState(({ model, rotation, resting, overhang_mm2: area }, before) => {
+  onState((state, before) => {
+    const { model, rotation, overhang_mm2: area } = state;
     if (JSON.stringify(rotation) !== JSON.stringify(before?.rotation)) {
-      TURNS.forEach((axis) => { $(`turn-${axis}`).value = 0; });
-      tellTurn();
+      TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; });
     }
     if (!model) return;
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
-    tellIn("model-told", [
-      ["name", model.name], ["faces", model.faces.toLocaleString("en")],
-      ["size", `${model.size_mm.map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
-    ]);
     listIn("model-notes", model.notes);
+    tellTiny(state);
     if (area !== null) $("overhang").textContent = mm2(area);
-    if (JSON.stringify(resting) !== JSON.stringify(before?.resting)) showResting(resting);
   });
+  subscribe(tellModel);
 }
 
-function showResting(resting) {
-  $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) =>
-    made("button", { type: "button", onclick: () => send({ do: "stand", rotation }) }, made("span", { text: words }), made("small", { text: mm2(area) }))));
+const TINY_MM = 5, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a model that is smaller is rarely meant so; the largest that is printed
+
+/** Asks for the unit of a model that is very small. */
+function tellTiny({ model }) {
+  const most = Math.max(...model.size_mm), words = Object.keys(UNITS).filter((unit) => most * UNITS[unit] <= MOST_MM);
+  $("tiny").hidden = most >= TINY_MM || !words.length;
+  $("tiny-told").textContent = `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?`;
+  unitButtons($("tiny-units"), words, (unit) => send({ do: "set", key: "process.scale", value: String(Number((store.state.scale * UNITS[unit]).toPrecision(9))) }));
 }
 
 /** A file may be dropped anywhere on the page. */
@@ -58,8 +64,15 @@ function dropping() {
   });
 }
 
-/** Sides along the platform's axes; as it is read, until it is known how it stands. */
-export const sizeOf = ({ standing, model }) => (standing || model).size_mm;
+/** Sides along the platform's axes as the model stands, or a hand turns it; as it is read where neither is known. */
+export const sizeOf = ({ standing, model }) => ((!store.turning && standing) || store.seen || model).size_mm;
+
+function tellModel({ state: { model, standing } }) {
+  if (model) tellIn("model-told", [
+    ["name", model.name], ["faces", model.faces.toLocaleString("en")],
+    ["size", `${sizeOf({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
+  ]);
+}
 
 export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));

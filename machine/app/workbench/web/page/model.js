@@ -1,13 +1,16 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal.
 
+import { sub } from "../../../../view/template/math.js";
 import { $, made, notice } from "../../../../view/template/page.js";
 import { alike, mm2, swatch } from "./elements.js";
 import { AGAIN_MS } from "./line.js";
+import { fadedColours } from "./pieces.js";
 import { planesNow } from "./planes.js";
 import { onState, store, subscribe, update } from "./store.js";
 import { overhanging, standingBy, trianglesFrom } from "./triangles.js";
 
 const MISSING = "The model has not come from tiltprint, so it is not drawn; it is asked for again with the next news.";
+const MANY_FACES = 100000; // to fetch and draw them takes a moment, which is told
 const MOST_NAMED = 24; // parts, in the legend
 let key = ""; // of the model that is there, or comes
 
@@ -15,9 +18,10 @@ let key = ""; // of the model that is there, or comes
 export async function fetchModel(model, picture, again) {
   if ((model?.key || "") === key) return;
   key = model?.key || "";
-  update({ triangles: null });
+  update({ triangles: null, seen: null });
   let triangles = null;
   if (model?.drawn) {
+    if (model.faces > MANY_FACES) notice(`${model.faces.toLocaleString("en")} faces are on their way into the picture …`, "model");
     const answer = await fetch(`model/${model.key}`).catch(() => null), content = answer?.ok ? await answer.arrayBuffer().catch(() => null) : null;
     if (key !== model.key) return;
     if (!content) {
@@ -41,13 +45,15 @@ export function modelOf(picture) {
   subscribe(({ state, triangles, turning }, before) => {
     if (!triangles) return;
     const began = performance.now(), { limit, platform_mm: platform, pedestal_mm: lift, overhang_mm2: area } = state, rotation = turning || state.rotation;
-    const stands = JSON.stringify([rotation, limit, platform, lift]), stoodOtherwise = stands !== stood || triangles !== before.triangles;
+    const how = JSON.stringify([rotation, limit, platform, lift]), stoodOtherwise = how !== stood || triangles !== before.triangles;
     if (stoodOtherwise) {
-      stood = stands;
+      stood = how;
       const found = overhanging(triangles, rotation[2], limit, platform);
       red = found.red;
       if (turning || area === null) $("overhang").textContent = mm2(found.area);
-      picture?.stand(standingBy(rotation, triangles.vertices, lift));
+      const stands = standingBy(rotation, triangles.vertices, lift), [least, most] = stands.box;
+      picture?.stand(stands);
+      update({ seen: { size_mm: sub(most, least) } });
     }
     if (picture) look(picture, red);
     if (!stoodOtherwise) return;
@@ -59,9 +65,9 @@ export function modelOf(picture) {
 /** Parts in their colours where they are looked at, else red faces; the row of the front under the hand before it is taken, whatever is told
  * meanwhile. */
 function look(picture, red) {
-  const { state: { search, parts, colours }, tab, row } = store;
+  const { state: { search, parts, colours }, tab, row, part } = store;
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;
-  picture.cut(cut ? planes : null, colours);
+  picture.cut(cut ? planes : null, row || search ? colours : fadedColours(colours, part));
   picture.red(cut ? null : red);
   const entries = cut ? colours.slice(0, planes.length + 1).slice(0, MOST_NAMED).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`)) : [];
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));

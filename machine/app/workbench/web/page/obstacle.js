@@ -4,7 +4,6 @@ import { boxesOf, headOf } from "../../../../view/template/bodies.js";
 import { length, sub } from "../../../../view/template/math.js";
 import { RED } from "../../../../view/template/model.js";
 import { chained, circle, trianglesOf } from "../../../../view/template/solids.js";
-import { trialNow } from "./planes.js";
 import { subscribe } from "./store.js";
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked
@@ -12,9 +11,9 @@ const TOUCH_COLOUR = [255, 221, 70, 255]; // seen on the red body and on the tab
 const RING_SHARES = [1, 0.5]; // of that mark's size: rings on the table where the head would touch it
 
 export function obstacleOf(picture) {
-  subscribe(({ state, triangles, tab }) => {
+  subscribe(({ state, triangles, tab, hand }) => {
     if (!triangles || !state.model) return;
-    const trial = trialNow(), obstacle = tab === "parts" ? (trial?.refused ? trial.obstacle : state.refused) : null;
+    const obstacle = tab === "parts" ? (hand?.why || state.refused)?.obstacle : null;
     picture.extra("obstacle", JSON.stringify([obstacle, state.machine.name]), () => {
       const size = PLACE_SHARE * length(sub(...picture.box())), { places_mm: places = [], touch } = obstacle || {};
       return [...places.map((place) => placeDrawn(place, size)), ...(touch ? [...headDrawn(touch, state.machine.head), ...touchDrawn(touch, 2 * size)] : [])];

@@ -1,7 +1,7 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
 import { bodiesOf } from "../../../../view/template/bodies.js";
-import { HALF_HEIGHT } from "../../../../view/template/camera.js";
+import { cameraOf, HALF_HEIGHT } from "../../../../view/template/camera.js";
 import { frameOf } from "../../../../view/template/frames.js";
 import { outlive } from "../../../../view/template/gl.js";
 import { linesOf } from "../../../../view/template/lines.js";
@@ -10,7 +10,7 @@ import { beside, cutsOf, planesOf } from "../../../../view/template/model.js";
 import { MOST_CUTS, solidOf } from "../../../../view/template/solids.js";
 import { markedOver } from "./marks-panel.js";
 import { piecesOn } from "./pieces.js";
-import { paintedRed, planeBefore } from "./triangles.js";
+import { paintedRed, planeBefore, standingBy } from "./triangles.js";
 
 const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156];
 
@@ -98,6 +98,19 @@ export function pictureOf(canvas, camera) {
     scene.toClip = flat.toClip;
     drawn.forEach((act) => act());
     document.documentElement.dataset.drawn = ++count;
+  };
+  /** The model alone, drawn into a corner of the canvas and taken from there before that is seen. */
+  const thumbnail = (rows, into) => {
+    const { matrix, box } = standingBy(rows, scene.model.vertices, 0), eye = cameraOf(), { width, height } = into;
+    eye.fit(cornersOf(box), width / height);
+    card.frame.begin(Math.max(canvas.width, width), Math.max(canvas.height, height));
+    gl.viewport(0, 0, width, height);
+    const toEye = multiply(eye.toEye(), matrix);
+    card.solid.draw({ toEye, toClip: multiply(eye.lens(width / height), toEye) }, { cuts: null, ghost: 0 });
+    card.frame.show();
+    const flat = into.getContext("2d");
+    flat.clearRect(0, 0, width, height);
+    flat.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
   };
   const plane = () => {
     Object.values(card.plane || {}).forEach(release);
@@ -208,6 +221,14 @@ export function pictureOf(canvas, camera) {
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
     matrix: () => scene.matrix,
+    /** Small pictures of the model as it would stand by rows of rotations, [[rows, canvas of two dimensions]]. */
+    thumbnails: (wanted) => {
+      if (gl.isContextLost() || !scene.model) return;
+      renew();
+      card.solid.paint(paintedRed(scene.model.count, null, MODEL_COLOUR, card.colours));
+      wanted.forEach(([rows, into]) => thumbnail(rows, into));
+      anew(painted);
+    },
     /** All that is drawn brought into view, and other places. */
     fit: (others = []) => {
       camera.fit([...placesDrawn(scene), ...others], canvas.clientWidth / Math.max(canvas.clientHeight, 1));

@@ -1,13 +1,12 @@
-// Pieces: the parts as bodies of their own, listed, and drawn apart along their printing directions, so that the faces of the cuts are seen.
+// Pieces: the parts as bodies of their own, drawn apart along their printing directions, so that the faces of the cuts are seen.
 
 import { blockOf } from "../../../../view/template/block.js";
-import { rgb } from "../../../../view/template/colours.js";
+import { hex, rgb } from "../../../../view/template/colours.js";
 import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/math.js";
 import { arrowsOf, LEFT, RED, surfacesOf } from "../../../../view/template/model.js";
 import { $ } from "../../../../view/template/page.js";
 import { solidOf } from "../../../../view/template/solids.js";
-import { choiceRow, mm2, newtons, putTable, swatch } from "./elements.js";
-import { anglesOf, choosePart } from "./planes.js";
+import { mm2, newtons } from "./elements.js";
 import { store, subscribe, update } from "./store.js";
 import { cornersAt, faceMet, wordOf } from "./triangles.js";
 
@@ -45,11 +44,17 @@ function cutFaces(places, [first, end], planes) {
 /** How far each part is from its place when they are drawn apart by a share of the model's size. */
 export const shiftsOf = ({ parts, span }, share) => parts.map(({ way }) => scaled(way, share * span));
 
-/** Colours of all corners: the parts', paler those not chosen (0: all are), light the cuts, red what needs support. */
+/** A part's colour, paler where it is not the chosen one (0: all are). */
+const fadedRgb = (colour, part, chosen) => rgb(colour).map((x, k) => (chosen && chosen !== part ? mix(x, PALER[k], FADED) : x));
+
+/** The colours of parts, those that are not chosen paler. */
+export const fadedColours = (colours, chosen) => colours.map((colour, k) => hex(fadedRgb(colour, k + 1, chosen)));
+
+/** Colours of all corners: the parts', paler those not chosen, light the cuts, red what needs support. */
 function pieceColours({ parts, marks, places }, chosen) {
   const words = new Uint32Array(places.length / 3);
   for (const { part, range, cut } of parts) {
-    const own = rgb(part.colour), plain = chosen && chosen !== part.index ? own.map((x, k) => mix(x, PALER[k], FADED)) : own;
+    const plain = fadedRgb(part.colour, part.index, chosen);
     const [red, light, colour] = [wordOf(RED, 255), wordOf(plain.map((x) => mix(x, 255, CUT_WHITE)), 254), wordOf(plain, 254)];
     for (let corner = range[0]; corner < range[1]; corner++) {
       const face = Math.floor(corner / 3);
@@ -89,17 +94,6 @@ export function pieceMet({ places, parts }, shifts, [from, along]) {
   return best;
 }
 
-const PART_HEAD = [["part"], ["cm³"], ["support"], ["joint"], ["printed", "words"]];
-const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
-
-/** A printing direction as somebody in front of the machine sees it. */
-function directionInWords(direction) {
-  const [tilt, towards] = anglesOf(direction);
-  if (tilt < 0.05) return "straight up";
-  const side = SIDES[(Math.round(towards / 45) + 8) % 8];
-  return `${Number(tilt.toFixed(1))}° to the ${side}`;
-}
-
 /** By which share of the model's size the parts are drawn apart now. */
 export const apartNow = () => (store.pieces && store.tab === "parts" && !store.hand && !store.state.search ? store.apart : 0);
 
@@ -118,14 +112,16 @@ export function apartPanel(picture) {
     document.documentElement.dataset.pieces = pieces ? pieces.parts.length : "";
   };
   $("apart").disabled = !picture;
-  $("apart").addEventListener("input", () => update({ apart: Number($("apart").value) }));
+  $("apart").addEventListener("input", () => {
+    update({ apart: Number($("apart").value) });
+    picture.fit();
+  });
   subscribe(({ state, tab, pieces, part, apart }, before) => {
-    $("parts-field").hidden = !state.parts || !state.model.drawn;
+    $("apart-line").hidden = !state.parts || !state.model.drawn;
     const key = keyOf(state);
     if (key !== asked && tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) return void fetchPieces(key);
     picture?.pieces(apartNow() ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
     $("joint-told").textContent = jointInWords(pieces ? pieces.parts.map(({ part: { joint } }) => joint).filter(Boolean) : [], part);
-    putTable($("parts-list"), [asked, Boolean(pieces), part], PART_HEAD, () => (pieces ? pieces.parts : []).map(({ part: piece }) => pieceRow(piece, part)));
   });
 }
 
@@ -136,6 +132,3 @@ function jointInWords(joints, chosen) {
   const force = `breaks at about ${newtons(joint.load_n)}, pushed sideways ${joint.arm_mm.toFixed(0)} mm away, or pulled off at ${newtons(joint.tension_n)}`;
   return `The joint of part ${joint.part}${joint.weakest ? ", the weakest," : ""} has ${mm2(joint.area_mm2)}, a seam of ${joint.seam_mm.toFixed(0)} mm and ${force}.`;
 }
-
-const pieceRow = ({ index, colour, volume_mm3: volume, risky_after_mm2: risky, joint, direction }, chosen) => choiceRow("piece", index, index === chosen, [swatch(colour), `${index}`],
-  [[(volume / 1000).toFixed(2)], [mm2(risky)], [joint ? newtons(joint.load_n) : "–"], [directionInWords(direction), "words"]], () => choosePart(index));

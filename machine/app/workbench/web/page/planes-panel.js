@@ -1,16 +1,15 @@
-// Planes panel: the cuts as a list with figures, and the chosen one: numbers, snaps, and what order it is printed in.
+// Planes panel: the chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand.
 
 import { add, dot, RAD, scaled } from "../../../../view/template/math.js";
-import { $, made } from "../../../../view/template/page.js";
-import { alike, choiceRow, mm2, putTable, swatch } from "./elements.js";
+import { $ } from "../../../../view/template/page.js";
+import { alike, mm2 } from "./elements.js";
 import { sectionNow } from "./handles.js";
 import { send } from "./line.js";
 import { sizeOf } from "./model-panel.js";
-import { alikePlanes, anglesOf, choosePart, isLocked, planeNow, putPlane, trialNow } from "./planes.js";
+import { anglesOf, figuresNow, followHand, isLocked, planeNow, putNear, putPlane, removePart, reorderPart } from "./planes.js";
 import { onState, store, subscribe, update } from "./store.js";
 
-const PLANE_HEAD = [["part"], ["cm³"], ["rim mm"], ["edge"], ["lock"]];
-const FIGURES = [({ volume_mm3: volume }) => (volume / 1000).toFixed(2), ({ rim_mm: rim }) => rim.toFixed(0), ({ edge_deg: edge }) => `${edge.toFixed(0)}°`];
+const MOVED_MM = 0.01, MOVED_DEG = 0.05; // less is not told
 
 const normalOf = (tilt, towards) => {
   const across = Math.sin(tilt * RAD);
@@ -18,38 +17,33 @@ const normalOf = (tilt, towards) => {
 };
 
 export function planesPanel(picture) {
-  let wanted = 0; // the part whose plane has been asked for
+  let moved = { text: "", cuts: [] }; // what is told of a plane that was put near, as long as the planes are these
   const byPlane = (id, event, act) => $(id).addEventListener(event, () => { if (planeNow()) act(store.part); });
-  const reorder = (part, to) => {
-    send({ do: "reorder", part, to });
-    choosePart(to);
-  };
   const lean = (tilt, towards) => putPlane(leaned(normalOf(tilt, towards), picture));
-  byPlane("remove", "click", (part) => send({ do: "remove", part }));
+  const near = (command) => putNear(command, (wanted, there) => {
+    moved = { text: movedInWords(wanted, there), cuts: store.state.cuts };
+    tellPlane();
+  });
+  const tellPlane = () => tell(alike(moved.cuts, store.state.cuts) ? moved.text : "");
+  byPlane("remove", "click", removePart);
   byPlane("neck", "click", (part) => send({ do: "neck", part }));
-  byPlane("earlier", "click", (part) => { if (part > 2) reorder(part, part - 1); });
-  byPlane("later", "click", (part) => { if (part < store.state.parts) reorder(part, part + 1); });
+  byPlane("earlier", "click", (part) => reorderPart(part, part - 1));
+  byPlane("later", "click", (part) => reorderPart(part, part + 1));
   byPlane("plane-offset", "change", () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }));
   for (const id of ["plane-tilt", "plane-towards"]) byPlane(id, "change", () => lean(Number($("plane-tilt").value), Number($("plane-towards").value)));
   document.querySelectorAll("[data-tilt]").forEach((button) => button.addEventListener("click", () => {
     if (planeNow()) lean(Number(button.dataset.tilt), Number($("plane-towards").value));
   }));
   $("find-others").addEventListener("click", () => send({ do: "search", ranker: $("ranker").value }));
-  $("add").addEventListener("click", () => { wanted = addPlane(picture); });
+  $("add").addEventListener("click", () => near(newPlane(picture)));
+  $("put-near").addEventListener("click", () => near(store.state.refused.near));
   onState((state, before) => {
-    const { hand, part } = store;
-    if (wanted && state.parts > (before?.parts || 1)) {
-      update({ part: wanted });
-      wanted = 0;
-    } else if (part > Math.max(state.parts, 1) || !state.model) update({ part: 0 });
-    if (!hand) return;
-    if (!alike(state.cuts, before?.cuts) || (state.problem && state.problem !== before?.problem)) return update({ hand: null });
-    if (hand.since_ms && trialNow() && alikePlanes(state.trial.cuts[hand.part - 2], hand.plane)) {
-      document.documentElement.dataset.triedMs = (performance.now() - hand.since_ms).toFixed(1);
-      hand.since_ms = 0;
-    }
+    const { hand, part } = store, { trial, cuts, model } = state;
+    if (part > Math.max(state.parts, 1) || !model) update({ part: 0 });
+    if (trial && trial !== before?.trial && !trial.refused && alike(trial.cuts, cuts)) update({ figures: trial });
+    if (hand) followHand(state, before);
   });
-  subscribe(tellPlanes);
+  subscribe(tellPlane);
 }
 
 /** The chosen plane with another normal, turned about the middle of its cut. */
@@ -58,28 +52,22 @@ function leaned(normal, picture) {
   return { normal, offset_mm: dot(normal, about) };
 }
 
-/** Asks for a level plane half way up, for a part printed after the one that is chosen; the number of the new one. */
-function addPlane(picture) {
+/** The command for a level plane half way up, for a part printed after the one that is chosen. */
+function newPlane(picture) {
   const { state, part } = store, low = state.pedestal_mm, [least, most] = picture ? picture.box() : [[0, 0, low], add(sizeOf(state), [0, 0, low])];
-  const after = planeNow() ? part : Math.max(state.parts, 1);
-  send({ do: "add", after, normal: [0, 0, 1], offset_mm: Math.round((least[2] + most[2]) * 5) / 10 });
-  return after + 1;
+  return { do: "add", after: planeNow() ? part : Math.max(state.parts, 1), normal: [0, 0, 1], offset_mm: Math.round((least[2] + most[2]) * 5) / 10 };
 }
 
-function tellPlanes() {
-  const { state: { cuts, locked, search, colours }, part } = store, known = trialNow()?.parts || [];
+/** How far from where it was wanted a plane stands. */
+function movedInWords({ normal, offset_mm: wanted }, there) {
+  const far = there.offset_mm - wanted, leans = Math.acos(Math.min(dot(normal, there.normal) / Math.hypot(...normal), 1)) / RAD;
+  if (leans > MOVED_DEG) return `It leans by ${leans.toFixed(0)}°: nowhere along its own direction can it be cut.`;
+  return Math.abs(far) < MOVED_MM ? "" : `It stands ${Math.abs(far).toFixed(2)} mm ${far > 0 ? "farther up" : "farther down"} than asked for: the nearest place where it can be cut.`;
+}
+
+function tell(moved) {
+  const { state: { locked, search, cuts }, hand, part } = store, plane = planeNow(), figures = figuresNow(), why = hand?.why;
   $("find-others").disabled = Boolean(search) || !locked.some(Boolean);
-  const rowOf = (_, k) => {
-    const figures = known[k], number = k + 2, onchange = ({ target }) => send({ do: "lock", part: number, locked: target.checked });
-    const lock = made("input", { type: "checkbox", checked: locked[k], ariaLabel: `lock the plane of part ${number}`, onchange });
-    return choiceRow("plane", number, number === part, [swatch(colours[k + 1]), `${number}`], [...FIGURES.map((of) => [figures ? of(figures) : "–"]), [lock]], () => choosePart(number));
-  };
-  putTable($("planes"), [cuts, locked, known, part], PLANE_HEAD, () => cuts.map(rowOf));
-  tellPlane();
-}
-
-function tellPlane() {
-  const plane = planeNow(), known = trialNow();
   $("plane").hidden = !plane;
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal), fill = (id, value) => { if (document.activeElement !== $(id)) $(id).value = value; };
@@ -87,8 +75,11 @@ function tellPlane() {
     fill("plane-tilt", tilt.toFixed(1));
     fill("plane-towards", towards.toFixed(1));
     document.querySelectorAll("#plane input, #plane button").forEach((control) => { control.disabled = isLocked(); });
+    $("earlier").disabled ||= part === 2;
+    $("later").disabled ||= part === cuts.length + 1;
   }
-  $("plane-told").classList.toggle("refused", Boolean(known?.refused));
-  $("plane-told").textContent = !known || !store.state.cuts.length ? "" : known.refused ? `Part ${known.refused_part} cannot be cut off: ${known.refused}.`
-    : `${mm2(known.support_area_mm2)} to support, ${known.seam_mm.toFixed(0)} mm of seams${known.unchecked ? "; looking at the parts printed before it …" : ""}`;
+  $("plane-told").classList.toggle("refused", Boolean(why));
+  $("plane-told").textContent = why ? `Part ${why.refused_part} cannot be cut off there: ${why.refused}.` : !figures || !cuts.length ? ""
+    : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
+  $("plane-moved").textContent = moved;
 }

@@ -1,0 +1,48 @@
+// Thumbnails: how the model lies, or would lie, as small pictures beside the words for it.
+
+import { $, made } from "../../../../view/template/page.js";
+import { send } from "./line.js";
+import { mm2 } from "./elements.js";
+import { store, subscribe } from "./store.js";
+
+const SIZE = { width: 112, height: 84 };
+
+const small = () => made("canvas", { ...SIZE, className: "thumbnail" });
+
+/** The ways in which the model rests, and how a search has laid it down; without a picture in words alone. */
+export function thumbnailsOf(picture) {
+  let resting = [], laid = null, model = null; // of what there are small pictures
+  subscribe(({ state, triangles }, before) => {
+    const fresh = triangles !== model;
+    model = triangles;
+    if (fresh || state.resting !== before.state?.resting) {
+      if (fresh || JSON.stringify(state.resting) !== JSON.stringify(resting)) showResting(state.resting, triangles && picture);
+      resting = state.resting;
+    }
+    if (fresh || JSON.stringify(state.laid) !== JSON.stringify(laid)) showLaid(state.laid, triangles && picture);
+    laid = state.laid;
+  });
+}
+
+/** Small pictures drawn when nothing else is to be done. */
+function drawLater(picture, wanted) {
+  if (wanted.length) setTimeout(() => { if (store.triangles) picture.thumbnails(wanted.filter(([, into]) => into.isConnected)); });
+}
+
+function showResting(resting, picture) {
+  const drawn = [];
+  $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
+    const into = picture ? small() : "";
+    if (into) drawn.push([rotation, into]);
+    return made("button", { type: "button", onclick: () => send({ do: "stand", rotation }) }, into, made("span", { text: words }), made("small", { text: mm2(area) }));
+  }));
+  if (picture) drawLater(picture, drawn);
+}
+
+function showLaid(laid, picture) {
+  $("laid").hidden = !laid || !picture;
+  if ($("laid").hidden) return;
+  const views = [["as it stood", laid.before], ["as it lies now", laid.after]].map(([words, rotation]) => ({ words, rotation, into: small() }));
+  $("laid").replaceChildren(...views.map(({ words, into }) => made("figure", {}, into, made("figcaption", { text: words }))));
+  drawLater(picture, views.map(({ rotation, into }) => [rotation, into]));
+}
