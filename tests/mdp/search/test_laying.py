@@ -11,7 +11,7 @@ from mdp.directions.orientation import measure_upright, side_in_words, standing_
 from mdp.mesh import Mesh
 from mdp.pose import about
 from mdp.search.front import Price, Pricing, Worth
-from mdp.search.laying import Lying, distinct_orientations, lay_down, total_mm2
+from mdp.search.laying import Lying, distinct_orientations, glimpses_of, lay_down, total_mm2
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
 from tests.shapes import box, branch, tee
@@ -102,6 +102,23 @@ def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
 
     lying, count = searches(tee(), surprised)
     assert (lying.orientation, count) == (None, 2)
+
+
+def test_a_way_that_ends_dearer_than_good_cuts_would_leave_it_is_compared_with_how_it_stands() -> None:
+    upright = glimpses_of(tee(), PROFILE, by_height)[0]
+    hoped_mm2 = (upright.forecast_mm2 + upright.hopeful_mm2) / 2.0  # less than the forecast, and no certainty
+    more_s = (hoped_mm2 - laid_down(tee()).total_mm2) / PROFILE.search.second_mm2
+
+    def slow_when_low(profile: Profile) -> Pricing:
+        def price(parts: Sequence[Part]) -> Price:
+            low = profile.process.support != "none" and np.ptp(parts[0].mesh.vertices[:, 2]) < 39
+            found = by_height(profile)(parts)
+            assert found is not None
+            return Price(found.time_s + more_s * low, found.filament_mm)
+
+        return price
+
+    assert searches(tee(), slow_when_low)[1] == 2
 
 
 def on_a_small_plate(profile: Profile) -> Pricing:
