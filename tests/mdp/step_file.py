@@ -1,14 +1,15 @@
-"""A box as a STEP file (ISO 10303-21, AP214): a boundary representation of six planes, written by hand."""
+"""Prisms and cylinders as STEP files (ISO 10303-21, AP214): boundary representations, written by hand."""
 
 from collections.abc import Iterable, Sequence
-from itertools import pairwise, product
+from itertools import pairwise
+
+import numpy as np
 
 HEADER = (
     "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
     "FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;"
 )
-FACE = ((0, 0), (1, 0), (1, 1), (0, 1))
-Corner = tuple[int, int, int]
+Corner = tuple[float, float]
 
 
 class Entities(list[str]):
@@ -30,42 +31,75 @@ class Entities(list[str]):
 
 def step_box(sides: tuple[float, float, float], prefix: str = ".MILLI.") -> str:
     """The file of a box with a corner at the origin; prefix: of the metre, `$` for none."""
-    box = _Box(sides)
-    shell = box.entities.add("CLOSED_SHELL", "''", _list(box.face(axis, side) for axis in range(3) for side in (0, 1)))
-    _product(box.entities, box.entities.add("MANIFOLD_SOLID_BREP", "'box'", shell), prefix)
-    return "\n".join([HEADER, *box.entities, "ENDSEC;", "END-ISO-10303-21;", ""])
+    x, y, z = sides
+    return step_prism([(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)], z, prefix=prefix)
 
 
-class _Box:
-    def __init__(self, sides: tuple[float, float, float]) -> None:
-        self.entities = Entities()
-        corners = product((0, 1), repeat=3)
-        self.places = {corner: [side * at for side, at in zip(sides, corner, strict=True)] for corner in corners}
-        self.vertices = {
-            corner: self.entities.add("VERTEX_POINT", "''", self.entities.point(point)) for corner, point in self.places.items()
-        }
-        self.edges: dict[tuple[Corner, Corner], tuple[str, str]] = {}
+def step_prism(base: Sequence[Corner], height: float, top: float = 1.0, prefix: str = ".MILLI.") -> str:
+    """The file of a prism over a polygon that runs counter-clockwise; top: factor on the upper polygon, a frustum then."""
+    count = len(base)
+    points = [(x, y, 0.0) for x, y in base] + [(top * x, top * y, height) for x, y in base]
+    sides = [(k, (k + 1) % count, count + (k + 1) % count, count + k) for k in range(count)]
+    solid = _Faceted(points)
+    return _file(solid.entities, [solid.face(loop) for loop in (range(count)[::-1], range(count, 2 * count), *sides)], prefix)
 
-    def face(self, axis: int, side: int) -> str:
-        """The side of the box at the end of an axis."""
-        add, across = self.entities.add, (axis + 1) % 3
-        loop: list[Corner] = [self._corner(axis, side, u, v) for u, v in (FACE if side else FACE[::-1])]
+
+def step_cylinder(radius: float, height: float) -> str:
+    """The file of a cylinder about z, its side one curved face."""
+    entities, up, x = Entities(), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+    add = entities.add
+    ends = [add("VERTEX_POINT", "''", entities.point((radius, 0.0, z))) for z in (0.0, height)]
+    frames = [entities.frame((0.0, 0.0, z), up, x) for z in (0.0, height)]
+    rims = [
+        add("EDGE_CURVE", "''", end, end, add("CIRCLE", "''", frame, radius), ".T.")
+        for end, frame in zip(ends, frames, strict=True)
+    ]
+    line = add("LINE", "''", entities.point((radius, 0.0, 0.0)), add("VECTOR", "''", entities.direction(up), "1."))
+    seam = add("EDGE_CURVE", "''", *ends, line, ".T.")
+
+    def face(edges: Iterable[tuple[str, str]], surface: str, sense: str = ".T.") -> str:
+        loop = add("EDGE_LOOP", "''", _list([add("ORIENTED_EDGE", "''", "*", "*", *edge) for edge in edges]))
+        return add("ADVANCED_FACE", "''", _list([add("FACE_OUTER_BOUND", "''", loop, ".T.")]), surface, sense)
+
+    side = [(rims[0], ".T."), (seam, ".T."), (rims[1], ".F."), (seam, ".F.")]
+    faces = [
+        face(side, add("CYLINDRICAL_SURFACE", "''", frames[0], radius)),
+        face([(rims[0], ".F.")], add("PLANE", "''", frames[0]), ".F."),
+        face([(rims[1], ".T.")], add("PLANE", "''", frames[1])),
+    ]
+    return _file(entities, faces, ".MILLI.")
+
+
+def _file(entities: Entities, faces: Iterable[str], prefix: str) -> str:
+    shell = entities.add("CLOSED_SHELL", "''", _list(faces))
+    _product(entities, entities.add("MANIFOLD_SOLID_BREP", "'solid'", shell), prefix)
+    return "\n".join([HEADER, *entities, "ENDSEC;", "END-ISO-10303-21;", ""])
+
+
+class _Faceted:
+    """A solid of plane faces; each edge is one that two faces share."""
+
+    def __init__(self, points: Sequence[Sequence[float]]) -> None:
+        self.entities, self.points = Entities(), points
+        self.vertices = [self.entities.add("VERTEX_POINT", "''", self.entities.point(point)) for point in points]
+        self.edges: dict[tuple[int, int], tuple[str, str]] = {}
+
+    def face(self, loop: Sequence[int]) -> str:
+        """The face whose corners run counter-clockwise seen from outside."""
+        add = self.entities.add
         edges = [add("ORIENTED_EDGE", "''", "*", "*", *self._edge(*ends)) for ends in pairwise([*loop, loop[0]])]
         bound = add("FACE_OUTER_BOUND", "''", add("EDGE_LOOP", "''", _list(edges)), ".T.")
-        normal = [(1.0 if side else -1.0) * (k == axis) for k in range(3)]
-        frame = self.entities.frame(self.places[loop[0]], normal, [float(k == across) for k in range(3)])
+        corners = np.array([self.points[corner] for corner in loop])
+        normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)  # Newell
+        frame = self.entities.frame(corners[0], normal, corners[1] - corners[0])
         return add("ADVANCED_FACE", "''", _list([bound]), add("PLANE", "''", frame), ".T.")
 
-    def _corner(self, axis: int, side: int, u: int, v: int) -> Corner:
-        value = {axis: side, (axis + 1) % 3: u, (axis + 2) % 3: v}
-        return value[0], value[1], value[2]
-
-    def _edge(self, start: Corner, end: Corner) -> tuple[str, str]:
+    def _edge(self, start: int, end: int) -> tuple[str, str]:
         """The edge between two corners, and whether it runs that way."""
         if (start, end) not in self.edges:
-            add, way = self.entities.add, [b - a for a, b in zip(start, end, strict=True)]
+            add, way = self.entities.add, [b - a for a, b in zip(self.points[start], self.points[end], strict=True)]
             vector = add("VECTOR", "''", self.entities.direction(way), "1.")
-            line = add("LINE", "''", self.entities.point(self.places[start]), vector)
+            line = add("LINE", "''", self.entities.point(self.points[start]), vector)
             edge = add("EDGE_CURVE", "''", self.vertices[start], self.vertices[end], line, ".T.")
             self.edges[start, end], self.edges[end, start] = (edge, ".T."), (edge, ".F.")
         return self.edges[start, end]
