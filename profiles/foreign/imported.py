@@ -55,10 +55,10 @@ class Imported:
         return [f'{self.kind}.name="{_quoted(self.name)}"', *(f"{row.key}={row.value}" for row in self.rows if row.taken)]
 
 
-def imported(config: Config, kind: str, name: str = "") -> Imported:
-    """The material or the process of a configuration. name: what to call it; else as there, else after the program."""
+def imported(config: Config, kind: str, name: str = "", nameless: str = "imported") -> Imported:
+    """The material or the process of a configuration. name: what to call it; else as there; nameless: where it has no name."""
     base = PROCESS_BASE if kind == "process" else material_rules.base_of(config)[0]
-    own_name = name or (config.process if kind == "process" else config.material) or f"{config.program} {kind}"
+    own_name = name or (config.process if kind == "process" else config.material) or nameless
     return _sound(Imported(kind, own_name, base, tuple(_rows(config, kind, base))))
 
 

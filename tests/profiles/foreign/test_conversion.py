@@ -113,5 +113,5 @@ def test_a_width_that_does_not_go_with_its_layers_is_left_with_the_reason() -> N
 
 
 def test_layers_that_are_too_high_for_all_lines_are_refused() -> None:
-    with pytest.raises(ProfileError, match=r"process 'PrusaSlicer process': .*at most 0.9 of line_width_mm"):
+    with pytest.raises(ProfileError, match=r"process 'imported': .*at most 0.9 of line_width_mm"):
         imported(config(layer_height="0.4", perimeter_extrusion_width="0.4"), "process")

@@ -25,7 +25,7 @@ AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "worked out", "left"
 def import_profiles(request: ImportRequest) -> int:
     """Write the material and the process of a file, and say row by row what became of its settings."""
     config = read_config(request.file, request.presets)
-    found = [imported(config, kind, request.name) for kind in KINDS]
+    found = [imported(config, kind, request.name, request.file.stem) for kind in KINDS]
     found = [profile for profile in found if any(row.taken for row in profile.rows)]
     if not found:
         raise ProfileError(f"profile {request.file}: none of its {len(config.entries)} settings has one like it here")

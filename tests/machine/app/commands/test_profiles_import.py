@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,11 @@ def test_material_and_process_are_written_and_read_back(tmp_path: Path) -> None:
     material = load_one(str(tmp_path / "theirs-material.toml"))["material"]
     assert (process.outer_wall_line_width_mm, process.outer_wall_speed_mm_s) == (0.45, 36.0)  # type: ignore[attr-defined]
     assert material.nozzle_c == 207.0  # type: ignore[attr-defined]
+
+
+def test_what_has_no_name_is_called_as_its_file(tmp_path: Path) -> None:
+    import_profiles(replace(request(tmp_path), name=""))
+    assert sorted(file.name for file in tmp_path.glob("*.toml")) == ["config-material.toml", "config-process.toml"]
 
 
 def test_what_became_of_every_setting_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
