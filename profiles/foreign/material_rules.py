@@ -72,6 +72,7 @@ GCODE = "G-code blocks belong to the machine"
 RULES: tuple[tuple[str, str, Convert], ...] = (
     ("material.diameter_mm", "filament_diameter", number),
     ("material.density_g_cm3", "filament_density", above_zero("not told")),
+    ("material.price_per_kg", "filament_cost", above_zero("not told")),
     ("material.nozzle_c", "temperature", number),
     ("material.first_layer_nozzle_c", "first_layer_temperature", number),
     ("material.bed_c", "bed_temperature", number),

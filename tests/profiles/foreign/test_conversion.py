@@ -54,6 +54,7 @@ def test_a_print_setting_becomes_ours(values: dict[str, str], key: str, value: s
         ({"temperature": "215,220"}, "nozzle_c", "215.0"),
         ({"start_filament_gcode": r'"M900 K0.05 ; PLA\nG92 E0"'}, "pressure_advance", "0.05"),
         ({"wipe": "0"}, "wipe_mm", "0.0"),
+        ({"filament_cost": "24.9"}, "price_per_kg", "24.9"),
     ],
 )
 def test_a_filament_setting_becomes_ours(values: dict[str, str], key: str, value: str) -> None:
