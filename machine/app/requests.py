@@ -167,7 +167,7 @@ class CalibrationRequest:
     """A machine profile by name, the mark that is touched on it (None: the usual one), and where the result goes.
 
     save: name of the user's own profile, None: the machine's. replace: write over files that exist. force: save although the
-    touches are far off.
+    touches are far off. directions: find those of the axes, too.
     """
 
     machine: str
@@ -177,6 +177,7 @@ class CalibrationRequest:
     save: str | None = None
     replace: bool = False
     force: bool = False
+    directions: bool = False
 
 
 @dataclass(frozen=True)

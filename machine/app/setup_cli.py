@@ -30,6 +30,7 @@ def calibrate(
     save: Annotated[str | None, typer.Option("--save", metavar="NAME", help="name of your profile; else the machine's")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
     force: Annotated[bool, typer.Option("--force", help="save although the touches are far off")] = False,
+    directions: Annotated[bool, typer.Option("--directions", help="find the directions of the axes, too")] = False,
     machine: MachineName = Given.machine,
     settings: Settings = None,
 ) -> int:
@@ -39,7 +40,7 @@ def calibrate(
     """
     from machine.app.commands.measuring.calibrate import ask_for_touches, evaluate_sheet, write_program
 
-    request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force)
+    request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force, directions)
     if out is not None and measured is None:
         return write_program(request, machine_profile(machine, settings), out)
     if measured is not None and out is None:

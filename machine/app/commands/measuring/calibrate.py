@@ -88,7 +88,7 @@ def _tilting(request: CalibrationRequest) -> Machine:
 
 def _calibrated(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple[Calibration, str]:
     """What follows from the touches, which is shown, and why it is not taken; "" when it is."""
-    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
+    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg, request.directions)
     show(_comparison(machine, calibration, sheet.mark_angle_deg is not None))
     if calibration.rms_mm <= MOST_OFF_MM or request.force:
         return calibration, ""
@@ -116,6 +116,10 @@ def _comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -
         lines.append(f"{axis} {new.letter}: sign {new.sign}, was {old.sign}")
         if axis == "tilt" or zero_of_turn:
             lines.append(f"{axis} {new.letter}: zero {new.zero_deg:.4f} deg, was {old.zero_deg:g}")
+        if calibration.directions:
+            along = " ".join(f"{value:.5f}" for value in new.axis)
+            was = " ".join(f"{value:g}" for value in old.axis)
+            lines.append(f"{axis} {new.letter}: along {along} (+-{calibration.sigma[f'{axis}.axis']:.4f} deg), was {was}")
     touches, mean_mm = len(calibration.residuals_mm), calibration.rms_mm
     most = f"most at touch {calibration.worst}: {max(calibration.residuals_mm):.4f} mm"
     lines.append(f"touches: {touches}, {mean_mm:.4f} mm off on average, {most}")
