@@ -181,6 +181,19 @@ class CalibrationRequest:
 
 
 @dataclass(frozen=True)
+class ProbeRequest:
+    """A printer that measures a ball by itself. ball_mm: its diameter; offset_mm: from the nozzle's tip to what touches, 0 where
+    the nozzle senses; png: picture of what is left over; log as for a print."""
+
+    port: str
+    baud: int = 115200
+    ball_mm: float = 20.0
+    offset_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    png: Path | None = None
+    log: Path | None = None
+
+
+@dataclass(frozen=True)
 class ImportRequest:
     """Another slicer's settings to read. presets: of a bundle, by process, material and printer, empty: its only or its active
     one; name: of both profiles, empty: as there; out: folder for their files, None: the user's own; replace: write over files.

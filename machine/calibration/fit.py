@@ -26,6 +26,7 @@ UPSIDE_DOWN_DEG = 90.0
 STARTS_DEG = (0.0, 25.0, -25.0)
 ROUNDS = 40
 STEP = 1e-4
+PULL = 0.01  # a touch is some hundredths of a mm off, a profile's numbers some mm
 LITTLE = 1e-7  # a squared sum that falls by a smaller share is the least
 HOPELESS = 400.0  # times the mean square of the best signs: such others are not worth another fit
 SETTLED = 1e-7  # mm and deg: numbers that change by less are found
@@ -80,7 +81,7 @@ class Calibration:
 
 @dataclass(frozen=True, eq=False)
 class _Guess:
-    """One choice of both signs, and the touches that numbers are to explain: (8,) in the order of UNKNOWN, (11,) with DIRECTIONS."""
+    """One choice of both signs, and the touches that numbers are to explain: (8,) as in UNKNOWN, (11,) with DIRECTIONS."""
 
     machine: Machine
     signs: tuple[int, int]
@@ -91,14 +92,18 @@ class _Guess:
         """Mean square and numbers of the best fit from a zero so far from the profile's, the axes directed as it says."""
         return self.improved(self._start(start_deg))
 
-    def improved(self, numbers: Floats) -> tuple[float, Floats]:
-        """Mean square and numbers of the best fit near to some numbers, by Levenberg's damped least squares."""
-        damping, here = 1e-3, self.residuals(numbers)
+    def improved(self, numbers: Floats, pull: float = 0.0) -> tuple[float, Floats]:
+        """Mean square and numbers of the best fit near to some numbers, by Levenberg's damped least squares.
+
+        pull: how strongly they are drawn to where they begin, as a share of a touch's own weight: what the touches do not tell
+        stays there.
+        """
+        usual, damping, here = numbers, 1e-3, np.append(self.residuals(numbers), np.zeros(len(numbers)))
         for _ in range(ROUNDS):
-            slope = self._slope(numbers)
+            slope = np.vstack([self._slope(numbers), pull * np.eye(len(numbers))])
             normal = slope.T @ slope
             step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-9), -slope.T @ here, rcond=None)[0]
-            tried = self.residuals(numbers + step)
+            tried = np.append(self.residuals(numbers + step), pull * (numbers + step - usual))
             if tried @ tried < here @ here:
                 settled = tried @ tried > (1.0 - LITTLE) * (here @ here)
                 numbers, here, damping = numbers + step, tried, damping * 0.2
@@ -108,6 +113,7 @@ class _Guess:
                 damping *= 8.0
             if np.abs(step).max() < SETTLED or damping > 1e7:
                 break
+        here = here[: -len(numbers)]
         if abs(numbers[5] - self.machine.tilt.zero_deg) > UPSIDE_DOWN_DEG:  # the other way round fits a table seen from below
             return np.inf, numbers
         return float(here @ here) / len(here), numbers
@@ -210,6 +216,17 @@ def calibrate(
     errors = np.zeros(told.shape)
     errors[told] = guess.residuals(numbers)
     return Calibration(calibrated, mark, tuple((float(x), float(y), float(z)) for x, y, z in errors), sigma)
+
+
+def estimate(
+    machine: Machine, touches: Sequence[Touch], mark_mm: tuple[float, float, float]
+) -> tuple[Machine, tuple[float, float, float]]:
+    """The machine and the mark as far as a few touches tell them: what they do not tell, and both signs, stay as given."""
+    guess = _Guess(machine, (machine.tilt.sign, machine.turn.sign), touches, mark_mm[2])
+    tilt_point = _across(machine) @ np.array(machine.tilt.point_mm)
+    begin = np.array([*machine.turn.point_mm, *tilt_point, machine.tilt.zero_deg, *mark_mm[:2], *np.zeros(len(DIRECTIONS))])
+    _, numbers = guess.improved(begin, PULL)
+    return guess.machine_with(numbers), (float(numbers[6]), float(numbers[7]), mark_mm[2])
 
 
 def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, directions: bool) -> tuple[_Guess, Floats]:
