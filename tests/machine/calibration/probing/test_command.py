@@ -8,7 +8,6 @@ import pytest
 from PIL import Image
 
 from machine.app.cli import main
-from machine.app.commands.measuring import calibrate_probe
 from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.contact.surface import TrueBall
 from machine.simulator.simulator import SimulatedPrinter
@@ -93,9 +92,3 @@ def test_what_cannot_be_measured_is_said_in_a_sentence(
 ) -> None:
     assert main(["calibrate", "--probe", *arguments]) == 1
     assert sentence in capsys.readouterr().err
-
-
-def test_the_words_of_older_klipper_are_understood() -> None:
-    rules = calibrate_probe.firmware_of(machine_of("fractal5pro")).probing
-    assert rules is not None
-    assert rules.contact.startswith(r"\bResult is z=")
