@@ -92,8 +92,11 @@ class Measuring:
             if pose not in met:
                 self._touch(pose)
         for tilt_deg in self._tilts():
-            for turn_deg in turns:
-                self._touch(Pose(tilt_deg, turn_deg))
+            for pose in (Pose(tilt_deg, turn_deg) for turn_deg in turns):
+                if obstacle := self._find_in_the_way(self.machine, pose):  # better known by now than when the tilt was chosen
+                    self.tell(f"{self._name(pose)} is left out: {obstacle}")
+                else:
+                    self._touch(pose)
         self._rise(home)
         self.prober.turn(home)
         return self.touches
@@ -224,8 +227,9 @@ class Measuring:
         for _ in range(MOST_TIMES):
             exact = share == WIDE
             contacts = []
-            for place in centre[:2] + share * radius * AROUND:
-                contacts.append(self._contact(pose, place, centre, over, exact))
+            places = centre[:2] + share * radius * AROUND
+            for place, height in zip(places, contact_heights(centre, radius, flat, places).tolist(), strict=True):
+                contacts.append(self._contact(pose, place, height, float(centre[2]) + radius + over, exact))
                 over = LIFT_MM if exact else over
             before, centre = centre, ball_centre(np.array(contacts), radius, flat, seek_flat=exact)
             near = float(np.hypot(*(centre - before)[:2])) <= CENTRED * radius
@@ -234,17 +238,15 @@ class Measuring:
             share = WIDE if near else share
         raise PrinterError(f"at {self._name(pose)} the ball's centre is not found: it comes to lie elsewhere each time")
 
-    def _contact(self, pose: Pose, place: Floats, centre: Floats, over_mm: float, exact: bool) -> Floats:
-        """(3,) where the ball is touched at a place, from a height over its top; exact: two contacts must agree."""
-        top = float(centre[2]) + self.ball.radius_mm
-        expected = contact_heights(centre, self.ball.radius_mm, self.probe.flat_mm, place[None])[0]
-        self._above = top + over_mm
+    def _contact(self, pose: Pose, place: Floats, expected: float, above_mm: float, exact: bool) -> Floats:
+        """(3,) where something is met at a place, expected at a height, from another above; exact: two contacts must agree."""
+        self._above = above_mm
         self.prober.rise(self._tip_z(self._above))
         self.prober.cross(*(place - self.probe.offset_mm[:2]))
         heights: list[float] = []
         while len(heights) < MOST_TIMES:
-            heights.append(self._seek(pose, float(expected)))
-            self._above = max(heights[-1], top) + LIFT_MM
+            heights.append(self._seek(pose, expected))
+            self._above = min(max(heights[-1], expected) + LIFT_MM, above_mm)
             self.prober.rise(self._tip_z(self._above))
             if not exact:
                 return np.array([*place, heights[-1]])
