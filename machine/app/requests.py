@@ -151,7 +151,10 @@ class ConsoleRequest:
 
 @dataclass(frozen=True)
 class SimulatorRequest:
-    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script."""
+    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script.
+
+    ball: X,Y,Z,D of one on its plate, true: of what machine; with either of them it has a probe.
+    """
 
     profile: "Profile"
     link: Path | None = None
@@ -160,6 +163,8 @@ class SimulatorRequest:
     speed: float = 1.0
     baud: int | None = None
     habits: str = ""
+    ball: str | None = None
+    true: "Profile | None" = None
 
 
 @dataclass(frozen=True)

@@ -124,4 +124,9 @@ def comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) ->
     touches, mean_mm = len(calibration.residuals_mm), calibration.rms_mm
     most = f"most at touch {calibration.worst}: {max(calibration.residuals_mm):.4f} mm"
     lines.append(f"touches: {touches}, {mean_mm:.4f} mm off on average, {most}")
+    if calibration.directions and before.coordinates == "workpiece":
+        lines.append(
+            f"note: {before.dialect} follows the table as if its axes were straight: the directions count where "
+            'coordinates = "table"'
+        )
     return "\n".join(lines) + "\n"
