@@ -57,6 +57,8 @@ def calibrate(
         if out is not None or measured is not None:
             raise typer.BadParameter("--probe measures by itself: -o and --measured are for touches by hand")
         return probe_axes(request, probing.request(), machine_profile(machine, settings))
+    if probing.port is not None or probing.png is not None:
+        raise typer.BadParameter("--port and --png go with --probe")
     if out is not None and measured is None:
         return write_program(request, machine_profile(machine, settings), out)
     if measured is not None and out is None:

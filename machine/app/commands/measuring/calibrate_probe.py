@@ -120,6 +120,8 @@ def _session(probing: ProbeRequest, machine: Machine, ball: Ball, probe: Probe) 
             path = stack.enter_context(SimulatedPrinter(machine, inf, table=table)).path
         log = stack.enter_context(new_log("calibrate", f"calibrate at {probing.port}", probing.log))
         wire = stack.enter_context(open_port(path, probing.baud))
+        if log.trouble:
+            say(f"the traffic is not logged: {log.file}: {log.trouble}")
         stack.enter_context(interrupting())
         answer = identify_printer(wire, probing.baud)
         say(describe_answer(answer, probing.baud))

@@ -81,6 +81,22 @@ def test_a_printer_without_the_command_is_told_what_it_needs(capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
+        (["--port", "sim"], "--port and --png go with --probe"),
+        (["--probe"], "--probe needs --port PORT"),
+        (["--probe", "--port", "sim", "--probe-offset", "1,2"], "three numbers X,Y,Z in mm are expected"),
+        (["--probe", "--port", "sim", "-o", "touch.gcode"], "-o and --measured are for touches by hand"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(
+    arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["calibrate", *arguments]) == 1
+    assert sentence in " ".join(capsys.readouterr().err.replace("│", " ").split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
         (["--machine", "linuxcnc_xyzac", "--port", "sim"], "linuxcnc"),
         (["--machine", "three_axis", "--port", "sim"], "there is no rotary axis to calibrate"),
         (["--machine", "generic_ac", "--port", "sim", "--mark-height", "5"], "has its centre higher up"),
