@@ -23,7 +23,8 @@ FAR_MM = 6.0  # a contact so far from where it is expected is of something else
 LIFT_MM = 2.0  # over the last contact, from where the next one is sought
 AT_ONCE_MM = 0.05  # a contact so near to where it was sought from is none
 AGREE_MM, MOST_TIMES = 0.03, 4  # two contacts at one place must agree so well, after so many at the most
-NEAR, WIDE = 0.2, 0.4  # of the ball's radius: how far around its middle it is sought, and measured
+NEAR, WIDE = 0.2, 0.5  # of the ball's radius: how far around its middle it is sought, and measured
+DROP = 1.0 - (1.0 - WIDE**2) ** 0.5  # by which the ball is lower there than at its top
 CENTRED = 0.1  # of the radius: a centre so near to where it was expected is measured well
 STEP = 0.3  # of the radius: how far the ball may be moved while a sign is unknown
 SMALL = 0.2  # sine of the greatest such tilt
@@ -223,14 +224,15 @@ class Measuring:
     def _centre(self, pose: Pose, expected: Floats, share: float) -> Floats:
         """The ball's centre, sought around where it is expected, then measured around where it is."""
         radius, flat = self.ball.radius_mm, self.probe.flat_mm
-        centre, over = expected, FAR_MM
+        centre, top = expected, expected[2] + radius + FAR_MM - LIFT_MM
         for _ in range(MOST_TIMES):
             exact = share == WIDE
             contacts = []
             places = centre[:2] + share * radius * AROUND
             for place, height in zip(places, contact_heights(centre, radius, flat, places).tolist(), strict=True):
-                contacts.append(self._contact(pose, place, height, float(centre[2]) + radius + over, exact))
-                over = LIFT_MM if exact else over
+                contacts.append(self._contact(pose, place, height, float(top) + LIFT_MM, exact))
+                if exact:  # the ball's top is no farther above a contact than this, wherever its middle is
+                    top = max(centre[2] + radius, max(z for _, _, z in contacts) + DROP * radius)
             before, centre = centre, ball_centre(np.array(contacts), radius, flat, seek_flat=exact)
             near = float(np.hypot(*(centre - before)[:2])) <= CENTRED * radius
             if near and exact:
