@@ -152,15 +152,22 @@ def simulator(
     habits: Annotated[
         str | None, typer.Option("--habits", metavar="LIST", help="how the firmware was built: no-advanced-ok,no-busy,...")
     ] = None,
+    ball: Annotated[
+        str | None,
+        typer.Option("--ball", metavar="X,Y,Z,D", help="it has a probe, and a ball on the plate: centre and diameter, mm"),
+    ] = None,
+    true_machine: Annotated[
+        str | None, typer.Option("--true-machine", metavar="NAME|FILE", help="what its probe senses is this machine's")
+    ] = None,
     machine: options.MachineName = Given.machine,
     settings: options.Settings = None,
 ) -> int:
     """A simulated printer for any host to print on; Ctrl-C ends it."""
     from machine.app.commands.simulator import simulate_printer
 
-    return simulate_printer(
-        SimulatorRequest(options.machine_profile(machine, settings), pty, tcp, faults, speed, baud, habits or "")
-    )
+    true = None if true_machine is None else options.machine_profile(true_machine, None)
+    profile = options.machine_profile(machine, settings)
+    return simulate_printer(SimulatorRequest(profile, pty, tcp, faults, speed, baud, habits or "", ball, true))
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

@@ -151,7 +151,10 @@ class ConsoleRequest:
 
 @dataclass(frozen=True)
 class SimulatorRequest:
-    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script."""
+    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script.
+
+    ball: X,Y,Z,D of one on its plate, true: of what machine; with either of them it has a probe.
+    """
 
     profile: "Profile"
     link: Path | None = None
@@ -160,6 +163,8 @@ class SimulatorRequest:
     speed: float = 1.0
     baud: int | None = None
     habits: str = ""
+    ball: str | None = None
+    true: "Profile | None" = None
 
 
 @dataclass(frozen=True)
@@ -167,7 +172,7 @@ class CalibrationRequest:
     """A machine profile by name, the mark that is touched on it (None: the usual one), and where the result goes.
 
     save: name of the user's own profile, None: the machine's. replace: write over files that exist. force: save although the
-    touches are far off.
+    touches are far off. directions: find those of the axes, too.
     """
 
     machine: str
@@ -177,6 +182,20 @@ class CalibrationRequest:
     save: str | None = None
     replace: bool = False
     force: bool = False
+    directions: bool = False
+
+
+@dataclass(frozen=True)
+class ProbeRequest:
+    """A printer that measures a ball by itself. ball_mm: its diameter; offset_mm: from the nozzle's tip to what touches, 0 where
+    the nozzle senses; png: picture of what is left over; log as for a print."""
+
+    port: str
+    baud: int = 115200
+    ball_mm: float = 20.0
+    offset_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    png: Path | None = None
+    log: Path | None = None
 
 
 @dataclass(frozen=True)

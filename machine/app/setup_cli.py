@@ -8,7 +8,16 @@ import typer
 
 from machine.app.requests import CalibrationRequest, CouponRequest, DetectRequest, Given, ImportRequest
 from machine.app.terminal.option_groups import with_option_groups
-from machine.app.terminal.options import Baud, Force, HtmlFile, MachineName, ModelProfileOptions, Settings, machine_profile
+from machine.app.terminal.options import (
+    Baud,
+    Force,
+    HtmlFile,
+    MachineName,
+    ModelProfileOptions,
+    ProbeOptions,
+    Settings,
+    machine_profile,
+)
 
 profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
 
@@ -30,16 +39,26 @@ def calibrate(
     save: Annotated[str | None, typer.Option("--save", metavar="NAME", help="name of your profile; else the machine's")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
     force: Annotated[bool, typer.Option("--force", help="save although the touches are far off")] = False,
+    directions: Annotated[bool, typer.Option("--directions", help="find the directions of the axes, too")] = False,
+    probing: ProbeOptions,
     machine: MachineName = Given.machine,
     settings: Settings = None,
 ) -> int:
     """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
 
-    Without -o and --measured a terminal asks for the touches one by one.
+    Without -o and --measured a terminal asks for the touches one by one; with --probe the machine measures a ball by itself.
     """
     from machine.app.commands.measuring.calibrate import ask_for_touches, evaluate_sheet, write_program
 
-    request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force)
+    request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force, directions)
+    if probing.probe:
+        from machine.app.commands.measuring.calibrate_probe import probe_axes
+
+        if out is not None or measured is not None:
+            raise typer.BadParameter("--probe measures by itself: -o and --measured are for touches by hand")
+        return probe_axes(request, probing.request(), machine_profile(machine, settings))
+    if probing.port is not None or probing.png is not None:
+        raise typer.BadParameter("--port and --png go with --probe")
     if out is not None and measured is None:
         return write_program(request, machine_profile(machine, settings), out)
     if measured is not None and out is None:

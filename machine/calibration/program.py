@@ -45,18 +45,23 @@ def plan_touches(machine: Machine, mark_height_mm: float, mark_radius_mm: float 
 
     Raises MoveError when no tilt of 10 degrees or more does.
     """
-    least = machine.table.radius_mm if machine.table.size_mm is None else 0.5 * min(machine.table.size_mm)
-    radius = mark_radius_mm if mark_radius_mm is not None else min(0.6 * least, MOST_MARK_RADIUS_MM)
     if not machine.tilts:
         raise MoveError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
-    if not 5.0 <= radius <= least:
-        raise MoveError(f"a mark {radius:g} mm from the middle cannot be used: 5 to {least:g} mm are allowed on {machine.name}")
-    mark = (radius, 0.0, mark_height_mm)
+    mark = (usual_radius_mm(machine, mark_radius_mm), 0.0, mark_height_mm)
     tilts = _tilts(machine, mark)
-    turns = _turns(machine)
+    turns = turns_deg(machine)
     poses = tuple(Pose(tilt, value) for tilt in (machine.tilt.zero_deg, *tilts) for value in turns)
     expected = tuple(_expected_mm(machine, pose, mark) for pose in poses)
-    return TouchPlan(poses, expected, _safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
+    return TouchPlan(poses, expected, safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
+
+
+def usual_radius_mm(machine: Machine, asked_mm: float | None = None) -> float:
+    """Distance of the mark from the middle, as asked for or as far out as is usual. Raises MoveError for one off the plate."""
+    least = machine.table.radius_mm if machine.table.size_mm is None else 0.5 * min(machine.table.size_mm)
+    radius = asked_mm if asked_mm is not None else min(0.6 * least, MOST_MARK_RADIUS_MM)
+    if not 5.0 <= radius <= least:
+        raise MoveError(f"a mark {radius:g} mm from the middle cannot be used: 5 to {least:g} mm are allowed on {machine.name}")
+    return radius
 
 
 def calibration_lines(profile: Profile, touches: TouchPlan) -> Iterator[str]:
@@ -64,46 +69,60 @@ def calibration_lines(profile: Profile, touches: TouchPlan) -> Iterator[str]:
 
     Raises ProfileError, before the first line, for a block of the profile that the firmware refuses.
     """
-    check_blocks(profile)
-    machine = profile.machine.model_copy(update={"coordinates": "table"})
-    dialect = dialect_of(machine)
-    pen = Pen(dialect, machine, "", level(machine))
-    pen.values = placeholders("calibration", profile, [], 0.0, 0.0)
+    pen = calibration_pen(profile)
+    machine = pen.machine
     yield f"; {machine.name}: calibration, {len(touches.poses)} touches of one mark, nozzle cold and clean"
     radius, _, height = touches.mark_mm
     yield f"; the mark is {height:g} mm high and stands {radius:g} mm from the middle, towards +X at turn 0"
-    for word in dialect.before_start:
-        yield from _fill(word, pen)
-    yield from (line for line in _fill(machine.gcode.start, pen) if line.split(" ")[0] not in HEATING)
-    yield from (mode for mode in dialect.modes if mode not in ("M83", "M82"))
-    for word in dialect.after_start:
-        yield from _fill(word, pen)
-    if dialect.follow_persists:
-        yield dialect.follow_off
+    yield from cold_start(pen)
+    dialect = pen.dialect
     up, across = 60.0 * machine.z.speed_mm_s, 60.0 * min(machine.x.speed_mm_s, machine.y.speed_mm_s, 100.0)
     for index, (pose, (x, y, z)) in enumerate(zip(touches.poses, touches.expected_mm, strict=True), start=1):
         name = f"{machine.tilt.letter}{number(pose.tilt_deg)} {machine.turn.letter}{number(pose.turn_deg)}"
         yield f"; touch {index}: {name}, expected near X{x:.1f} Y{y:.1f} Z{z:.1f}"
         yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
-        yield from _turn(pose, pen)
+        yield from turn_lines(pose, pen)
         yield f"G1 X{x:.3f} Y{y:.3f} F{across:.0f}"
         yield f"G1 Z{_hover(machine, z, touches.safe_z_mm):.3f} F{up:.0f}"
         yield from (line.format(text=f"touch {index} {name} note X Y Z") for line in dialect.wait_for_person)
     yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
-    yield from _turn(level(machine), pen)
+    yield from turn_lines(level(machine), pen)
     for word in dialect.before_end:
         yield from _fill(word, pen)
     if dialect.last:
         yield dialect.last
 
 
-def _fill(block: str, pen: Pen) -> list[str]:
-    return fill_block(block, BLOCKS[0], pen.values, pen.dialect.longest_line)
+def calibration_pen(profile: Profile) -> Pen:
+    """A pen for the axes' own coordinates, the table level. Raises ProfileError for a block that the firmware refuses."""
+    check_blocks(profile)
+    machine = profile.machine.model_copy(update={"coordinates": "table"})
+    pen = Pen(dialect_of(machine), machine, "", level(machine))
+    pen.values = placeholders("calibration", profile, [], 0.0, 0.0)
+    return pen
 
 
-def _turn(pose: Pose, pen: Pen) -> Iterator[str]:
+def cold_start(pen: Pen) -> Iterator[str]:
+    """Homing as the start block does it but without heat, and the modes of a program."""
+    dialect = pen.dialect
+    for word in dialect.before_start:
+        yield from _fill(word, pen)
+    yield from (line for line in _fill(pen.machine.gcode.start, pen) if line.split(" ")[0] not in HEATING)
+    yield from (mode for mode in dialect.modes if mode not in ("M83", "M82"))
+    for word in dialect.after_start:
+        yield from _fill(word, pen)
+    if dialect.follow_persists:
+        yield dialect.follow_off
+
+
+def turn_lines(pose: Pose, pen: Pen) -> Iterator[str]:
+    """The lines that turn the table from where it stands to a pose."""
     speed = turn_speed(pose.tilt_deg - pen.pose.tilt_deg, pose.turn_deg - pen.pose.turn_deg, pen.machine)
     yield from turn(pose, speed, pen)
+
+
+def _fill(block: str, pen: Pen) -> list[str]:
+    return fill_block(block, BLOCKS[0], pen.values, pen.dialect.longest_line)
 
 
 def _hover(machine: Machine, expected_z_mm: float, safe_z_mm: float) -> float:
@@ -134,16 +153,16 @@ def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, f
 
 def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> bool:
     """Whether the tip can touch the mark at a tilt at every turn: head over the plate, X Y Z inside, room above to turn."""
-    if _safe_z_mm(machine, mark, abs(tilt_deg - machine.tilt.zero_deg)) > machine.z.limits_mm[1]:
+    if safe_z_mm(machine, mark, abs(tilt_deg - machine.tilt.zero_deg)) > machine.z.limits_mm[1]:
         return False
-    if least_tip_height_mm(_clip_head(machine, mark), Pose(tilt_deg, machine.turn.zero_deg)) > mark[2]:
+    if least_tip_height_mm(clipped_head(machine, mark), Pose(tilt_deg, machine.turn.zero_deg)) > mark[2]:
         return False
     limits = np.array([axis.limits_mm for axis in (machine.x, machine.y, machine.z)])
-    places = np.array([_expected_mm(machine, Pose(tilt_deg, value), mark) for value in _turns(machine)])
+    places = np.array([_expected_mm(machine, Pose(tilt_deg, value), mark) for value in turns_deg(machine)])
     return bool((places >= limits[:, 0]).all() and (places <= limits[:, 1]).all())
 
 
-def _clip_head(machine: Machine, mark: tuple[float, float, float]) -> Machine:
+def clipped_head(machine: Machine, mark: tuple[float, float, float]) -> Machine:
     """The machine with its head's boxes cut where the plate cannot reach them."""
     far = machine.table.radius_mm + mark[0] + MARGIN_MM
     boxes = []
@@ -155,7 +174,7 @@ def _clip_head(machine: Machine, mark: tuple[float, float, float]) -> Machine:
     return machine.model_copy(update={"head": machine.head.model_copy(update={"boxes": boxes})})
 
 
-def _turns(machine: Machine) -> list[float]:
+def turns_deg(machine: Machine) -> list[float]:
     """The four turns inside limits and cables, each as near to the zero as can be."""
     least, most = machine.turn.reach_deg
     zero = machine.turn.zero_deg
@@ -168,7 +187,7 @@ def _expected_mm(machine: Machine, pose: Pose, mark: tuple[float, float, float])
     return x, y, z
 
 
-def _safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> float:
+def safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> float:
     """Machine Z over everything that turns, to either side up to a tilt, whichever way the axes really go."""
     around = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
     ring = np.column_stack([np.cos(around), np.sin(around), np.zeros(24)])

@@ -11,23 +11,27 @@ from machine.calibration.fit import Calibration
 from profiles.machine import Machine
 from profiles.places import PARENT, merged, own, own_folder, parse, shipped
 
+DIRECTIONS = ("machine.tilt.axis", "machine.turn.axis")
+DIGITS = {"axis": 6}  # a millionth of a unit vector is a tenth of a micrometre at 100 mm; of other numbers four digits are kept
 FOUND = tuple(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "point_mm"))
 
 
-def fitted_keys(zero_of_turn: bool) -> tuple[str, ...]:
-    """The keys that a calibration finds; the turn's zero only where the mark's direction was told."""
-    return (*FOUND, "machine.tilt.zero_deg", *(("machine.turn.zero_deg",) if zero_of_turn else ()))
+def fitted_keys(zero_of_turn: bool, directions: bool = False) -> tuple[str, ...]:
+    """The keys that a calibration finds; the turn's zero only where the mark's direction was told, the axes' where sought."""
+    zeros = ("machine.tilt.zero_deg", *(("machine.turn.zero_deg",) if zero_of_turn else ()))
+    return (*FOUND, *zeros, *(DIRECTIONS if directions else ()))
 
 
 def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
     """The tables of the calibrated profile: numbers, sources, and what is left uncalibrated."""
-    keys = fitted_keys(zero_of_turn)
+    keys = fitted_keys(zero_of_turn, calibration.directions)
     source = f"tiltprint calibrate, {len(calibration.residuals_mm)} touches, {calibration.rms_mm:.3f} mm off"
     axes: dict[str, dict[str, Any]] = {"tilt": {}, "turn": {}}
     for key in keys:
         _, axis, name = key.split(".")
         value = getattr(getattr(calibration.machine, axis), name)
-        axes[axis][name] = [round(x, 4) for x in value] if isinstance(value, tuple) else round(value, 4)
+        digits = DIGITS.get(name, 4)
+        axes[axis][name] = [round(x, digits) for x in value] if isinstance(value, tuple) else round(value, digits)
     left = [key for key in before.uncalibrated if key not in keys]
     return {"machine": {"uncalibrated": left, **axes, "sources": dict.fromkeys(keys, source)}}
 

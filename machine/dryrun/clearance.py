@@ -36,12 +36,24 @@ def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[n
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
     """Moves with the table at rest, one group for every pose_run between turns: two directions settle almost every move."""
     problems: list[Finding] = []
+    tried = ~_rises_from_home(program)
     for pose_run in pose_runs(program):
         if len(problems) >= MOST:
             return [*problems, cut_short(program, int(pose_run.rows[0]), "straight moves")]
-        for body, solid, rows in _close(program, pose_run, machine):
+        for body, solid, rows in _close(program, PoseRun(pose_run.rows[tried[pose_run.rows]], pose_run.pose), machine):
             problems += _body(program, PoseRun(rows, pose_run.pose), body, solid, machine)
     return problems
+
+
+def _rises_from_home(program: ParsedProgram) -> NDArray[np.bool_]:
+    """(n,) moves straight up from where the firmware has homed: there the tip stands on the plate or above it, although a
+    calibrated plate may lie higher than the 0 that it is read as standing at."""
+    from_home = np.ones(len(program.line), dtype=np.bool_)
+    from_home[1:] = (program.start[1:, :3] != program.end[:-1, :3]).any(axis=1)
+    aside = [0, 1, 3, 4]
+    straight = (program.start[:, aside] == program.end[:, aside]).all(axis=1) & (program.end[:, 2] > program.start[:, 2])
+    rises: NDArray[np.bool_] = from_home & straight
+    return rises
 
 
 def _close(program: ParsedProgram, run: PoseRun, machine: Machine) -> Iterator[tuple[Body, Solid, NDArray[np.int64]]]:

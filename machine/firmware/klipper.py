@@ -13,6 +13,7 @@ from dataclasses import replace
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
+from machine.firmware.probing import ProbingRules
 from machine.firmware.simulation import Idle, SimulationRules
 from profiles.axes import RotaryAxis
 
@@ -87,7 +88,7 @@ def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, be
 
 UNKNOWN = frozenset({
     "M92", "M108", "M113", "M116", "M154", "M155", "M211", "M302", "M409", "M410", "M486", "M503", "M568", "M572", "M665", "M876",
-    "M900", "G43.4",
+    "M900", "G43.4", "G38.3",
 })  # fmt: skip
 IDENTITY = "FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0-simulated"
 
@@ -131,6 +132,20 @@ SIMULATED = SimulationRules(
     idle=Idle(after_s=600.0, axes=5, shuts_down=True),
 )
 
+# klippy/extras/probe.py, cmd_PROBE: down to position_min of stepper_z, there is no other limit. Since 2026 it answers where
+# the bed is, z_offset subtracted ("Result: at %.3f,%.3f estimate contact at z=%.6f"), before where the tip was ("Result is
+# z=%.6f").
+# klippy/extras/homing.py: "No trigger on probe after full movement", "Probe triggered prior to movement".
+PROBING = ProbingRules(
+    command="PROBE PROBE_SPEED={speed:.1f} SAMPLES=1",
+    needs="a [probe] in Klipper's configuration",
+    contact=r"\bResult is z=(-?[\d.]+)",
+    corrected=r"\bestimate contact at z=(-?[\d.]+)",
+    limited=False,
+    silent="No trigger on probe after full movement",
+    early="Probe triggered prior to movement",
+)
+
 KLIPPER = Firmware(
     name="Klipper",
     signs=("klipper",),
@@ -143,4 +158,5 @@ KLIPPER = Firmware(
         keep_awake="G4 P1",
     ),
     simulated=SIMULATED,
+    probing=PROBING,
 )

@@ -8,6 +8,7 @@ from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
 from machine.firmware.marlin_settings import settings_report
+from machine.firmware.probing import ProbingRules
 from machine.firmware.simulation import Idle, SimulationRules
 
 DIALECT = Dialect(
@@ -63,10 +64,15 @@ SIMULATED = SimulationRules(
     idle=Idle(after_s=120.0, axes=3),
 )
 
+# gcode/probe/G38.cpp, bugfix-2.1.x: G38.3 stops on contact or at its target and says nothing; G38.2 would report an error.
+# G30 goes down to Z_PROBE_LOW_POINT whatever is expected, so it is not used. M114 tells hundredths of a mm.
+PROBING = ProbingRules(command="G38.3 Z{low:.3f} F{feed:.0f}", needs="Marlin built with G38_PROBE_TARGET")
+
 MARLIN = Firmware(
     name="Marlin",
     signs=("marlin",),
     dialects={"marlin": DIALECT},
     line=LineRules(reports_rotary_axes=True, waiting_moves=BLOCK_BUFFER_SIZE + BUFSIZE, keep_awake=MOTORS_STAY_ON),
     simulated=SIMULATED,
+    probing=PROBING,
 )

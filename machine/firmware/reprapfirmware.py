@@ -12,6 +12,7 @@ from typing import Any
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
+from machine.firmware.probing import ProbingRules
 from machine.firmware.simulation import SimulatedSettings, SimulationRules
 
 DIALECT = Dialect(
@@ -90,10 +91,15 @@ SIMULATED = SimulationRules(
     lacks=frozenset({"M503", "M154", "M155", "M113", "M876", "M900"}),
 )
 
+# GCodes/GCodes4.cpp, 3.6, straightProbe0 to 3: G38.3 stops on contact or at its target, at the speed of M558 F, and says nothing;
+# where the probe has triggered before, it does not move. G30 S-1 ("Stopped at height") knows no lowest Z, so it is not used.
+PROBING = ProbingRules(command="G38.3 Z{low:.3f}", needs="a Z probe set up with M558")
+
 REPRAPFIRMWARE = Firmware(
     name="RepRapFirmware",
     signs=("reprapfirmware", "duet"),
     dialects={"reprapfirmware": DIALECT},
     line=LineRules(resends=False, reports_rotary_axes=True, revival="send M999, or press its reset button,"),
     simulated=SIMULATED,
+    probing=PROBING,
 )

@@ -33,15 +33,19 @@ def workpiece_path(machine: Machine, axes: Floats) -> Floats:
     """(n, 3) workpiece points under the tip for (n, 5) rows X Y Z tilt turn, the angles in degrees."""
     tilt_point, turn_point = np.array(machine.tilt.point_mm), np.array(machine.turn.point_mm)
     tip = axes[:, :3] - np.array(machine.tool_mm)
-    tilted_back = _turned(machine.tilt, axes[:, 3], tip - tilt_point) + tilt_point
-    points: Floats = _turned(machine.turn, axes[:, 4], tilted_back - turn_point)
-    return points
+    tilted_back = turned_back(unit(machine.tilt.axis), angles_rad(machine.tilt, axes[:, 3]), tip - tilt_point) + tilt_point
+    return turned_back(unit(machine.turn.axis), angles_rad(machine.turn, axes[:, 4]), tilted_back - turn_point)
 
 
-def _turned(axis: RotaryAxis, values_deg: Floats, points: Floats) -> Floats:
-    """Each point turned back by its own axis value: the inverse of axis_rotation, row by row."""
-    u = unit(axis.axis)
-    angles = np.radians(axis.sign * (values_deg - axis.zero_deg))[:, None]
-    cosine, sine = np.cos(angles), np.sin(angles)
-    turned: Floats = points * cosine + np.cross(u, points) * sine + u * (points @ u)[:, None] * (1.0 - cosine)
+def angles_rad(axis: RotaryAxis, values_deg: Floats) -> Floats:
+    """(...) right-handed angles that undo what the axis does to the table at its values."""
+    angles: Floats = np.radians(axis.sign * (values_deg - axis.zero_deg))
+    return angles
+
+
+def turned_back(unit_axis: Floats, angles: Floats, points: Floats) -> Floats:
+    """(..., 3) points turned about (..., 3) unit axes by (...) angles in radians (Rodrigues), each by its own."""
+    cosine, sine = np.cos(angles)[..., None], np.sin(angles)[..., None]
+    along = (points * unit_axis).sum(axis=-1, keepdims=True)
+    turned: Floats = points * cosine + np.cross(unit_axis, points) * sine + unit_axis * along * (1.0 - cosine)
     return turned

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import exp, inf, log
 
 from machine.firmware import simulation_of
+from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.motion import Motion, WordValues
 from profiles.machine import Machine
 
@@ -108,10 +109,20 @@ class Heater:
 
 
 class Board:
-    """now_s is virtual; say() adds a line to what the host will read. kept_moves: kept on record, None: all."""
+    """now_s is virtual; say() adds a line to what the host will read. kept_moves: kept on record, None: all.
 
-    def __init__(self, machine: Machine, build: BuildOptions, say: Callable[[str], None], kept_moves: int | None = None) -> None:
-        self.machine, self.build, self.say = machine, build, say
+    table: what a probe meets; None: the machine has no probe.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        build: BuildOptions,
+        say: Callable[[str], None],
+        kept_moves: int | None = None,
+        table: ProbedTable | None = None,
+    ) -> None:
+        self.machine, self.build, self.say, self.table = machine, build, say, table
         self.rules = simulation_of(machine)
         self.now_s = 0.0
         self.motion = Motion(machine, self.note, kept_moves, build.home_start)

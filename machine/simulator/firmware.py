@@ -12,6 +12,7 @@ from machine.firmware import dialect_of
 from machine.gcode.words import read_values, read_words, split_command
 from machine.simulator.board import Board, BuildOptions, Work
 from machine.simulator.commands import COMMANDS, TEXTS
+from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.macros import command_of
 from machine.simulator.motion_commands import move
 from machine.simulator.receiver import EmergencyParser, Receiver
@@ -31,14 +32,20 @@ class SimulatedFirmware:
     """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile.
 
     kept_moves: so many stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
+    table: what its probe meets, None: it has none.
     """
 
     def __init__(
-        self, machine: Machine, build: BuildOptions | None = None, busy_s: float = BUSY_S, kept_moves: int | None = None
+        self,
+        machine: Machine,
+        build: BuildOptions | None = None,
+        busy_s: float = BUSY_S,
+        kept_moves: int | None = None,
+        table: ProbedTable | None = None,
     ) -> None:
         self._build = build or BuildOptions()
         self._said: list[str] = []
-        self.board = Board(machine, self._build, self._said.append, kept_moves)
+        self.board = Board(machine, self._build, self._said.append, kept_moves, table)
         self._rules = self.board.rules
         self._macros = dialect_of(machine).macros
         self.board.busy_every_s = self._busy_default_s = busy_s if self._build.busy and self._rules.has_build_options else 0.0

@@ -4,11 +4,11 @@ import re
 from collections.abc import Callable, Iterator
 from math import hypot
 
-from machine.firmware.klipper import OPTIONAL, stepper_name
+from machine.firmware.klipper import OPTIONAL, PROBING, stepper_name
 from machine.gcode.words import read_number
 from machine.simulator.board import Board, Work, wait_for_moves
 from machine.simulator.commands import heat, heat_and_wait
-from machine.simulator.motion_commands import seek_endstops
+from machine.simulator.motion_commands import seek_contact, seek_endstops
 
 Values = dict[str, str]
 
@@ -70,6 +70,33 @@ def _off(board: Board, values: Values) -> Work:
     return heat(board, {"S": 0.0}, "M140")
 
 
+def _probe(board: Board, values: Values) -> Work:
+    """PROBE, as klippy/extras/probe.py and homing.py word it; the probe's own offset in the configuration is 0."""
+    if board.table is None:
+        board.unknown += 1
+        board.say(board.rules.unknown.format("PROBE"))
+        return None
+    return _probe_down(board, _number(values, "PROBE_SPEED", 5.0))
+
+
+def _probe_down(board: Board, speed_mm_s: float) -> Iterator[float]:
+    yield from wait_for_moves(board)
+    motion = board.motion
+    if 2 not in motion.homed:
+        board.say("!! Must home before probe")
+        return
+    began = motion.position[2]
+    met = yield from seek_contact(board, [*motion.position[:2], motion.limits[2][0], *motion.position[3:]], speed_mm_s)
+    x, y, z = motion.coordinates()[:3]
+    if not met:
+        board.say(f"!! {PROBING.silent}")
+    elif motion.position[2] == began:
+        board.say(f"!! {PROBING.early}")
+    else:
+        board.say(f"// probe: at {x:.3f},{y:.3f} bed will contact at z={z:.6f}")
+        board.say(f"// Result: at {x:.3f},{y:.3f} estimate contact at z={z:.6f}")
+
+
 def _number(values: Values, key: str, default: float = 0.0) -> float:
     number = read_number(values.get(key, ""))
     return default if number is None else number
@@ -77,6 +104,7 @@ def _number(values: Values, key: str, default: float = 0.0) -> float:
 
 MACROS: dict[str, Callable[[Board, Values], Work]] = {
     "MANUAL_STEPPER": _turn,
+    "PROBE": _probe,
     "SET_HEATER_TEMPERATURE": _heat,
     "TEMPERATURE_WAIT": _wait,
     "TURN_OFF_HEATERS": _off,

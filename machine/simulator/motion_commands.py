@@ -1,6 +1,6 @@
 """What the commands that move do in a simulated printer: moves, arcs, dwelling, homing, modes, limits, overrides."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from math import inf
 
 from machine.gcode.words import read_letters, split_command
@@ -102,6 +102,37 @@ def _wait_for_person(board: Board, words: WordValues, text: str) -> Iterator[flo
     board.waits_for_person = False
 
 
+def probe(board: Board, words: WordValues, text: str) -> Work:
+    """G38.3: down to a Z or to contact, as Marlin's gcode/probe/G38.cpp and RepRapFirmware's straight probe do."""
+    if board.table is None:
+        board.unknown += 1
+        board.say(board.rules.unknown.format(text))
+        return None
+    return _probe(board, words)
+
+
+def _probe(board: Board, words: WordValues) -> Iterator[float]:
+    yield from wait_for_moves(board)
+    target = board.motion.target({letter: value for letter, value in words.items() if letter in "ZF"})
+    yield from seek_contact(board, target)
+
+
+def seek_contact(board: Board, target: list[float], feed_mm_s: float | None = None) -> Generator[float, None, bool]:
+    """Move down to a target or until the probe triggers; whether it did."""
+    motion, table = board.motion, board.table
+    assert table is not None
+    real = motion.at(board.now_s)
+    shift = motion.position[2] - real[2]
+    stop = table.stop_z(real, target[2] - shift)
+    met = stop == stop
+    if met:
+        target[2] = stop + shift
+    board.note(f"probing down to Z{target[2]:.3f}")
+    motion.reach(target, board.now_s, feed_mm_s)
+    yield from wait_for_moves(board)
+    return met
+
+
 def _follow(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
     board.motion.follow(text.startswith("G43"))
@@ -167,6 +198,7 @@ MOVING: dict[str, Command] = {
     **dict.fromkeys(("G2", "G3"), _arc),
     "G4": _dwell,
     "G28": _home,
+    "G38.3": probe,
     **dict.fromkeys(("G43.4", "G49"), _follow),
     "G92": _rename,
     **dict.fromkeys(("M0", "M1"), _wait_for_person),

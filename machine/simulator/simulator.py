@@ -14,6 +14,7 @@ from typing import Any, Self
 
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.cable import Cable
+from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import BUSY_S, SimulatedFirmware
 from machine.simulator.record import Record
@@ -33,6 +34,7 @@ class SimulatedPrinter:
     baud: every byte takes the time of 10 bits, both ways, and what a ring of machine.receive_bytes cannot hold is lost (build
     of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path
     with means nothing. kept_moves: how many moves the record holds at least, None: all (120 bytes a move).
+    table: what its probe meets, None: it has none.
     Without pseudo-terminals path is a socket:// address, too. Raises PortError for a link or port that is taken, and for a link
     where there are no terminals.
     """
@@ -48,11 +50,14 @@ class SimulatedPrinter:
         tcp: int | None = None,
         baud: int | None = None,
         kept_moves: int | None = None,
+        table: ProbedTable | None = None,
     ) -> None:
         if not speed > 0:
             raise ValueError(f"speed is {speed:g}: it must be above 0")
         # `busy:` must come in real time, or a slow simulation would look dead to the sender.
-        self._firmware = SimulatedFirmware(machine, build or build_options(machine, baud), BUSY_S * min(1.0, speed), kept_moves)
+        self._firmware = SimulatedFirmware(
+            machine, build or build_options(machine, baud), BUSY_S * min(1.0, speed), kept_moves, table
+        )
         self._cable = Cable(self._firmware, faults if isinstance(faults, FaultScript) else FaultScript(tuple(faults)), speed)
         self._line = self._cable if baud is None else Uart(self._cable, baud)
         self._lock = threading.Lock()

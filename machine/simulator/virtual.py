@@ -6,6 +6,7 @@ from machine.link.medium import Medium
 from machine.link.port import READ_S, WRITE_S
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.cable import Cable
+from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.faults import FaultScript
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.record import Record
@@ -24,7 +25,7 @@ class EndlessError(Exception):
 class VirtualPrinter:
     """`print_lines(lines, PATH, medium=printer.medium)`: the host's time is this printer's, and passes only while the host waits.
 
-    faults, baud: as of SimulatedPrinter. Beyond most_s the host is stopped with EndlessError: it hangs.
+    faults, baud, table: as of SimulatedPrinter. Beyond most_s the host is stopped with EndlessError: it hangs.
     """
 
     def __init__(
@@ -34,8 +35,9 @@ class VirtualPrinter:
         faults: FaultScript | None = None,
         baud: int | None = None,
         most_s: float = inf,
+        table: ProbedTable | None = None,
     ) -> None:
-        self.firmware = SimulatedFirmware(machine, build or build_options(machine, baud))
+        self.firmware = SimulatedFirmware(machine, build or build_options(machine, baud), table=table)
         self.now_s = 0.0
         self._most_s = most_s
         self._cable = Cable(self.firmware, faults, speed=1.0)

@@ -13,6 +13,8 @@ from machine.firmware import dialect_of, dialects
 from machine.firmware.line import check_baud
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
+from machine.simulator.contact.probe import ProbedTable
+from machine.simulator.contact.surface import TrueBall
 from machine.simulator.faults import FaultScript, read_script
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
@@ -20,6 +22,7 @@ from profiles.errors import PrinterError
 
 KEPT = 10000  # moves on record; of the others only the sums are reported
 LOOK_S = 0.5
+PROBE_NOISE_MM = 0.005  # one sigma of a contact's height
 LEAST, MOST = {"rx_ring": 16, "queue": 1}, 65536  # bytes and lines that a firmware may be built with
 
 
@@ -31,7 +34,15 @@ def simulate_printer(request: SimulatorRequest) -> int:
     build = read_build_options(request.habits, build_options(machine, baud))
     stop = threading.Event()
     simulated = SimulatedPrinter(
-        machine, request.speed or inf, build=build, faults=script, link=request.link, tcp=request.tcp, baud=baud, kept_moves=KEPT
+        machine,
+        request.speed or inf,
+        build=build,
+        faults=script,
+        link=request.link,
+        tcp=request.tcp,
+        baud=baud,
+        kept_moves=KEPT,
+        table=_table(request),
     )
     with (
         stopping(stop),
@@ -49,6 +60,22 @@ def simulate_printer(request: SimulatorRequest) -> int:
         record = printer.record
     show(summary(record))
     return 0
+
+
+def _table(request: SimulatorRequest) -> ProbedTable | None:
+    """What its probe meets; None where nothing is said of it."""
+    if request.ball is None and request.true is None:
+        return None
+    true = request.profile.machine if request.true is None else request.true.machine
+    if request.ball is None:
+        return ProbedTable(true, noise_mm=PROBE_NOISE_MM)
+    try:
+        x, y, z, diameter = (float(word) for word in request.ball.split(","))
+    except ValueError:
+        raise PrinterError(f"--ball is {request.ball}: four numbers X,Y,Z,D in mm are allowed") from None
+    if not (all(isfinite(value) for value in (x, y, z)) and 0.0 < diameter <= 100.0):
+        raise PrinterError(f"--ball is {request.ball}: a place, and a diameter above 0 up to 100 mm, are allowed")
+    return ProbedTable(true, TrueBall(0.5 * diameter, (x, y, z)), noise_mm=PROBE_NOISE_MM)
 
 
 def _check(request: SimulatorRequest) -> None:

@@ -1,7 +1,7 @@
 """Command session: single commands to a printer over the same protocol as a print, and a safe end of it."""
 
 from machine.link.exchange import Exchange, Reconnection
-from machine.link.medium import SERIAL, Wire
+from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.protocol.events import Event, Ok, Position, Temperature, position_in, unknown_command
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
@@ -25,7 +25,7 @@ class CommandSession:
     unknown: commands that the printer did not know; heat, position: as it has told them last.
     """
 
-    def __init__(self, wire: Wire, limit: int = LINE_LIMIT) -> None:
+    def __init__(self, wire: Wire, limit: int = LINE_LIMIT, medium: Medium = SERIAL) -> None:
         self.unknown: list[str] = []
         self._limit = limit
         self._ordered: type[Exception] | None = None
@@ -33,7 +33,7 @@ class CommandSession:
         self.position: Position | None = None
         self._command = ""
         self.exchange = Exchange(
-            wire, SERIAL, timing=Timing(), on_event=self._heard, on_turn=self._turned, on_lost=self._lost, limit=limit
+            wire, medium, timing=Timing(), on_event=self._heard, on_turn=self._turned, on_lost=self._lost, limit=limit
         )
 
     def greet(self) -> None:
@@ -58,7 +58,7 @@ class CommandSession:
 
     def stop(self) -> FirmwareError:
         """The emergency stop; returns what became of it as an error to raise."""
-        if emergency_stop(self.exchange.wire, SERIAL):
+        if emergency_stop(self.exchange.wire, self.exchange.medium):
             revival = self.exchange.connection.greeting.firmware.line.revival
             return FirmwareError(f"emergency stop: the printer has halted; {revival} before the next print")
         return FirmwareError("emergency stop: the printer did not confirm M112: cut the power")
@@ -77,12 +77,14 @@ class CommandSession:
             for command in ("M104 S0", "M140 S0"):
                 self.command(command)
             return not self.heated()
-        return heaters_off(self.exchange.wire, SERIAL, homing=self.exchange.waits) is not Heaters.UNPROVED
+        return heaters_off(self.exchange.wire, self.exchange.medium, homing=self.exchange.waits) is not Heaters.UNPROVED
 
     def give_up(self) -> bool:
         """The same after an error: order it without the protocol, for the printer may not follow it any more."""
         try:
-            heaters = heaters_off(self.exchange.wire, SERIAL, FAULT_S) if self.exchange.greeted else Heaters.UNPROVED
+            heaters = (
+                heaters_off(self.exchange.wire, self.exchange.medium, FAULT_S) if self.exchange.greeted else Heaters.UNPROVED
+            )
         except PortError:
             return False
         return heaters is not Heaters.UNPROVED or self.exchange.connection.halted

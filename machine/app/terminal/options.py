@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from machine.app.requests import Cuts, Given, ModelRequest
+from machine.app.requests import Cuts, Given, ModelRequest, ProbeRequest
 
 if TYPE_CHECKING:
     from profiles.profile import Profile
@@ -175,3 +175,33 @@ def machine_profile(machine: str | None, settings: list[str] | None = None) -> "
 def page_port(watch: bool, watch_port: int | None) -> int | None:
     """Where the page of a print is served, 0: at any free port; None: nowhere."""
     return (watch_port or 0) if watch or watch_port is not None else None
+
+
+@dataclass(frozen=True)
+class ProbeOptions:
+    """A machine that measures a ball on its plate by itself."""
+
+    probe: Annotated[bool, typer.Option("--probe", help="the machine at --port measures a ball on its plate by itself")] = False
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT|sim", help="of --probe: serial port; sim: the simulated printer")
+    ] = None
+    baud: Baud = 115200
+    ball_mm: Annotated[float, typer.Option("--ball-mm", metavar="MM", min=4, max=60, help="diameter of the ball")] = 20.0
+    probe_offset: Annotated[
+        str,
+        typer.Option("--probe-offset", metavar="X,Y,Z", help="from the nozzle's tip to what touches; 0,0,0: the nozzle senses"),
+    ] = "0,0,0"
+    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="of --probe: picture of what is left over")] = None
+    log: LogFile = None
+
+    def request(self) -> ProbeRequest:
+        """What is asked for with --probe; raises BadParameter."""
+        if self.port is None:
+            raise typer.BadParameter("--probe needs --port PORT, or sim for the simulated printer")
+        try:
+            x, y, z = (float(word) for word in self.probe_offset.split(","))
+        except ValueError:
+            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: three numbers X,Y,Z in mm are expected") from None
+        if not all(-200.0 <= value <= 200.0 for value in (x, y, z)):
+            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: -200 to 200 mm are allowed")
+        return ProbeRequest(self.port, self.baud, self.ball_mm, (x, y, z), self.png, self.log)

@@ -64,6 +64,19 @@ def test_replacing_keeps_what_else_the_own_profile_says_and_the_file_before(tmp_
     assert tomllib.loads(own.read_text())["inherits"] == "generic_ac"
 
 
+def test_directions_of_the_axes_are_found_where_they_are_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    real = really(machine_of("generic_ac"), {"axis": (0.9999, 0.01, 0.01)}, {"axis": (0.02, 0.0, 0.9998)})
+    sheet = tmp_path / "sheet.csv"
+    rows = [f"{t.pose.tilt_deg},{t.pose.turn_deg},{','.join(map(repr, t.at_mm))}" for t in touched(real)]
+    sheet.write_text("tilt_deg,turn_deg,x_mm,y_mm,z_mm\n" + "\n".join(rows) + "\n")
+    command = ["calibrate", "--machine", "generic_ac", "--measured", str(sheet), "--mark-height", "20"]
+    assert main([*command, "--save", "straight"]) == 1
+    assert "the touches are 0." in capsys.readouterr().err
+    assert main([*command, "--save", "leaning", "--directions"]) == 0
+    assert "turn C: along 0.02000 0.00000 0.99980" in capsys.readouterr().out
+    assert load("leaning").machine.turn.axis == pytest.approx((0.02, 0.0, 0.9998), abs=1e-5)
+
+
 def talked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
     """What a person at the machine is asked; where the lines end, Ctrl-C is pressed."""
     person = Person(*lines)

@@ -125,3 +125,13 @@ def test_the_hull_of_beads_reaches_as_far_as_their_points() -> None:
     tried = spread(50)
     level = hull(points, 0.25).reach(GENERIC.machine, Pose(0.0, 0.0), tried)
     assert level == pytest.approx((points @ tried.T).max(axis=0) + 0.25)
+
+
+def test_a_tip_that_rises_from_where_it_was_homed_meets_no_plate_that_was_measured_higher() -> None:
+    profile = load("generic_ac")
+    turn = profile.machine.turn.model_copy(update={"point_mm": (0.0, 0.0, 0.4)})
+    higher = profile.model_copy(update={"machine": profile.machine.model_copy(update={"turn": turn})})
+    lines = ["G21", "G90", "M83", "G28 X Y Z", "G1 Z11 F600", "G1 X10 Y10 F6000"]
+    assert [f for f in dry_run(lines, higher).findings if f.severity == "error"] == []
+    low = [*lines, "G1 Z0.2 F600"]
+    assert [f.code for f in dry_run(low, higher).findings if f.severity == "error"] == ["collision"]

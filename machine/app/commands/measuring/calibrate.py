@@ -40,20 +40,20 @@ def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> i
 
 def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
     """Find signs, zeros and centres from a filled sheet, tell them and save them."""
-    machine, name = _tilting(request), request.machine
+    machine, name = tilting_machine(request), request.machine
     sheet = read_sheet(measured, request.mark_height_mm)
     if sheet.machine not in (None, name):
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
     calibration, off = _calibrated(request, machine, sheet)
     if off:
         raise ProfileError(f"{off}: look at touch {calibration.worst} first")
-    _save(request, machine, calibration, sheet)
+    save_calibration(request, machine, calibration, sheet.mark_angle_deg is not None)
     return 0
 
 
 def ask_for_touches(request: CalibrationRequest) -> int:
     """Ask a person for the touches one by one, tell what follows from them, save it."""
-    machine, name = _tilting(request), request.machine
+    machine, name = tilting_machine(request), request.machine
     refuse_to_overwrite(own_profile("machine", request.save or Path(name).stem, name, {})[0], request.replace)
     accepted: list[Calibration] = []
 
@@ -69,7 +69,7 @@ def ask_for_touches(request: CalibrationRequest) -> int:
         return None
 
     sheet = ask_touches(name, machine, _mark_height_mm(request), request.mark_radius_mm, judge)
-    _save(request, machine, accepted[-1], sheet)
+    save_calibration(request, machine, accepted[-1], sheet.mark_angle_deg is not None)
     return 0
 
 
@@ -77,7 +77,8 @@ def _mark_height_mm(request: CalibrationRequest) -> float:
     return MARK_HEIGHT_MM if request.mark_height_mm is None else request.mark_height_mm
 
 
-def _tilting(request: CalibrationRequest) -> Machine:
+def tilting_machine(request: CalibrationRequest) -> Machine:
+    """The machine of a request; raises ProfileError for one without rotary axes."""
     machine = load_one(request.machine, request.settings).get("machine")
     if not isinstance(machine, Machine):
         raise ProfileError(f"{request.machine} is not a machine profile")
@@ -88,23 +89,23 @@ def _tilting(request: CalibrationRequest) -> Machine:
 
 def _calibrated(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple[Calibration, str]:
     """What follows from the touches, which is shown, and why it is not taken; "" when it is."""
-    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
-    show(_comparison(machine, calibration, sheet.mark_angle_deg is not None))
+    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg, request.directions)
+    show(comparison(machine, calibration, sheet.mark_angle_deg is not None))
     if calibration.rms_mm <= MOST_OFF_MM or request.force:
         return calibration, ""
     off = f"the touches are {calibration.rms_mm:.2f} mm off on average"
     return calibration, f"{off}, at most {MOST_OFF_MM:g} mm is taken without --force"
 
 
-def _save(request: CalibrationRequest, machine: Machine, calibration: Calibration, sheet: Sheet) -> None:
+def save_calibration(request: CalibrationRequest, machine: Machine, calibration: Calibration, zero_of_turn: bool = False) -> None:
     """The found numbers in the user's own profile, and the file before beside it."""
-    tables = fitted_tables(machine, calibration, sheet.mark_angle_deg is not None)
+    tables = fitted_tables(machine, calibration, zero_of_turn)
     file, text = own_profile("machine", request.save or Path(request.machine).stem, request.machine, tables)
     write_own(file, text, request.replace)
     show(f"saved: {file}; use it as --machine {file.stem}\n")
 
 
-def _comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -> str:
+def comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -> str:
     """The found numbers beside the profile's, and how far the touches are off."""
     lines = []
     for axis in ("tilt", "turn"):
@@ -116,7 +117,16 @@ def _comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -
         lines.append(f"{axis} {new.letter}: sign {new.sign}, was {old.sign}")
         if axis == "tilt" or zero_of_turn:
             lines.append(f"{axis} {new.letter}: zero {new.zero_deg:.4f} deg, was {old.zero_deg:g}")
+        if calibration.directions:
+            along = " ".join(f"{value:.5f}" for value in new.axis)
+            was = " ".join(f"{value:g}" for value in old.axis)
+            lines.append(f"{axis} {new.letter}: along {along} (+-{calibration.sigma[f'{axis}.axis']:.4f} deg), was {was}")
     touches, mean_mm = len(calibration.residuals_mm), calibration.rms_mm
     most = f"most at touch {calibration.worst}: {max(calibration.residuals_mm):.4f} mm"
     lines.append(f"touches: {touches}, {mean_mm:.4f} mm off on average, {most}")
+    if calibration.directions and before.coordinates == "workpiece":
+        lines.append(
+            f"note: {before.dialect} follows the table as if its axes were straight: the directions count where "
+            'coordinates = "table"'
+        )
     return "\n".join(lines) + "\n"

@@ -80,6 +80,8 @@ def test_faults_of_a_file_happen(tmp_path: Path) -> None:
     (["--pty", "x", "--tcp", "0"], "one of them is allowed"),
     (["--pty", "/nodir/x"], "the link /nodir/x cannot be made: no such file or directory"),
     (["--faults", "none.toml"], "the fault script none.toml cannot be read: no such file"),
+    (["--ball", "20,0,45"], "--ball is 20,0,45: four numbers X,Y,Z,D in mm are allowed"),
+    (["--ball", "20,0,45,0"], "a diameter above 0"),
     (["--habits", "melt"], "--habits holds 'melt': advanced-ok, emergency-parser,"),
     (["--machine", "linuxcnc_xyzac"], "takes no lines: marlin, reprapfirmware, klipper"),
 ])  # fmt: skip
@@ -88,6 +90,12 @@ def test_what_cannot_be_is_refused_with_a_sentence(options: list[str], words: st
     errors = capsys.readouterr().err
     assert words in errors
     assert errors.count("\n") == 1
+
+
+def test_a_ball_on_its_plate_is_probed() -> None:
+    with running("--machine", "gen5x", "--ball", "20,0,45,20", "--speed", "0") as (path, _):
+        answer = talk(path, b"G28\nG90\nG1 X20 Y0 Z70 F6000\nG38.3 Z50\nM114\n", b"Bed comp")
+    assert b" Z:55.0" in answer or b" Z:54.9" in answer
 
 
 def test_a_file_in_the_way_of_the_link_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

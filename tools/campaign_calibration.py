@@ -1,0 +1,167 @@
+"""Campaign of calibrations: every shipped machine, misaligned at random, measures a ball on its own plate.
+
+    python -m tools.campaign_calibration [--runs N] [--noise MM] [--machines NAME...] [--printers N] [--touches N]
+
+A machine's centres are up to 2 mm, its zero and the directions of its axes up to 1 degree from the profile's, its signs any, and
+the ball stands up to 2 mm from where it is told. Per machine: how many of the runs end with a mean residual of at most
+0.05 mm, the residual and the error of what is predicted over the measured reach that 99 of 100 runs keep, and how near the tip
+comes to table and ball outside of probing. --printers: so many runs of each machine that is streamed go through its simulated
+firmware. --touches: so many runs of the fit alone, from touches with 0.02 mm noise at thirty poses.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from machine.app.printer.prober import PrinterProber, ProbingSession
+from machine.calibration.fit import calibrate
+from machine.calibration.probing.ball import contact_heights
+from machine.calibration.probing.clear import find_in_the_way
+from machine.calibration.probing.measure import AROUND, WIDE, Measuring
+from machine.calibration.program import calibration_pen
+from machine.firmware import dialect_of, firmware_of
+from machine.kinematics.table import machine_points
+from machine.simulator.contact.probe import ProbedTable
+from machine.simulator.virtual import PATH, VirtualPrinter
+from mdp.mesh import Floats
+from mdp.pose import Pose
+from profiles.errors import UserError
+from profiles.machine import Machine
+from profiles.profile import load, shipped
+from tests.machine.calibration.direct import HEIGHT_MM, DirectProber, probed
+from tests.machine.calibration.misaligned import prediction_errors_mm
+from tests.machine.calibration.test_directions import worst_predictions_mm
+
+MOST_MM, FLAT_MM = 0.05, 0.5
+SHARE = 0.99
+
+
+@dataclass(frozen=True)
+class Run:
+    """Of one calibration, mm: mean and worst residual, mean and worst error of prediction, nearest approach; contacts, and poses
+    at which the head keeps less than its clearance."""
+
+    residual_mm: float
+    worst_mm: float
+    predicted_mm: float
+    worst_predicted_mm: float
+    nearest_mm: float
+    contacts: int
+    tight: int
+    signs: bool
+
+
+def directly(machine: Machine, seed: int, noise_mm: float) -> Run:
+    """One run without a firmware in between."""
+    measuring, prober = probed(machine, seed, noise_mm, flat_mm=FLAT_MM)
+    measuring.run()
+    return _judged(machine, measuring, prober.table, prober.least_mm, seed)
+
+
+def by_firmware(machine: Machine, seed: int, noise_mm: float) -> Run:
+    """One run over the protocol of the machine's simulated firmware, in virtual time."""
+    measuring, direct = probed(machine, seed, noise_mm, flat_mm=FLAT_MM)
+    printer = VirtualPrinter(machine, table=direct.table)
+    session = ProbingSession(printer.medium.open(PATH, 0), dialect_of(machine).longest_line, printer.medium)
+    session.greet()
+    rules = firmware_of(machine).probing
+    assert rules is not None
+    profile = load().model_copy(update={"machine": machine})
+    prober = PrinterProber(session, calibration_pen(profile), rules)
+    prober.start()
+    prober.rise(machine.z.limits_mm[1])
+    measuring.prober = prober
+    measuring.run()
+    record = printer.record
+    nearest = _nearest_mm(direct, record.start, record.end)
+    return _judged(machine, measuring, direct.table, nearest, seed)
+
+
+def _nearest_mm(direct: DirectProber, start: Floats, end: Floats) -> float:
+    """How near the tip of executed moves comes to what stands there, those straight down or up left out."""
+    for begin, finish in zip(start[:, :5].tolist(), end[:, :5].tolist(), strict=True):
+        if begin[:2] != finish[:2] or begin[3:] != finish[3:]:
+            direct.at = begin
+            direct._go(finish)
+    return direct.least_mm
+
+
+def _judged(machine: Machine, measuring: Measuring, table: ProbedTable, nearest_mm: float, seed: int) -> Run:
+    real, touches = table.machine, measuring.touches
+    found = calibrate(machine, touches, HEIGHT_MM, directions=True)
+    tilts = [touch.pose.tilt_deg for touch in touches]
+    radius = float(np.hypot(*measuring.ball.centre_mm[:2]))
+    random = np.random.default_rng(seed)
+    errors = prediction_errors_mm(found.machine, real, radius, HEIGHT_MM, (min(tilts), max(tilts)), random)
+    return Run(
+        found.rms_mm,
+        max(found.residuals_mm),
+        float(np.sqrt(np.mean(errors**2))),
+        float(errors.max()),
+        nearest_mm,
+        measuring.contacts,
+        sum(_is_tight(real, touch.pose, measuring, table) for touch in touches),
+        (found.machine.tilt.sign, found.machine.turn.sign) == (real.tilt.sign, real.turn.sign),
+    )
+
+
+def _is_tight(real: Machine, pose: Pose, measuring: Measuring, table: ProbedTable) -> bool:
+    """Whether the real machine's head keeps less than its clearance from table, cradle or ball while the ball is touched."""
+    assert table.ball is not None
+    ball = table.ball
+    centre = machine_points(real, pose, np.array([ball.centre_mm]))[0]
+    places = centre[:2] + WIDE * ball.radius_mm * AROUND
+    tips = np.column_stack([places, contact_heights(centre, ball.radius_mm, table.flat_mm, places)])
+    stands = type(measuring.ball)(ball.radius_mm, ball.centre_mm)
+    return find_in_the_way(real, pose, stands, tips, True) is not None
+
+
+def campaign(name: str, runs: int, noise_mm: float, way: Callable[[Machine, int, float], Run]) -> str:
+    """One line of the table."""
+    machine, done, failed, began_s = load(name).machine, list[Run](), list[str](), time.process_time()
+    for seed in range(runs):
+        try:
+            done.append(way(machine, seed, noise_mm))
+        except UserError as error:
+            failed.append(f"seed {seed}: {error}")
+    good = sum(run.residual_mm <= MOST_MM and run.signs for run in done)
+    columns = [[getattr(run, key) for run in done] for key in ("residual_mm", "worst_mm", "predicted_mm", "worst_predicted_mm")]
+    figures = " | ".join(f"{np.quantile(column, SHARE):.3f}" for column in columns) if done else "- | - | - | -"
+    nearest = min((run.nearest_mm for run in done), default=np.nan)
+    contacts = int(np.mean([run.contacts for run in done])) if done else 0
+    tight, seconds = sum(run.tight for run in done), (time.process_time() - began_s) / runs
+    row = f"| {name} | {good}/{runs} | {figures} | {nearest:.2f} | {tight} | {contacts} | {seconds:.2f} |"
+    return "\n".join([row, *(f"  {sentence}" for sentence in failed[:3])])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=100)
+    parser.add_argument("--noise", type=float, default=0.01, help="mm, one sigma of a contact's height")
+    parser.add_argument("--machines", nargs="*", default=[name for name in shipped("machine") if load(name).machine.tilts])
+    parser.add_argument("--printers", type=int, default=0)
+    parser.add_argument("--touches", type=int, default=0)
+    given = parser.parse_args()
+    if given.touches:
+        worst = worst_predictions_mm(range(given.touches))
+        good = sum(value < MOST_MM for value in worst)
+        print(
+            f"touches alone: {good} of {given.touches} runs predict the reach to {MOST_MM:g} mm, the worst to {max(worst):.3f} mm"
+        )
+    print(f"{given.noise:g} mm noise; 99 of 100 runs keep:")
+    print(
+        "| machine | residual <= 0.05 mm | mean residual | worst | mean prediction | worst | nearest mm | tight | contacts | s |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for name in given.machines:
+        if given.runs:
+            print(campaign(name, given.runs, given.noise, directly), flush=True)
+        if given.printers and firmware_of(load(name).machine).probing is not None:
+            print(campaign(f"{name}", given.printers, given.noise, by_firmware) + " by firmware", flush=True)
+
+
+if __name__ == "__main__":
+    main()
