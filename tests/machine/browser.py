@@ -159,6 +159,12 @@ class Browser:
             path.write_bytes(picture)
         return picture
 
+    def accessible(self) -> list[dict[str, str]]:
+        """Role and name of all that the page shows, as the browser tells those to whom it is read out."""
+        nodes = self._send("Accessibility.getFullAXTree")["nodes"]
+        shown = [node for node in nodes if not node["ignored"]]
+        return [{"role": node["role"]["value"], "name": node.get("name", {}).get("value", "")} for node in shown]
+
     def pdf(self) -> bytes:
         """The page as it would be printed."""
         return base64.b64decode(self._send("Page.printToPDF", printBackground=True)["data"])
