@@ -1,10 +1,12 @@
 """Makes pictures of the workbench: `python tools/make_workbench_screenshots.py [FOLDER]`; needs Chromium.
 
-Without a folder the two of the docs, `workbench.png` and `workbench-phone.png`; with one, every step of the way from model to
-print, on a desktop and on a phone, light and dark, to be looked at.
+Without a folder those of the docs, `workbench.png`, `workbench-phone.png` and the small ones of one session, `strip/`; with one,
+every step of the way from model to print, on a desktop and on a phone, light and dark, to be looked at.
 """
 
+import os
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +18,8 @@ from tests.machine.workbench import workbench
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 DEMO = "demo:tree"
 DESKTOP, PHONE = (1280, 800), (390, 844)
+STRIP = ("model", "parts", "plane", "settings", "sliced", "look", "checks", "printing")
+STRIP_SIZE, STRIP_SCALE = (1040, 650), 0.5
 SETTLED_S = 0.8
 IDLE = "document.documentElement.dataset.busy === ''"
 FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
@@ -36,7 +40,7 @@ STEPS = (
     Step("finding", ("#tab-parts", "#find"), "document.documentElement.hasAttribute('data-searching')"),
     Step("parts", (), FOUND),
     Step("plane", ("#parts-list tbody tr:last-child input",), "!document.getElementById('plane').hidden"),
-    Step("settings", ("#tab-settings",), "document.querySelectorAll('[data-key]').length > 100"),
+    Step("settings", ("#tab-settings",), "document.querySelectorAll('[data-key]').length > 10"),
     Step("slicing", ("#tab-slices", "#slice"), "document.getElementById('slice').disabled"),
     Step("sliced", (), SLICED),
     Step("look", ("#look",), "!document.getElementById('print-page').hidden"),
@@ -72,6 +76,20 @@ def picture(path: Path, size: tuple[int, int], last: str) -> None:
         walk(browser, running.address, STEPS[: names.index(last) + 1], keep)
 
 
+def strip(folder: Path) -> None:
+    """One session in small pictures."""
+    folder.mkdir(exist_ok=True)
+    with workbench(DEMO) as running, Browser(STRIP_SIZE) as browser:
+        browser.prefer("light")
+
+        def keep(name: str) -> None:
+            browser.value("$('run-files').hidden = true")  # a log has another path each time
+            if name in STRIP:
+                browser.screenshot(folder / f"{STRIP.index(name) + 1}-{name}.png", STRIP_SCALE)
+
+        walk(browser, running.address, STEPS, keep)
+
+
 def every(folder: Path) -> None:
     """All steps on both, light and dark."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -89,8 +107,11 @@ def every(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        every(Path(sys.argv[1]))
-    else:
-        picture(DOCS / "workbench.png", DESKTOP, "plane")
-        picture(DOCS / "workbench-phone.png", PHONE, "parts")
+    with tempfile.TemporaryDirectory() as state:
+        os.environ["XDG_STATE_HOME"] = state  # no earlier work in the pictures
+        if len(sys.argv) > 1:
+            every(Path(sys.argv[1]))
+        else:
+            picture(DOCS / "workbench.png", DESKTOP, "plane")
+            picture(DOCS / "workbench-phone.png", PHONE, "parts")
+            strip(DOCS / "strip")

@@ -152,12 +152,21 @@ class Browser:
         """What the system asks for: dark or light."""
         self._send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
-    def screenshot(self, path: Path | None = None) -> bytes:
-        """The window as PNG."""
-        picture = base64.b64decode(self._send("Page.captureScreenshot", format="png")["data"])
+    def screenshot(self, path: Path | None = None, scale: float = 1.0) -> bytes:
+        """The window as PNG; scale: the share of its size that the picture has."""
+        width, height = self.value("[innerWidth, innerHeight]")
+        clip = {"x": 0, "y": 0, "width": width, "height": height, "scale": scale}
+        given = {} if scale == 1.0 else {"clip": clip}
+        picture = base64.b64decode(self._send("Page.captureScreenshot", format="png", **given)["data"])
         if path:
             path.write_bytes(picture)
         return picture
+
+    def accessible(self) -> list[dict[str, str]]:
+        """Role and name of all that the page shows, as the browser tells those to whom it is read out."""
+        nodes = self._send("Accessibility.getFullAXTree")["nodes"]
+        shown = [node for node in nodes if not node["ignored"]]
+        return [{"role": node["role"]["value"], "name": node.get("name", {}).get("value", "")} for node in shown]
 
     def pdf(self) -> bytes:
         """The page as it would be printed."""

@@ -298,6 +298,38 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
     assert browser.complaints == []
 
 
+def test_a_printer_is_heated_homed_and_moved_by_hand_from_the_page_and_let_go_of(sliced: Running, browser: Browser) -> None:
+    with SimulatedPrinter(load().machine) as printer:
+        browser.open(sliced.address)
+        browser.click("#tab-printing")
+        browser.wait("document.documentElement.dataset.line === 'open'")
+        type_port(browser, printer.path)
+        browser.click("#hand")
+        browser.wait(
+            f"{PRINTING} === 'hand' && $('hand-live').checkVisibility() && $('run-told').textContent.includes('nozzle20.0 °C')"
+        )
+        assert browser.value("[...$('hand-jog').children].every((button) => button.disabled) && $('emergency').checkVisibility()")
+        browser.click("[data-hand=heat]")
+        browser.wait("/nozzle[0-9.]+ of 215 °C/.test($('run-told').textContent)")
+        browser.click("#hand-home")
+        browser.click("#hand-not")
+        assert (browser.value("$('hand-sure').checkVisibility()"), homed(printer)) == (False, [])
+        browser.click("#hand-home")
+        browser.click("[data-hand=home]")
+        browser.wait("[...$('hand-jog').children].every((button) => !button.disabled)")
+        assert homed(printer) == ["homed XYZ"]
+        browser.click("[data-jog='X+']")
+        browser.wait("$('run-told').textContent.includes('X -159.0')")
+        browser.value("{ $('hand-step').value = '10'; }")
+        browser.click("[data-jog='X-']")
+        browser.wait("$('run-state').textContent === 'in hand · X would be -169.00 mm: -160 to 160 are allowed'")
+        browser.click("[data-hand=let_go]")
+        browser.wait(f"{PRINTING} === 'over' && $('run-state').textContent === 'let go of; the heaters are off'")
+        assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
+        browser.click("#forget")
+    assert browser.complaints == []
+
+
 def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced: Running) -> None:
     """The last one: it ends the workbench of the others."""
     with SimulatedPrinter(load().machine, speed=20.0) as printer, prints_line(sliced, "first") as page:

@@ -51,6 +51,11 @@ RULES = (
     (r" \((?:criterion [IV]+|\[\[keep\]\])\)", ""),
     (r"--as-is keeps it", "Undo keeps it"),
     (r"`profiles show` lists them", "Settings lists them"),
+    (r"\boffset_mm is (-?[\d.]+)", r"the offset is \1 mm"),
+    (r"\boffset_mm must be at least (-?[\d.]+), it is (-?[\d.]+)", r"the offset must be at least \1 mm, it is \2 mm"),
+    (r"(?<=\d) deg C\b", " °C"),
+    (r"compiling the kernels \(only the first run that needs them does\)", "getting ready (only the first run needs to)"),
+    (r"compiling the kernels: (\d+) done", r"getting ready: \1 steps are done"),
     (r"\bmm2\b", "mm²"),
     (r"\bmm3\b", "mm³"),
 )

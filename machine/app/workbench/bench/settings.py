@@ -32,11 +32,13 @@ def with_setting(given: Given, key: str, value: str | None) -> Given:
 
 
 def with_typed(given: Given, key: str, value: str | None, before: Profile) -> Given:
-    """The same for what a person types: nothing, where the profile has nothing, is no change. Raises ProfileError."""
+    """The same for what a person types: what the profile has without it is no change. Raises ProfileError."""
     changed, unchanged = (with_setting(given, key, new) for new in (value, None))
-    if value == "" and profile_as_given(changed, before) == profile_as_given(unchanged, before):
-        return unchanged
-    return changed
+    typed = profile_as_given(changed, before)
+    try:
+        return unchanged if typed == profile_as_given(unchanged, before) else changed
+    except ProfileError:  # what is typed mends the profile
+        return changed
 
 
 def _in_one_line(value: str) -> str:

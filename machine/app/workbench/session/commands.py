@@ -129,7 +129,7 @@ COMMANDS: dict[str, Command] = {
     "add_stop": _change("add a pause", add_stop),
     "remove_stop": _change("take a pause away", remove_stop),
     "copies": _change("print another number of copies", set_copies),
-    "slice": Command(Need.MODEL, lambda session, asked: session.slicing.begin()),
+    "slice": Command(Need.MODEL, lambda session, asked: session.slice()),
     "compare": Command(Need.SLICES, lambda session, asked: session.comparing.begin()),
 }
 

@@ -204,6 +204,17 @@ class Session(SessionBase):
         check_block(profile_as_given(change(self.bench.given), self.bench.profile), key)  # refused at once
         return self._settle(word, change)
 
+    def slice(self) -> Coroutine[Any, Any, None] | None:
+        """Slice what lies on the bench, with the settings that were asked for before, which may still be settled."""
+        if self._settling.locked():
+            return self._slice_settled()
+        self.slicing.begin()
+        return None
+
+    async def _slice_settled(self) -> None:
+        async with self._settling:
+            self.slicing.begin()
+
     async def _settle(self, word: str, change: Callable[[Given], Given]) -> None:
         async with self._settling:
             before = None

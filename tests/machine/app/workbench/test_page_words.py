@@ -44,6 +44,15 @@ PAIRS = [
         "wait until that is done; tick Only hand the file over meanwhile",
     ),
     ("rubbish at 9600 baud, and nothing at the usual other rates: --baud N tries another", None),
+    (
+        "the model lies between 0.00 and 116.36 mm, offset_mm is -50",
+        "the model lies between 0.00 and 116.36 mm, the offset is -50 mm",
+    ),
+    (
+        "along its normal offset_mm must be at least 0.60, it is 0.2",
+        "along its normal the offset must be at least 0.60 mm, it is 0.2 mm",
+    ),
+    ("the printer has halted; nozzle 240 deg C, bed 80 deg C", "the printer has halted; nozzle 240 °C, bed 80 °C"),
     ("and name that profile with --machine", "and name that profile under Homed as in"),
 ]
 

@@ -206,6 +206,25 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
     assert session.slicing.done.bench is session.bench
 
 
+def test_slices_wait_for_the_settings_that_were_asked_for_before() -> None:
+    async def work(session: Session) -> None:
+        async def read(task: str, *given: Any, **more: Any) -> Any:
+            for _ in range(5):
+                await asyncio.sleep(0)
+            return model("a") if task == "read_model" else ()
+
+        session.quick.run = read  # type: ignore[method-assign]
+        obey(session, {"do": "set", "key": "process.scale", "value": "2"})
+        await asyncio.sleep(0)
+        obey(session, {"do": "slice"})
+        assert session.slicing.under_way is None
+
+    session = when_done(work)
+    assert session.slicing.done is not None
+    assert session.slicing.done.bench.profile.process.scale == 2.0
+    assert session.problem == ""
+
+
 def test_what_a_page_is_refused_no_other_page_is_told_and_its_next_step_takes_it_back() -> None:
     told = []
 

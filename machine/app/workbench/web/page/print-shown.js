@@ -99,7 +99,7 @@ function ago(moment_s) {
 export function showProgress(print) {
   const { progress, phase } = print, over = phase === "over", old = over || progress.heat_is_old || silence(print);
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
-  const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target == null ? "" : ` of ${target.toFixed(0)}`} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
+  const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target ? ` of ${target.toFixed(0)}` : ""} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
   $("run-progress").value = progress.share || 0;
   $("run-progress").hidden = phase === "hand";
   tellIn("run-told", [

@@ -114,8 +114,11 @@ const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); /
 const textsOf = ({ key, label, title, synonyms, meaning, about }) => [`${label} ${key}`, synonyms, `${title} ${meaning} ${about}`].map((text) => text.toLowerCase());
 const hasWords = (setting, words) => words.every((word) => textsOf(setting).join(" ").includes(word));
 
-/** How late the words that are sought come: 0, where the label itself or the key has one. */
-const farFrom = (setting, words) => (words.length ? textsOf(setting).findIndex((text) => words.some((word) => text.includes(word))) : 0);
+/** How late the words that are sought come: 0, where the label is these alone, 1, where it or the key has one. */
+function farFrom(setting, words) {
+  if (!words.length || setting.label.toLowerCase().split(/\s+/).map(stem).join(" ") === words.join(" ")) return 0;
+  return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));
+}
 
 function groupedBy(rows, nameOf) {
   const groups = new Map();
@@ -138,7 +141,7 @@ function tellTakeBack(changed, part) {
 function groupTitle(own, folded, turn) {
   const [{ group, title, about }] = own, told = JSON.stringify([title, own.length, folded]);
   const button = () => made("button", { type: "button", title: `${about}.`, ariaExpanded: String(!folded), onclick: turn }, made("span", { text: title }), made("small", { text: own.length }));
-  return { id: `group ${group}`, told, make: () => made("h3", {}, button()) };
+  return { id: `group ${group}`, told, make: () => made("h2", {}, button()) };
 }
 
 /** A text into the clipboard, or marked for the person to take where the browser allows no more. */

@@ -3,7 +3,7 @@
 import { $, made } from "../../../../view/template/page.js";
 import { send } from "./line.js";
 import { mm2 } from "./elements.js";
-import { store, subscribe } from "./store.js";
+import { store, subscribe, update } from "./store.js";
 
 const SIZE = { width: 112, height: 84 };
 
@@ -34,7 +34,7 @@ function showResting(resting, picture) {
   $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
     const into = picture ? small() : "";
     if (into) drawn.push([rotation, into]);
-    return made("button", { type: "button", onclick: () => send({ do: "stand", rotation }) }, into, made("span", { text: words }), made("small", { text: mm2(area) }));
+    return made("button", { type: "button", onclick: () => { update({ clicks: "" }); send({ do: "stand", rotation }); } }, into, made("span", { text: words }), made("small", { text: mm2(area) }));
   }));
   if (picture) drawLater(picture, drawn);
 }
