@@ -8,9 +8,22 @@ from collections.abc import Iterable
 from os.path import exists, isdir, isfile, islink  # pathlib's raise for a name that is too long
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 from machine.app.requests import STDOUT, Outputs
 from profiles.errors import OutputError, reason
+
+LONGEST_NAME = 150  # bytes
+
+
+def plain_name(name: str) -> str:
+    """A name that a file has on any system: letters and digits of any script stay.
+
+    >>> plain_name("Kätzchen 猫/2")
+    'Kätzchen_猫_2'
+    """
+    plain = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in normalize("NFC", name))
+    return plain.encode()[:LONGEST_NAME].decode(errors="ignore")  # a disk counts bytes
 
 
 def check_writable(path: Path) -> None:

@@ -1,13 +1,12 @@
 """The profiles detect command: a machine profile by what a firmware tells of itself, with what it does not tell."""
 
 import json
-import re
 import sys
 from collections.abc import Iterator, Sequence
 from glob import glob, has_magic
 from pathlib import Path
 
-from machine.app.output import check_writable, refuse_to_overwrite, write_own
+from machine.app.output import check_writable, plain_name, refuse_to_overwrite, write_own
 from machine.app.printer.settings_queries import text_of_port
 from machine.app.profile_file import profile_text
 from machine.app.requests import DetectRequest
@@ -53,7 +52,7 @@ def detect(request: DetectRequest) -> int:
 def _stem(found: Found, request: DetectRequest) -> str:
     """A file's name of the machine's, else of the file's that was read."""
     named = found.name or (request.file.stem if request.file is not None else "") or found.dialect
-    return re.sub(r"[^\w.+-]+", "_", named).strip("._") or found.dialect
+    return plain_name(named).strip("._") or found.dialect
 
 
 def _config(request: DetectRequest) -> ConfigText:

@@ -1,12 +1,11 @@
 """The profiles import command: another slicer's configuration as a material and a process of one's own."""
 
 import json
-import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from machine.app.output import check_folder, refuse_to_overwrite, write_own
+from machine.app.output import check_folder, plain_name, refuse_to_overwrite, write_own
 from machine.app.profile_file import profile_text
 from machine.app.requests import ImportRequest
 from machine.app.terminal.plain import plain_lines
@@ -45,7 +44,7 @@ def import_profiles(request: ImportRequest) -> int:
 
 def _file(request: ImportRequest, profile: Imported) -> Path:
     """Where a profile goes: a name that a file may have, in the folder that is asked for, else in the user's own."""
-    stem = re.sub(r"[^\w.+-]+", "_", profile.name).strip("._") or profile.kind
+    stem = plain_name(profile.name).strip("._") or profile.kind
     if request.out is None:
         return own_folder(profile.kind) / f"{stem}.toml"
     return request.out / f"{stem}-{profile.kind}.toml"

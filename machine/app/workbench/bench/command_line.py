@@ -2,32 +2,20 @@
 
 from pathlib import Path
 from shlex import join
-from unicodedata import normalize
 
 import numpy as np
 
+from machine.app.output import plain_name
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.part_settings import option
 from mdp.directions.turns import turned_further
 from profiles.profile import DEFAULTS
-
-LONGEST_NAME = 150  # bytes
 
 
 def file_stem(bench: Bench) -> str:
     """The model's name for that of a file."""
     name = "" if bench.model is None else Path(bench.model.name.removeprefix("demo:")).stem
     return plain_name(name) or "model"
-
-
-def plain_name(name: str) -> str:
-    """A name that a file has on any system: letters and digits of any script stay.
-
-    >>> plain_name("Kätzchen 猫/2")
-    'Kätzchen_猫_2'
-    """
-    plain = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in normalize("NFC", name))
-    return plain.encode()[:LONGEST_NAME].decode(errors="ignore")  # a disk counts bytes
 
 
 def export_command(bench: Bench) -> str:

@@ -7,8 +7,9 @@ from starlette.background import BackgroundTask
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
+from machine.app.output import plain_name
 from machine.app.profile_file import profile_text
-from machine.app.workbench.bench.command_line import file_stem, plain_name
+from machine.app.workbench.bench.command_line import file_stem
 from machine.app.workbench.bench.settings import settings_of
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.slicing import Slices

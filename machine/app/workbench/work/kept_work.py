@@ -16,9 +16,9 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any
 
+from machine.app.output import plain_name
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
-from machine.app.workbench.bench.command_line import plain_name
 from machine.app.workbench.work.received import lock_folder
 from mdp.plans.writing import plan_text
 from profiles.errors import PlanError, reason
