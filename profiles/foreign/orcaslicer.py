@@ -41,7 +41,6 @@ KEYS = {
     "infill_direction": "fill_angle",
     "minimum_sparse_infill_area": "solid_infill_below_area",
     "spiral_mode": "spiral_vase",
-    "elefant_foot_compensation": "elefant_foot_compensation",
     "brim_object_gap": "brim_separation",
     "skirt_loops": "skirts",
     "bridge_flow": "bridge_flow_ratio",
@@ -86,7 +85,6 @@ KEYS = {
     "retraction_length": "retract_length",
     "retraction_speed": "retract_speed",
     "retraction_minimum_travel": "retract_before_travel",
-    "retract_restart_extra": "retract_restart_extra",
     "z_hop": "retract_lift",
     "filament_retraction_length": "filament_retract_length",
     "filament_retraction_speed": "filament_retract_speed",
@@ -94,7 +92,7 @@ KEYS = {
     "filament_z_hop": "filament_retract_lift",
 }
 WORDS = {  # values that are called otherwise
-    "fill_pattern": {"zig-zag": "rectilinear", "tri-hexagon": "stars", "adaptivecubic": "adaptivecubic"},
+    "fill_pattern": {"zig-zag": "rectilinear", "tri-hexagon": "stars"},
     "seam_position": {"back": "rear", "aligned_back": "rear"},
     "support_material_pattern": {"default": "rectilinear"},
 }
