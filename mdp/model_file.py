@@ -32,6 +32,12 @@ def locate(model: str) -> Path:
     return Path(str(demos[name]))
 
 
+def plan_beside(model: str) -> Path | None:
+    """The plan by which a demo is cut where it comes with one, None else, and for any other model. Raises MeshError."""
+    plan = locate(model).with_suffix(".toml") if model.startswith(DEMO) else None
+    return plan if plan is not None and plan.exists() else None
+
+
 def check_file(path: Path) -> None:
     """Refuse what is no model file at all before any work is done. Raises MeshError."""
     if os.path.isdir(path):  # unlike pathlib's, false for a name that is too long to exist

@@ -1,23 +1,27 @@
 """Campaign of calibrations: every shipped machine, misaligned at random, measures a ball on its own plate.
 
-    python -m tools.campaign_calibration [--runs N] [--noise MM] [--machines NAME...] [--printers N] [--touches N]
+    python -m tools.campaign_calibration [--runs N] [--noise MM] [--machines NAME...] [--printers N] [--touches N] [--pieces N]
 
 A machine's centres are up to 2 mm, its zero and the directions of its axes up to 1 degree from the profile's, its signs any, and
 the ball stands up to 2 mm from where it is told. Per machine: how many of the runs end with a mean residual of at most
 0.05 mm, the residual and the error of what is predicted over the measured reach that 99 of 100 runs keep, and how near the tip
 comes to table and ball outside of probing. --printers: so many runs of each machine that is streamed go through its simulated
 firmware. --touches: so many runs of the fit alone, from touches with 0.02 mm noise at thirty poses.
+--pieces: so many machines whose centres are up to 0.4 mm and whose zero is up to 0.4 degrees off print `demo:calibration` up to
+three times: how far its pads lie aside before, and after each piece.
 """
 
 import argparse
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from machine.app.printer.prober import PrinterProber, ProbingSession
 from machine.calibration.fit import calibrate
+from machine.calibration.piece.fit import correct
+from machine.calibration.piece.pads import Piece
 from machine.calibration.probing.ball import contact_heights
 from machine.calibration.probing.clear import find_in_the_way
 from machine.calibration.probing.measure import AROUND, WIDE, Measuring
@@ -33,10 +37,13 @@ from profiles.machine import Machine
 from profiles.profile import load, shipped
 from tests.machine.calibration.direct import HEIGHT_MM, DirectProber, probed
 from tests.machine.calibration.misaligned import prediction_errors_mm
+from tests.machine.calibration.piece.pieces import off, read_off, seam_mm, standing
 from tests.machine.calibration.test_directions import worst_predictions_mm
 
 MOST_MM, FLAT_MM = 0.05, 0.5
 SHARE = 0.99
+PIECES, STEEP_DEG = 3, 60.0
+LEANS_DEG = dict.fromkeys(("gen5x", "open5x_jubilee", "open5x_prusa_i3", "open5x_voron0"), 30.0)  # they print calibration30
 
 
 @dataclass(frozen=True)
@@ -137,6 +144,21 @@ def campaign(name: str, runs: int, noise_mm: float, way: Callable[[Machine, int,
     return "\n".join([row, *(f"  {sentence}" for sentence in failed[:3])])
 
 
+def printed_pieces(name: str, runs: int) -> str:
+    """How far pads lie aside before and after readings of one, two and three pieces."""
+    machine, random, rows = load(name).machine, np.random.default_rng(0), []
+    for _ in range(runs):
+        true, found, pieces, readings, row = off(machine, random), machine, list[Piece](), list[Floats](), list[float]()
+        for _ in range(PIECES):
+            pieces.append(replace(standing(machine, LEANS_DEG.get(name, STEEP_DEG)), machine=found))
+            row.append(seam_mm(pieces[0], found, true))
+            readings.append(read_off(pieces[-1].laid_aside_mm(true), random))
+            found = correct(machine, pieces, np.array(readings)).machine
+        rows.append([*row, seam_mm(pieces[0], found, true)])
+    columns = [" ".join(f"{np.quantile(column, share):.2f}" for share in (0.5, 0.95, 1.0)) for column in np.array(rows).T]
+    return f"| {name} | {' | '.join(columns)} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=100)
@@ -144,7 +166,14 @@ def main() -> None:
     parser.add_argument("--machines", nargs="*", default=[name for name in shipped("machine") if load(name).machine.tilts])
     parser.add_argument("--printers", type=int, default=0)
     parser.add_argument("--touches", type=int, default=0)
+    parser.add_argument("--pieces", type=int, default=0)
     given = parser.parse_args()
+    if given.pieces:
+        print("| machine | pads aside, mm: median, 95 %, worst | after one piece | two | three |\n|---|---|---|---|---|")
+        for name in given.machines:
+            print(printed_pieces(name, given.pieces), flush=True)
+    if not given.runs and not given.printers and not given.touches:
+        return
     if given.touches:
         worst = worst_predictions_mm(range(given.touches))
         good = sum(value < MOST_MM for value in worst)

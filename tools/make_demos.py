@@ -7,6 +7,7 @@ The organic ones are level sets of smoothly united round cones, the others exact
 import math
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,6 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.kernel import kernel
+from mdp.plane import Plane
+from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
+from mdp.plans.writing import plan_text
+from mdp.read import read_mesh
 
 FOLDER = Path(__file__).resolve().parents[1] / "mdp" / "demos"
 Point = tuple[float, float, float]
@@ -159,6 +164,97 @@ def lattice() -> m3.Manifold:
     return solid.simplify(0.005)
 
 
+# The calibration piece, mm: on each of its faces u runs to the right and v up the slope, from the middle of the face's scales.
+SCALE_MM, FINER_MM = 2.0, 0.1  # pitch of the grooves across the slope, and by how much finer the notches over them are
+GRID_MM = 0.6  # whole layers of 0.1, 0.15, 0.2 and 0.3 mm: where grooves along the layers begin and end
+ASIDE, UP = 4, 3  # marks to either side of the middle one
+NOTCH_MM, DEEP_MM, LONG_MM, SHORT_MM, GAP_MM = 0.8, 1.0, 3.2, 2.2, 0.3
+PADS, ARM_MM, EDGE_MM, OVER_MM = 4, 24.0, 1.2, 0.02
+PAD_MM, PAD_HEIGHT_MM = ((-10.2, -8.6), (9.2, 8.6)), 1.2  # its least and greatest u and v
+DOT_MM = 1.5
+
+
+def calibration(lean_deg: float, clear_mm: float) -> m3.Manifold:
+    """Four roofs about a square, each with a pad to be printed when the table has turned and tilted by lean_deg: where the pad's
+    notches lie over the grooves of the roof tells, as on a vernier, by how many tenths of a mm it lies aside and too high up.
+
+    clear_mm: height over the plate below which no pad may reach.
+    """
+    lean, half = math.radians(lean_deg), 0.5 * ARM_MM
+    below_mm, above_mm = LONG_MM + GAP_MM - PAD_MM[0][1] + EDGE_MM, _above_mm()
+    middle_mm = _middle_mm(lean, clear_mm)
+    low, high = middle_mm - below_mm * math.sin(lean), middle_mm + above_mm * math.sin(lean)
+    run = (below_mm + above_mm) * math.cos(lean)
+    outline = [(-half - run, 0), (half + run, 0), (half + run, low), (half, high), (-half, high), (-half - run, low)]
+    roof = m3.Manifold.extrude(m3.CrossSection([outline]), ARM_MM).translate((0, 0, -half)).rotate((90, 0, 0))
+    solid = roof + roof.rotate((0, 0, 90))
+    place = (half + above_mm * math.cos(lean), 0.0, middle_mm)
+    frame = np.column_stack([(0, 1, 0), (-math.cos(lean), 0, math.sin(lean)), (math.sin(lean), 0, math.cos(lean)), place])
+    for k in range(PADS):
+        grooves, pad = (piece.transform(frame).rotate((0, 0, 90.0 * k)) for piece in (_grooves(lean), _pad(lean, k + 1)))
+        solid = solid - grooves + pad
+    return solid
+
+
+def roofs(lean_deg: float, clear_mm: float) -> list[Plane]:
+    """The base planes of the pads: just over the roofs, which stay whole."""
+    lean = math.radians(lean_deg)
+    out, up = math.sin(lean), math.cos(lean)
+    offset = (0.5 * ARM_MM + _above_mm() * math.cos(lean)) * out + _middle_mm(lean, clear_mm) * up + OVER_MM
+    quarters = ((1, 0), (0, 1), (-1, 0), (0, -1))
+    return [Plane(np.array([out * x, out * y, up]), offset) for x, y in quarters]
+
+
+def _above_mm() -> float:
+    """From the middle of a face up to its edge."""
+    return PAD_MM[1][1] + EDGE_MM
+
+
+def _middle_mm(lean: float, clear_mm: float) -> float:
+    """Height of the middle of a face over the plate: the grooves about it begin and end between layers."""
+    return GRID_MM * (math.ceil((clear_mm - PAD_MM[0][1] * math.sin(lean)) / GRID_MM) + 0.5)
+
+
+def _grooves(lean: float) -> m3.Manifold:
+    """The scales of a face, below its pad and to the right of it; those along the layers have a ceiling that carries itself."""
+    (_, low), (right, _) = PAD_MM
+    inside, half = GRID_MM + 0.5 * GRID_MM / math.tan(lean), 0.5 * GRID_MM
+    slot = m3.CrossSection([[(-inside, -half), (DEEP_MM, -half), (DEEP_MM, half), (GRID_MM - inside, half)]])
+    upright = np.array([(0, -math.cos(lean), math.sin(lean)), (0, math.sin(lean), math.cos(lean)), (-1, 0, 0)])
+    cutters = []
+    for k in range(-ASIDE, ASIDE + 1):
+        groove = m3.Manifold.cube((NOTCH_MM, _long(k), 2 * DEEP_MM), True)
+        cutters.append(groove.translate((k * SCALE_MM, low - GAP_MM - 0.5 * _long(k), 0)))
+    for k in range(-UP, UP + 1):
+        place = (right + GAP_MM + _long(k), k * _up_mm(lean), 0)
+        cutters.append(m3.Manifold.extrude(slot, _long(k)).transform(np.column_stack([*upright, place])))
+    return m3.Manifold.batch_boolean(cutters, m3.OpType.Add)
+
+
+def _pad(lean: float, dots: int) -> m3.Manifold:
+    """A pad with notches in its lower and in its right edge, and its number as holes."""
+    (left, low), (right, high) = PAD_MM
+    outline = m3.CrossSection.square((right - left, high - low)).translate((left, low))
+    for k in range(-ASIDE, ASIDE + 1):
+        notch = m3.CrossSection.square((NOTCH_MM, 2 * _long(k)), True)
+        outline -= notch.translate((k * (SCALE_MM - FINER_MM), low))
+    for k in range(-UP, UP + 1):
+        notch = m3.CrossSection.square((2 * _long(k), NOTCH_MM), True)
+        outline -= notch.translate((right, k * (_up_mm(lean) - FINER_MM)))
+    for dot in range(dots):
+        outline -= m3.CrossSection.circle(0.5 * DOT_MM, 24).translate((left + 2.5 * (dot + 1), high - 2.5))
+    return m3.Manifold.extrude(outline, PAD_HEIGHT_MM + GAP_MM).translate((0, 0, -GAP_MM))  # rooted in the roof: one solid
+
+
+def _up_mm(lean: float) -> float:
+    """Pitch of the grooves above each other, along the slope: whole grids high."""
+    return round(SCALE_MM * math.sin(lean) / GRID_MM) * GRID_MM / math.sin(lean)
+
+
+def _long(mark: int) -> float:
+    return LONG_MM if mark == 0 else SHORT_MM
+
+
 def standing(solid: m3.Manifold) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Vertices and faces in an order that does not depend on how the solid was made; base at z = 0, box about the z axis."""
     x0, y0, z0, x1, y1, _ = solid.bounding_box()
@@ -190,7 +286,29 @@ def ply(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> bytes:
     return "\n".join(header).encode("ascii") + vertices.tobytes() + rows.tobytes()
 
 
-DEMOS: dict[str, Callable[[], m3.Manifold]] = {"bracket": bracket, "figure": figure, "lattice": lattice, "tree": tree}
+# By name how far the pads lean, and how high over the plate they are: so that most heads, and that the broadest clear it.
+LEANS = {"calibration": (60.0, 15.0), "calibration30": (30.0, 26.0)}
+DEMOS: dict[str, Callable[[], m3.Manifold]] = {
+    "bracket": bracket,
+    "calibration": partial(calibration, *LEANS["calibration"]),
+    "calibration30": partial(calibration, *LEANS["calibration30"]),
+    "figure": figure,
+    "lattice": lattice,
+    "tree": tree,
+}
+
+
+def write_plan(folder: Path, name: str) -> None:
+    """Write the plan by which a calibration piece is cut, beside it."""
+    mesh, _ = read_mesh(folder / f"{name}.ply")
+    remarks = [f"pad {number}" for number in range(1, PADS + 1)]
+    parts = tuple(
+        PlannedPart((float(x), float(y), float(z)), round(plane.offset_mm, 6), remark)
+        for plane, remark in zip(roofs(*LEANS[name]), remarks, strict=True)
+        for x, y, z in [plane.normal.round(9) + 0.0]
+    )
+    plan = PlanFile(f"{name}.toml", f"{name}.ply", mesh_sha256(mesh), None, parts)
+    (folder / f"{name}.toml").write_text(plan_text(plan), encoding="utf-8")
 
 
 def main(folder: Path, names: Sequence[str] = tuple(DEMOS)) -> None:
@@ -202,6 +320,8 @@ def main(folder: Path, names: Sequence[str] = tuple(DEMOS)) -> None:
         if again.status() != m3.Error.NoError or len(again.decompose()) != 1:
             raise SystemExit(f"{name} is not one closed solid: {again.status()}, {len(again.decompose())} pieces")
         (folder / f"{name}.ply").write_bytes(ply(vertices, faces))
+        if name in LEANS:
+            write_plan(folder, name)
         size = np.ptp(vertices, axis=0)
         print(f"{name}: {len(faces)} faces, {size[0]:.1f} x {size[1]:.1f} x {size[2]:.1f} mm, {again.volume():.0f} mm3")
 

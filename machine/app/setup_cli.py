@@ -36,9 +36,20 @@ def calibrate(
     mark_radius: Annotated[
         float | None, typer.Option("--mark-radius", metavar="MM", help="distance of the mark from the middle of the plate")
     ] = None,
+    printed: Annotated[
+        list[Path] | None,
+        typer.Option("--printed", metavar="FILE.gcode", help="program of demo:calibration that was printed; repeatable"),
+    ] = None,
+    readings: Annotated[
+        list[str] | None,
+        typer.Option("--readings", metavar="TEXT", help="of each --printed: right,up,height of its four pads; else asked for"),
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="with --printed: page to type the readings on")
+    ] = None,
     save: Annotated[str | None, typer.Option("--save", metavar="NAME", help="name of your profile; else the machine's")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
-    force: Annotated[bool, typer.Option("--force", help="save although the touches are far off")] = False,
+    force: Annotated[bool, typer.Option("--force", help="save although touches or readings are far off")] = False,
     directions: Annotated[bool, typer.Option("--directions", help="find the directions of the axes, too")] = False,
     probing: ProbeOptions,
     machine: MachineName = Given.machine,
@@ -46,11 +57,26 @@ def calibrate(
 ) -> int:
     """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
 
-    Without -o and --measured a terminal asks for the touches one by one; with --probe the machine measures a ball by itself.
+    Without -o and --measured a terminal asks for the touches one by one; with --probe the machine measures a ball by itself;
+    with --printed it is read off a piece that was printed.
     """
     from machine.app.commands.measuring.calibrate import ask_for_touches, evaluate_sheet, write_program
 
     request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force, directions)
+    if printed:
+        from machine.app.commands.measuring.calibrate_piece import ask_for_readings, correct_axes, write_page
+
+        if out is not None or measured is not None or probing.probe:
+            raise typer.BadParameter("--printed is a way of its own: -o, --measured and --probe are for touches")
+        if html is not None and not readings:
+            return write_page(request, printed, html)
+        if readings:
+            return correct_axes(request, printed, readings)
+        if len(printed) == 1 and sys.stdin.isatty() and sys.stdout.isatty():
+            return ask_for_readings(request, printed[0])
+        raise typer.BadParameter("--printed goes with --readings TEXT or --html FILE; in a terminal with neither, to be asked")
+    if readings or html is not None:
+        raise typer.BadParameter("--readings and --html go with --printed FILE.gcode")
     if probing.probe:
         from machine.app.commands.measuring.calibrate_probe import probe_axes
 

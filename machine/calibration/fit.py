@@ -13,8 +13,9 @@ from math import acos, atan2, cos, degrees, radians, sin
 import numpy as np
 
 from machine.kinematics.table import turned_back, workpiece_path
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats
-from mdp.pose import UP, Pose, unit
+from mdp.pose import Pose, unit
 from profiles.errors import ProfileError
 from profiles.machine import UPRIGHT, Machine
 
@@ -121,7 +122,7 @@ class _Guess:
     def _start(self, start_deg: float) -> Floats:
         """The profile's own numbers, the mark where the first touches put it."""
         machine = self.machine
-        tilt_across = _across(machine) @ np.array(machine.tilt.point_mm)
+        tilt_across = frame_across(unit(machine.tilt.axis)) @ np.array(machine.tilt.point_mm)
         numbers = np.array([*machine.turn.point_mm, *tilt_across, machine.tilt.zero_deg + start_deg, 0.0, 0.0])
         of_mark = [touch for touch in self.touches if not touch.on_plate] or self.touches
         numbers[6:8] = workpiece_path(self.machine_with(numbers), _positions(of_mark))[:, :2].mean(axis=0)
@@ -154,7 +155,8 @@ class _Guess:
 
     def _axes(self, numbers: Floats) -> tuple[Floats, Floats, Floats]:
         """(..., 3) each: the tilt axis, a point of it, the turn axis. Along itself that point stays where the profile has it."""
-        machine, along, across = self.machine, unit(self.machine.tilt.axis), _across(self.machine)
+        machine, along = self.machine, unit(self.machine.tilt.axis)
+        across = frame_across(along)
         point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[..., 3:5] @ across
         angles = np.tan(np.radians(numbers[..., len(UNKNOWN) :]))
         if angles.shape[-1] == 0:
@@ -223,7 +225,7 @@ def estimate(
 ) -> tuple[Machine, tuple[float, float, float]]:
     """The machine and the mark as far as a few touches tell them: what they do not tell, and both signs, stay as given."""
     guess = _Guess(machine, (machine.tilt.sign, machine.turn.sign), touches, mark_mm[2])
-    tilt_point = _across(machine) @ np.array(machine.tilt.point_mm)
+    tilt_point = frame_across(unit(machine.tilt.axis)) @ np.array(machine.tilt.point_mm)
     begin = np.array([*machine.turn.point_mm, *tilt_point, machine.tilt.zero_deg, *mark_mm[:2], *np.zeros(len(DIRECTIONS))])
     _, numbers = guess.improved(begin, PULL)
     return guess.machine_with(numbers), (float(numbers[6]), float(numbers[7]), mark_mm[2])
@@ -278,13 +280,6 @@ def _check_count(touches: Sequence[Touch], sought: int) -> None:
     tilts = {round(touch.pose.tilt_deg, 1) for touch in touches}
     if len(tilts) < 2:
         raise ProfileError(f"all touches are at tilt {tilts.pop():g}: the tilt axis is found from two tilts or more")
-
-
-def _across(machine: Machine) -> Floats:
-    """(2, 3) unit vectors across the tilt axis."""
-    along = unit(machine.tilt.axis)
-    first = unit(np.cross(along, UP if abs(along[2]) < 0.9 else np.array([1.0, 0.0, 0.0])))
-    return np.array([first, np.cross(along, first)])
 
 
 def _lean(machine: Machine) -> Floats:

@@ -1,7 +1,7 @@
 """Saved: the numbers that a calibration or a coupon found, as a profile in the user's own folder that inherits the rest."""
 
 import tomllib
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +24,16 @@ def fitted_keys(zero_of_turn: bool, directions: bool = False) -> tuple[str, ...]
 
 def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
     """The tables of the calibrated profile: numbers, sources, and what is left uncalibrated."""
-    keys = fitted_keys(zero_of_turn, calibration.directions)
     source = f"tiltprint calibrate, {len(calibration.residuals_mm)} touches, {calibration.rms_mm:.3f} mm off"
+    return found_tables(before, calibration.machine, fitted_keys(zero_of_turn, calibration.directions), source)
+
+
+def found_tables(before: Machine, after: Machine, keys: Sequence[str], source: str) -> dict[str, Any]:
+    """The tables of a profile in which these keys of the rotary axes are found: numbers, sources, what is left uncalibrated."""
     axes: dict[str, dict[str, Any]] = {"tilt": {}, "turn": {}}
     for key in keys:
         _, axis, name = key.split(".")
-        value = getattr(getattr(calibration.machine, axis), name)
+        value = getattr(getattr(after, axis), name)
         digits = DIGITS.get(name, 4)
         axes[axis][name] = [round(x, digits) for x in value] if isinstance(value, tuple) else round(value, digits)
     left = [key for key in before.uncalibrated if key not in keys]

@@ -1,4 +1,4 @@
-"""The demo models: closed, printable, worth several directions, and remade byte for byte."""
+"""The demo models: closed, printable, worth several directions or cut by a plan of their own, and remade byte for byte."""
 
 from importlib import resources
 from pathlib import Path
@@ -8,18 +8,20 @@ import pytest
 
 from mdp.cut import solid_of
 from mdp.mesh import Mesh
-from mdp.model_file import locate
+from mdp.model_file import locate, plan_beside
 from mdp.overhang import risky_upright
 from mdp.read import read_mesh
 from mdp.search.search import decompose
 from profiles.profile import load
 from tests.checks import assert_closed
-from tools.make_demos import DEMOS, bar, cone_distance, main, smooth_union
+from tools.make_demos import DEMOS, LEANS, bar, cone_distance, main, smooth_union
 
 NAMES = sorted(DEMOS)
+PIECES = sorted(LEANS)
+MODELS = [name for name in NAMES if name not in PIECES]
 # Euler's formula: the bracket has 4 bolt holes and a bore with 5 mouths, 4 + 5 - 1; the lattice has 22 struts between 11 nodes,
 # 22 - 11 + 1; the organic ones have no hole.
-GENUS = {"bracket": 8, "figure": 0, "lattice": 12, "tree": 0}
+GENUS = {"bracket": 8, "calibration": 0, "calibration30": 0, "figure": 0, "lattice": 12, "tree": 0}
 
 
 def demo(name: str) -> Mesh:
@@ -53,14 +55,14 @@ def test_a_demo_stands_on_a_flat_base_about_the_turn_axis(name: str) -> None:
     assert np.allclose(mesh.bounds_mm.mean(axis=0)[:2], 0.0, atol=1e-3)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", MODELS)
 def test_a_demo_fits_on_a_table_of_100_mm_radius(name: str) -> None:
     mesh = demo(name)
     assert np.hypot(*mesh.vertices[:, :2].T).max() < 60.0
     assert 40.0 < np.ptp(mesh.vertices[:, 2]) < 80.0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", MODELS)
 def test_the_risky_faces_of_a_demo_lie_high_above_the_platform(name: str) -> None:
     mesh = demo(name)
     risky = risky_upright(mesh, 45.0)
@@ -77,10 +79,24 @@ def test_several_directions_make_most_of_a_demo_safe(name: str, reduction: float
     assert decomposition.reduction > reduction
 
 
-@pytest.mark.parametrize("name", ["bracket", "lattice"])
+@pytest.mark.parametrize("name", ["bracket", "lattice", *PIECES])
 def test_the_exact_demos_are_remade_byte_for_byte(name: str, tmp_path: Path) -> None:
     main(tmp_path, [name])
     assert (tmp_path / f"{name}.ply").read_bytes() == locate(f"demo:{name}").read_bytes()
+
+
+@pytest.mark.parametrize("name", PIECES)
+def test_a_calibration_piece_comes_with_its_plan_and_no_other_demo_has_one(name: str, tmp_path: Path) -> None:
+    main(tmp_path, [name])
+    plan = plan_beside(f"demo:{name}")
+    assert plan is not None
+    assert plan.read_bytes() == (tmp_path / f"{name}.toml").read_bytes()
+    assert [plan_beside(f"demo:{other}") for other in MODELS] == [None] * len(MODELS)
+
+
+@pytest.mark.parametrize(("name", "reach_mm"), [("calibration", 100.0), ("calibration30", 35.0)])
+def test_a_calibration_piece_fits_on_the_tables_it_is_for(name: str, reach_mm: float) -> None:
+    assert np.hypot(*demo(name).vertices[:, :2].T).max() < reach_mm
 
 
 @pytest.mark.slow

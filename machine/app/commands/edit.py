@@ -13,7 +13,7 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.redirect import redirecting
 from machine.app.workbench.web.serve import serve_workbench
 from machine.app.workbench.work.worker_pool import WorkerPools
-from mdp.model_file import DEMO, check_file, locate
+from mdp.model_file import DEMO, check_file, locate, plan_beside
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from profiles.errors import MeshError, PlanError
@@ -66,7 +66,8 @@ def _find(model: str) -> Opened:
         raise MeshError(f"{model} is G-code, which is sliced already: tiltprint view shows it")
     path = locate(model)
     check_file(path)
-    return Opened(path, model if model.startswith(DEMO) else path.name)
+    plan = plan_beside(model)
+    return Opened(path, model if model.startswith(DEMO) else path.name, None if plan is None else read_plan(plan))
 
 
 def _of_plan(file: Path, plan: PlanFile) -> Opened:

@@ -1,8 +1,11 @@
 """Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
 
+from pathlib import Path
+
 from machine.app.requests import ModelRequest
 from mdp.directions.turns import turned_further
 from mdp.mesh import Floats
+from mdp.model_file import plan_beside
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.search.search import check_part_count
@@ -22,11 +25,17 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
         raise PlanError(f"--record {record}: --plan {cuts.plan} exists, so nothing is searched that could be recorded")
     if cuts.planes is not None and request.orient:
         raise PlanError(f"--orient: the planes of {cuts.planes} belong to the model as it lies; process.rotate_deg turns it")
-    file = cuts.plan or cuts.planes
+    file = cuts.plan or cuts.planes or _plan_of_demo(request)
     given = None if file is None else read_plan(file)
     if given is not None and given.orientation is not None and request.orient is False:
         raise PlanError(f"--as-is: the plan {file} lays the model down by its orientation; leave one of them out")
     return given
+
+
+def _plan_of_demo(request: ModelRequest) -> Path | None:
+    """The plan that a demo comes with, unless the user wants it cut or laid down otherwise."""
+    otherwise = request.cuts.parts is not None or request.orient or request.outputs.record is not None
+    return None if otherwise else plan_beside(request.model)
 
 
 def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:

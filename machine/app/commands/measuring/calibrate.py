@@ -10,6 +10,7 @@ from machine.calibration.fit import Calibration, calibrate
 from machine.calibration.program import calibration_lines, plan_touches
 from machine.calibration.saved import fitted_tables, own_profile
 from machine.calibration.sheet import Sheet, read_sheet, sheet_text
+from profiles.axes import RotaryAxis
 from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile, load_one
@@ -105,15 +106,21 @@ def save_calibration(request: CalibrationRequest, machine: Machine, calibration:
     show(f"saved: {file}; use it as --machine {file.stem}\n")
 
 
+def through(name: str, old: RotaryAxis, new: RotaryAxis, sigma_mm: float) -> str:
+    """Where an axis was found to be, and how sure that is, beside where the profile has it."""
+    point, was = (
+        " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", axis.point_mm, strict=True)) for axis in (new, old)
+    )
+    return f"{name} {new.letter}: through {point} (+-{sigma_mm:.3f} mm), was {was}"
+
+
 def comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -> str:
     """The found numbers beside the profile's, and how far the touches are off."""
     lines = []
     for axis in ("tilt", "turn"):
         old, new = getattr(before, axis), getattr(calibration.machine, axis)
         sigma = max(value for key, value in calibration.sigma.items() if key.startswith(f"{axis}.point_mm"))
-        point = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", new.point_mm, strict=True))
-        was = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", old.point_mm, strict=True))
-        lines.append(f"{axis} {new.letter}: through {point} (+-{sigma:.3f} mm), was {was}")
+        lines.append(through(axis, old, new, sigma))
         lines.append(f"{axis} {new.letter}: sign {new.sign}, was {old.sign}")
         if axis == "tilt" or zero_of_turn:
             lines.append(f"{axis} {new.letter}: zero {new.zero_deg:.4f} deg, was {old.zero_deg:g}")

@@ -39,7 +39,7 @@ from machine.app.workbench.work.models import Resting, Unscaled
 from machine.app.workbench.work.worker_pool import WorkerPools
 from machine.planning.stops import parse_stops
 from mdp.directions.turns import turned_by
-from mdp.model_file import locate
+from mdp.model_file import locate, plan_beside
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import MANY_FACES
@@ -142,6 +142,8 @@ class Session(SessionBase):
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
         await self.open_model(locate(name), name)
+        if (plan := plan_beside(name)) is not None:
+            await self.open_plan(plan)
 
     async def open_kept(self, work: KeptWork) -> None:
         """Put kept work on the bench again, and go on keeping it where it was. Raises UserError, then it stays as it is there."""

@@ -172,6 +172,12 @@ def test_the_best_of_a_search_that_is_stopped_is_what_the_command_line_cuts_by_i
     assert {name: priced[name] for name in figures} == {name: cut[name] for name in figures}
 
 
+def test_a_demo_that_comes_with_a_plan_is_cut_by_it(bench: Running) -> None:
+    with bench.line() as page:
+        page.do("demo", name="demo:calibration")
+        assert page.until(lambda state: state["undo"] == "open calibration.toml")["parts"] == 5
+
+
 def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refused(bench: Running, folder: Path) -> None:
     (folder / "other.stl").write_bytes(stl(tee(8.0)))
     assert main(["decompose", "other.stl", *QUICK, "--as-is", "--plan", "plan.toml"]) == 0
