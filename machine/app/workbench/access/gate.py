@@ -11,7 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from machine.app.workbench.access.devices import Device
 from machine.app.workbench.access.door import Door
-from machine.app.workbench.access.guard import LONG_NUMBER, SAFE, is_foreign, method_of, refuse, values_of, with_headers
+from machine.app.workbench.access.guard import HEADERS, LONG_NUMBER, SAFE, is_foreign, method_of, refuse, values_of, with_headers
 from machine.app.workbench.access.lan import Lan
 from machine.app.workbench.access.limits import DEVICE
 from machine.app.workbench.access.pairing import Verdict
@@ -31,6 +31,10 @@ class Gate:
 
     def __init__(self, app: ASGIApp, door: Door, lan: Lan, port: int) -> None:
         self._app, self._door, self._scheme = app, door, lan.scheme
+        unheeded = (
+            "" if lan.certificate else "cross-origin-opener-policy"
+        )  # browsers say so on an open line
+        self._headers = {name: value for name, value in HEADERS.items() if name != unheeded}
         self._own, self._cookie = lan.hosts(port), f"tiltprint-{port}"  # of a host, whatever the port, a browser has one cookie
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -41,12 +45,12 @@ class Gate:
         if device is None:
             await self._answer_stranger(scope, receive, send)
         elif scope["path"] in ("/", "/pair"):
-            await _leading_to(PAIRED)(scope, receive, with_headers(send))
+            await _leading_to(PAIRED)(scope, receive, with_headers(send, self._headers))
         elif not scope["path"].startswith(PAIRED) or LONG_NUMBER.search(scope["path"]):
             await refuse(scope, send, 404, NOTHING)
         else:
             receive = _until_gone(device, scope["type"], receive, send)
-            await self._app({**scope, DEVICE: device.number}, receive, with_headers(send))
+            await self._app({**scope, DEVICE: device.number}, receive, with_headers(send, self._headers))
 
     def _cookies(self, scope: Scope) -> list[str]:
         found = []
@@ -68,7 +72,7 @@ class Gate:
         else:
             await refuse(scope, send, 403, f"{UNPAIRED}\n")
             return
-        await answer(scope, receive, with_headers(send))
+        await answer(scope, receive, with_headers(send, self._headers))
 
     async def _pair(self, request: Request) -> Response:
         """What a device gets that sends a code."""

@@ -6,7 +6,7 @@ person's own browser: its Origin is refused, and a name of its own that points h
 
 import re
 import secrets
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -87,14 +87,14 @@ async def refuse(scope: Scope, send: Send, status: int, sentence: str) -> None:
     await send({"type": "http.response.body", "body": sentence.encode()})
 
 
-def with_headers(send: Send) -> Send:
+def with_headers(send: Send, headers: Mapping[str, str] = HEADERS) -> Send:
     """Answers with the headers of ours that they do not have themselves."""
 
     async def wrapped(message: Message) -> None:
         if message["type"] == "http.response.start":
             given = list(message.get("headers", ()))
             there = {name.lower() for name, _ in given}
-            own = [(name.encode(), value.encode()) for name, value in HEADERS.items() if name.encode() not in there]
+            own = [(name.encode(), value.encode()) for name, value in headers.items() if name.encode() not in there]
             message = {**message, "headers": [*given, *own]}
         await send(message)
 

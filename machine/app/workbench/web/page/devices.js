@@ -4,7 +4,7 @@ import { $, made } from "../../../../view/template/page.js";
 import { putRows } from "./elements.js";
 import { lineAt } from "./line.js";
 
-const PAIRED = "This page is that of a paired device. Files are chosen and sent from here; other printers than those that were found are named on the computer.";
+const PAIRED = "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself.";
 const at = (seconds) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
 
 export function devicesPanel() {
