@@ -207,7 +207,7 @@ def test_from_the_phone_a_model_is_turned_and_a_print_stopped(bench: OpenToNetwo
     browser.complaints.clear()  # of the answer to a wrong code
     browser.value(f"document.getElementById('code').value = '{bench.code().lower()}'")
     browser.value("document.querySelector('button').click()")
-    browser.wait("document.documentElement.dataset.line === 'open' && document.documentElement.dataset.state === 'ready'")
+    browser.wait("document.documentElement?.dataset.line === 'open' && document.documentElement.dataset.state === 'ready'")
     assert browser.complaints == []
     browser.value("$('demo').value = 'demo:bracket'; $('demo').dispatchEvent(new Event('change'))")
     browser.wait(f"$('title').textContent === 'bracket' || $('title').textContent.includes('bracket') && {IDLE}")

@@ -31,9 +31,7 @@ class Gate:
 
     def __init__(self, app: ASGIApp, door: Door, lan: Lan, port: int) -> None:
         self._app, self._door, self._scheme = app, door, lan.scheme
-        unheeded = (
-            "" if lan.certificate else "cross-origin-opener-policy"
-        )  # browsers say so on an open line
+        unheeded = "" if lan.certificate else "cross-origin-opener-policy"  # browsers say so on an open line
         self._headers = {name: value for name, value in HEADERS.items() if name != unheeded}
         self._own, self._cookie = lan.hosts(port), f"tiltprint-{port}"  # of a host, whatever the port, a browser has one cookie
 
