@@ -40,8 +40,10 @@ def listen_at_all(port: int, hosts: Iterable[str]) -> tuple[socket.socket, list[
         except OutputError:
             for each in (own, *others):
                 each.close()
-            if port or not left:
+            if port:
                 raise
+            if not left:
+                raise OutputError(f"--lan: no port is free at all of {', '.join((HOST, *hosts))}") from None
         else:
             return own, others
     raise AssertionError("the last try returns or raises")

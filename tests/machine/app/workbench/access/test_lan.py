@@ -83,6 +83,8 @@ def test_one_port_is_had_at_all_addresses_or_at_none() -> None:
     ):
         listen_at_all(port, ("127.0.0.2", "127.0.0.3"))
     listen(port).close()
+    with pytest.raises(OutputError, match=r"--lan: no port is free at all of 127.0.0.1, 192.0.2.77"):
+        listen_at_all(0, ("192.0.2.77",))  # an address of another computer
 
 
 @needs_openssl
