@@ -40,7 +40,7 @@ class Device:
     """A device of the network without a browser."""
 
     def __init__(self, bench: OpenToNetwork) -> None:
-        self._bench, self.cookie = bench, ""
+        self._bench, self.cookie, self.said = bench, "", b""
 
     @property
     def origin(self) -> str:
@@ -50,7 +50,7 @@ class Device:
         connection = http.client.HTTPConnection(self._bench.host, self._bench.port, timeout=PATIENCE_S)
         connection.request(method, path, body, {"Cookie": self.cookie, "Origin": self.origin, **headers})
         answer = connection.getresponse()
-        answer.read()
+        self.said = answer.read()
         connection.close()
         return answer
 
@@ -115,6 +115,10 @@ def test_a_paired_device_commands_the_bench_until_it_is_let_go(bench: OpenToNetw
             with pytest.raises(InvalidStatus, match="403"), device.connect("/paired/1/devices"):
                 pass
             assert device.ask("/paired/1/file?name=a.gltf", "POST", b"{}").status == 422
+            assert b"may name files of the computer" in device.said
+            profile = b'inherits = "/etc/hostname"\n[process]\nwalls = 3\n'
+            assert device.ask("/paired/1/file?name=own.toml", "POST", profile).status == 422
+            assert b"own.toml: the profile of a paired device inherits one that is known here" in device.said
             own.do("unpair", device=number)
             with pytest.raises(ConnectionClosed) as closed:
                 page.until(lambda state: False)
@@ -248,6 +252,9 @@ def test_the_page_of_the_computer_lists_devices_and_lets_them_go(bench: OpenToNe
     browser.value("$('network').scrollIntoView()")
     browser.screenshot(tmp_path / "devices.png")
     count = browser.value("$('devices').children.length")
+    for _ in range(5):
+        Device(bench).pair("WRONG")
+    browser.wait("$('pairing-told').textContent.startsWith('Wrong codes were typed: no code is taken before')")
     browser.click("#devices li:last-child button")
     browser.wait(f"$('devices').children.length === {count} - 1")
     end_s = time.monotonic() + PATIENCE_S

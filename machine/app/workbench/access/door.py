@@ -82,7 +82,7 @@ class Door(Observable):
             "addresses": self._addresses,
             "encrypted": self.encrypted,
             "closed": self.pairing.closed,
-            "wait_s": self.wait_s,
+            "waits_until_s": time() + self.wait_s if self.wait_s else 0.0,  # since the epoch: a page may hear of it later
             "devices": [{"number": each.number, "name": each.name, "paired_s": each.paired_s} for each in self.devices],
         }
 

@@ -6,10 +6,15 @@ from collections.abc import Awaitable, Callable
 from starlette.websockets import WebSocket
 
 from machine.app.workbench.access.door import Door
+from machine.app.workbench.bench.values import Asked
 from machine.app.workbench.web.line import parsed, receive, send, tell, until_either_ends
 from profiles.errors import PlanError, UserError
 
 MOST_COMMAND = 1_000  # characters
+COMMANDS: dict[str, Callable[[Door, Asked], None]] = {
+    "unpair": lambda door, asked: door.unpair(asked.get("device")),
+    "reopen": lambda door, asked: door.reopen(),
+}
 
 
 def devices_line(door: Door) -> Callable[[WebSocket], Awaitable[None]]:
@@ -24,13 +29,16 @@ def devices_line(door: Door) -> Callable[[WebSocket], Awaitable[None]]:
 
 async def _hear(door: Door, socket: WebSocket) -> None:
     while True:
+        text = await receive(socket)
         try:
-            asked = parsed(await receive(socket), MOST_COMMAND)
-            if asked.get("do") == "unpair":
-                door.unpair(asked.get("device"))
-            elif asked.get("do") == "reopen":
-                door.reopen()
-            else:
-                raise PlanError("what the page has sent is no command of the paired devices")
+            _obey(door, parsed(text, MOST_COMMAND))
         except UserError as error:
             await send(socket, json.dumps({"problem": str(error)}))
+
+
+def _obey(door: Door, asked: Asked) -> None:
+    name = asked.get("do")
+    command = COMMANDS.get(name) if isinstance(name, str) else None
+    if command is None:
+        raise PlanError("what the page has sent is no command of the paired devices")
+    command(door, asked)

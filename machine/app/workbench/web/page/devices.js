@@ -5,7 +5,7 @@ import { putRows } from "./elements.js";
 import { lineAt } from "./line.js";
 
 const PAIRED = "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself.";
-const at = (seconds) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+const at = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...form });
 
 export function devicesPanel() {
   const { network } = document.documentElement.dataset;
@@ -22,15 +22,15 @@ function openDevicesLine() {
     $("network-told").textContent = `A device that opens ${told.addresses.join(" or ")} is asked for the code that the terminal shows.${told.encrypted ? "" : " Whoever is in this network can read along."}`;
     clearTimeout(until);
     tellPairing(told);
-    if (told.wait_s) until = setTimeout(tellPairing, 1000 * told.wait_s, { ...told, wait_s: 0 });
+    until = setTimeout(tellPairing, Math.max(0, 1000 * told.waits_until_s - Date.now()) + 100, told);
     putRows(told.devices.map((device) => ({ id: `${device.number}`, told: JSON.stringify(device), make: () => deviceRow(device, line) })), $("devices"));
   }, () => {});
   $("reopen").addEventListener("click", () => line.send({ do: "reopen" }));
 }
 
-function tellPairing({ closed, wait_s: wait, devices }) {
+function tellPairing({ closed, waits_until_s: end, devices }) {
   const none = devices.length ? "" : "No device is paired.";
-  $("pairing-told").textContent = closed ? "Too many wrong codes were typed: no further device is paired." : wait ? `Wrong codes were typed: no code is taken before ${at(Date.now() / 1000 + wait)}.` : none;
+  $("pairing-told").textContent = closed ? "Too many wrong codes were typed: no further device is paired." : 1000 * end > Date.now() ? `Wrong codes were typed: no code is taken before ${at(end, { second: "2-digit" })}.` : none;
   $("reopen").hidden = !closed;
 }
 
