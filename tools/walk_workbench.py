@@ -3,6 +3,7 @@
 Every task of docs/workbench-tasks.md is done one after the other on a page by elements that are seen and can be pressed at that
 moment. Counted are clicks: one for a button, a row, a field that is typed into, two for an entry of a drop-down list or a file.
 Told are, for each task, its clicks and the seconds from the last of them to the answer. --pictures: one after each task.
+--phone: instead, another device is paired on a page of a phone's size, and pauses a print of the model.
 """
 
 import argparse
@@ -13,8 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.machine.browser import Browser
+from tests.machine.prints import prints_line
 from tests.machine.test_workbench_page import choose
-from tests.machine.workbench import workbench
+from tests.machine.workbench import OpenToNetwork, open_workbench, workbench
 
 IDLE = "document.documentElement.dataset.busy === ''"
 SEARCHED = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
@@ -23,6 +25,7 @@ ROWS = "document.querySelectorAll('#parts-list tbody tr').length"
 ROW, CHOSEN = "#parts-list tbody tr:last-child", "#parts-list tbody tr:last-child input[type=radio]"
 WALLS, SUPPORT = '[data-key="process.walls"] input', '[data-key="process.support"] select'
 SETTLED_S, BAR_PIXELS = 0.8, 42
+PHONE = (390, 780)
 
 
 def undone(step: str) -> str:
@@ -132,12 +135,47 @@ def walk(browser: Browser, address: str, model: Path, at: Callable[[str, int, fl
         at(task.name, hand.clicks, time.monotonic() - began)
 
 
+def walk_from_the_phone(browser: Browser, model: Path, at: Callable[[str, int, float], None]) -> None:
+    """A device is paired and pauses a print that another page has begun, on the simulated printer, sped up twenty times."""
+    with open_workbench(str(model)) as running:
+        begin_print(running)
+        browser.resize(*PHONE, mobile=True)
+        hand = Hand(browser, model)
+        browser.value(f"location.assign({json.dumps(running.network)})")
+        hand.clicks += 1  # the address that is typed
+        for task, steps, until in (
+            ("Pair a phone", (f"#code={running.code()}", "button"), "document.documentElement?.dataset.line === 'open'"),
+            ("Pause from the phone", ("#tab-printing", "#take", "#pause"), f"{PHASE} === 'paused'"),
+        ):
+            for step in steps:
+                began = time.monotonic()
+                hand.do(step)
+            browser.wait(until)
+            at(task, hand.clicks, time.monotonic() - began)
+            hand = Hand(browser, model)
+        browser.click("#emergency")
+        browser.wait(f"{PHASE} === 'over'")
+
+
+def begin_print(running: OpenToNetwork) -> None:
+    """Has another page slice what lies on the bench and print it; it is there until the first layer is under way."""
+    with running.line() as bench, prints_line(running, "computer") as prints:
+        bench.until(lambda state: state["model"])
+        bench.do("slice")
+        bench.until(lambda state: state["sliced"])
+        prints.do("check", port="sim", sim_speed=20)
+        prints.until(lambda job: job["phase"] == "ready")
+        prints.command("begin")
+        prints.until(lambda job: job["progress"].get("layer"))
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("model", type=Path)
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="one that is there")
+    parser.add_argument("--phone", action="store_true", help="pair a device and pause a print")
     given = parser.parse_args()
-    with workbench() as running, Browser((1280, 800)) as page:
+    with Browser((1280, 800)) as page:
 
         def told(name: str, clicks: int, seconds: float) -> None:
             print(f"{name:34}{clicks:3}{seconds:8.1f} s", flush=True)
@@ -145,5 +183,9 @@ if __name__ == "__main__":
                 time.sleep(SETTLED_S)
                 page.screenshot(given.pictures / f"{name}.png")
 
-        walk(page, running.address, given.model, told)
+        if given.phone:
+            walk_from_the_phone(page, given.model, told)
+        else:
+            with workbench() as running:
+                walk(page, running.address, given.model, told)
         print(f"complaints: {page.complaints or 'none'}")

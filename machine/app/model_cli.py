@@ -127,14 +127,21 @@ def edit(
     upload_mib: Annotated[
         int, typer.Option("--upload-mib", metavar="N", min=1, max=1024, help="the largest file that is taken from a page")
     ] = UPLOAD_MIB,
+    lan: Annotated[
+        bool, typer.Option("--lan", help="open it to devices of the local network, too, each paired by a code that is told here")
+    ] = False,
+    certificate: Annotated[
+        Path | None, typer.Option("--certificate", metavar="FILE", help="PEM file: encrypts --lan, with --key")
+    ] = None,
+    key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="PEM file: the key of the certificate")] = None,
     given: options.ModelProfileOptions,
 ) -> int:
-    """Open the workbench: a page to look, cut, slice and print. It is on this computer alone; Ctrl-C ends it."""
+    """Open the workbench: a page to look, cut, slice and print. It is on this computer alone, but with --lan; Ctrl-C ends it."""
     from machine.app.commands.edit import edit
     from machine.app.requests import EditRequest, Given
 
     names = Given(given.machine, given.material, given.process, tuple(given.settings or ()))
-    return edit(EditRequest(given.profile(), names, model, port, not no_browser, upload_mib))
+    return edit(EditRequest(given.profile(), names, model, port, not no_browser, upload_mib, lan, certificate, key))
 
 
 def batch(

@@ -109,7 +109,8 @@ class Given:
 @dataclass(frozen=True)
 class EditRequest:
     """The workbench. given: what the profile is made of; model: a model or a plan to begin with; port: of this computer, 0: any
-    free one; browser: open it there; upload_mib: the largest file that is taken from a page."""
+    free one; browser: open it there; upload_mib: the largest file that is taken from a page; lan: open it to the local
+    network, too, certificate, key: PEM files by which that is encrypted."""
 
     profile: "Profile"
     given: Given
@@ -117,6 +118,9 @@ class EditRequest:
     port: int = 0
     browser: bool = True
     upload_mib: int = UPLOAD_MIB
+    lan: bool = False
+    certificate: Path | None = None
+    key: Path | None = None
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,16 @@
 import http.client
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from urllib.parse import urlsplit
 
 from websockets.sync.client import ClientConnection, connect
@@ -79,14 +81,47 @@ class Page:
         return self.state
 
 
+class OpenToNetwork(Running):
+    """A workbench with --lan. network: its address there; told: the file of what it has said at its terminal."""
+
+    def __init__(self, process: "subprocess.Popen[str]", told: Path) -> None:
+        assert process.stdout is not None
+        super().__init__(process, process.stdout.readline().strip())
+        self.network, self.told = process.stdout.readline().strip(), told
+        self.host = urlsplit(self.network).hostname or ""
+
+    def code(self) -> str:
+        """The one that was told last."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not (codes := re.findall(r"[A-Z2-9]{4}-[A-Z2-9]{4}", self.told.read_text())):
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+        return str(codes[-1])
+
+
+@contextmanager
+def open_workbench(*arguments: str) -> Iterator[OpenToNetwork]:
+    """The same with --lan."""
+    with tempfile.TemporaryDirectory() as folder:
+        told = Path(folder) / "told"
+        with told.open("w") as errors, _running(("--lan", *arguments), errors) as process:
+            yield OpenToNetwork(process, told)
+
+
 @contextmanager
 def workbench(*arguments: str) -> Iterator[Running]:
     """`tiltprint edit` with these arguments, ended by Ctrl-C."""
-    command = [sys.executable, "-m", "machine.app.cli", "edit", "--no-browser", *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    try:
+    with _running(arguments, subprocess.DEVNULL) as process:
         assert process.stdout is not None
         yield Running(process, process.stdout.readline().strip())
+
+
+@contextmanager
+def _running(arguments: Iterable[str], errors: int | IO[str]) -> Iterator["subprocess.Popen[str]"]:
+    command = [sys.executable, "-m", "machine.app.cli", "edit", "--no-browser", *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
+    try:
+        yield process
     finally:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)

@@ -9,6 +9,7 @@ from pathlib import Path
 from machine.app.requests import GCODE_SUFFIXES, EditRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
+from machine.app.workbench.access.lan import Lan, open_lan
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.redirect import redirecting
 from machine.app.workbench.web.serve import serve_workbench
@@ -16,7 +17,7 @@ from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import DEMO, check_file, locate, plan_beside
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
-from profiles.errors import MeshError, PlanError
+from profiles.errors import MeshError, OutputError, PlanError
 
 PLAN_SUFFIX = ".toml"
 
@@ -33,6 +34,7 @@ class Opened:
 def edit(request: EditRequest) -> int:
     """Serve the page; a model that cannot be read is told in it, a file that is not there at once."""
     opened = None if request.model is None else _find(request.model)
+    lan = _lan(request)
 
     def make(pools: WorkerPools) -> Session:
         return Session(request.profile, request.given, pools)
@@ -41,15 +43,24 @@ def edit(request: EditRequest) -> int:
         if opened is not None:
             session.start(_open(session, opened))
 
-    def announce(address: str) -> None:
-        show(f"{address}\n")
-        say("the workbench is there, for this computer alone; Ctrl-C ends it")
+    def announce(address: str, *of_lan: str) -> None:
+        show("".join(f"{each}\n" for each in (address, *of_lan)))
+        say(f"the workbench is there, for this computer{'' if of_lan else ' alone'}; Ctrl-C ends it")
         if request.browser:
             _lead_browser(address, until_end)
 
     with ExitStack() as until_end:
-        serve_workbench(make, begin, announce, request.port, request.upload_mib)
+        serve_workbench(make, begin, announce, request.port, request.upload_mib, lan)
     return 0
+
+
+def _lan(request: EditRequest) -> Lan | None:
+    """The network that the workbench is opened to, None: to none. Raises OutputError."""
+    if request.lan:
+        return open_lan(request.certificate, request.key)
+    if request.certificate or request.key:
+        raise OutputError("--certificate and --key encrypt what --lan opens: give --lan, too")
+    return None
 
 
 async def _open(session: Session, opened: Opened) -> None:

@@ -45,6 +45,16 @@ class Prints(Observable):
         """Those of which something goes on."""
         return [job for job in self.prints if not job.over]
 
+    @property
+    def ports_known(self) -> set[str]:
+        """Ports that were found here, and those of the prints that are listed."""
+        return {report["port"] for report in self._ports or ()} | {job.state["port"] for job in self.prints}
+
+    @property
+    def journals_known(self) -> set[str]:
+        """Journals that were found here."""
+        return {str(journal.path) for journal in self._journals or ()}
+
     def snapshot(self) -> dict[str, Any]:
         """What every page is told."""
         return {

@@ -8,6 +8,7 @@ from weakref import WeakKeyDictionary
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from machine.app.workbench.access.limits import DEVICE, check_bench_command
 from machine.app.workbench.session.base import hear_from
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
@@ -82,6 +83,8 @@ async def _hear(session: Session, socket: WebSocket) -> None:
         try:
             asked = parsed(text, MOST_COMMAND)
             hear_from(asked.get("page"))
+            if DEVICE in socket.scope:
+                check_bench_command(asked)
             obey(session, asked)
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
             session.answer(asked.get("ask"), session.refuse(error))

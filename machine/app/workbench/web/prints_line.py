@@ -12,6 +12,7 @@ from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
 from machine.app.crash import bug_in_words, log_bug
+from machine.app.workbench.access.limits import DEVICE, check_print_command
 from machine.app.workbench.bench.page_words import page_words, with_page_words
 from machine.app.workbench.printing.commands import PageOfPrints, obey
 from machine.app.workbench.printing.prints import Prints
@@ -90,6 +91,8 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
         text = await receive(socket)
         try:
             asked = parsed(text, MOST_COMMAND)
+            if DEVICE in socket.scope:
+                check_print_command(asked, page.prints.ports_known, page.prints.journals_known)
             obey(page, asked)
         except UserError as error:
             await send(socket, json.dumps({"problem": page_words(str(error)), "forcible": error.forcible}))

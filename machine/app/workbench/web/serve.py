@@ -2,29 +2,31 @@
 
 import asyncio
 import gc
-import os
 import secrets
 import socket
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 
 import uvicorn
+from starlette.types import ASGIApp
 
 from machine.app.requests import UPLOAD_MIB
 from machine.app.terminal.interrupts import calling
 from machine.app.terminal.progress import say
+from machine.app.workbench.access.door import Door
+from machine.app.workbench.access.guard import HOST
+from machine.app.workbench.access.lan import Lan
+from machine.app.workbench.access.listening import listen_at_all
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
-from machine.app.workbench.web.guard import HOST
-from machine.app.workbench.web.server import application
+from machine.app.workbench.web.server import Served, application, lan_application
 from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.uploads import Uploads
 from machine.app.workbench.work.processes import hear_the_ends
 from machine.app.workbench.work.received import files_in, tidy_left
 from machine.app.workbench.work.worker_pool import WorkerPools
-from profiles.errors import OutputError, reason
 
 GRACE_S = 1  # for answers under way when it ends, and for its processes
 SWITCH_S = 0.0005  # between threads: usual are 5 ms, and a stop is waited for several times
@@ -45,77 +47,64 @@ class Server(uvicorn.Server):
         self.should_exit = True
 
 
-def listen(port: int) -> socket.socket:
-    """A socket at a port of this computer, 0: any free one. Raises OutputError for one that cannot be had."""
-    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-    try:
-        if os.name == "posix":  # lines of a server that died keep its port for a minute; a second listener is refused as ever
-            own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        elif hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows keeps no port, and would let a second program listen there
-            own.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
-        own.bind((HOST, port))
-        own.listen()  # at once: of two that are bound so, the second is refused here
-    except (OSError, OverflowError) as error:
-        own.close()
-        why = reason(error) if isinstance(error, OSError) else str(error)
-        raise OutputError(f"--port {port} cannot be used: {why}; without it any free one is taken") from None
-    return own
-
-
 def serve_workbench(
     make: Callable[[WorkerPools], Session],
     begin: Callable[[Session], None],
-    announce: Callable[[str], None],
+    announce: Callable[..., None],
     port: int = 0,
     upload_mib: int = UPLOAD_MIB,
+    lan: Lan | None = None,
 ) -> None:
     """Serve until Ctrl-C. make: a session; begin: given the first one when it is there, both in the event loop of the sessions;
-    announce: given its address when it answers; upload_mib: the largest file that is taken from a page."""
-    own = listen(port)
-    with own:
+    announce: given its address when it answers, and those in the network; upload_mib: the largest file that is taken from a page;
+    lan: the network that it is open to, None: to none."""
+    with ExitStack() as sockets:
+        own, of_lan = listen_at_all(port, lan.addresses if lan else ())
+        for each in (own, *of_lan):
+            sockets.enter_context(each)
         folders = tidy_left()
         if folders:
             names = f"{folders[0]} and {len(folders) - 1} more" if folders[1:] else str(folders[0])
             left = f"workbenches that were killed have left the files of their benches in {names}"
             say(f"{left}: the page offers them, and they go with a start in a day")
-        asyncio.run(_serve(make, begin, announce, own, Uploads(upload_mib, files_in(*folders))))
+        asyncio.run(_serve(make, begin, announce, own, Uploads(upload_mib, files_in(*folders)), lan, of_lan))
 
 
 async def _serve(
     make: Callable[[WorkerPools], Session],
     begin: Callable[[Session], None],
-    announce: Callable[[str], None],
+    announce: Callable[..., None],
     own: socket.socket,
     uploads: Uploads,
+    lan: Lan | None,
+    of_lan: Sequence[socket.socket],
 ) -> None:
     number, token = own.getsockname()[1], secrets.token_urlsafe(24)
     workbench, prints, loop = Workbench(make), Prints(), asyncio.get_running_loop()
     sessions = SessionsThread()
+    served = Served(workbench, sessions, prints, uploads)
+    door = Door(say, lan.urls(number), lan.certificate is not None) if lan else None
 
     async def open_first() -> int:
         first = workbench.open()
         begin(workbench.sessions[first])
         return first
 
-    settings = uvicorn.Config(
-        application(workbench, sessions, prints, token, number, uploads),
-        log_config=None,
-        lifespan="off",
-        ws="websockets-sansio",
-        ws_max_size=MOST_SENT,
-        ws_per_message_deflate=False,  # nothing goes further than this computer
-        timeout_graceful_shutdown=GRACE_S,
-        server_header=False,
-        proxy_headers=False,
-    )
-    server, ending = Server(settings), list[asyncio.Task[None]]()
+    servers = [(_server(application(served, token, number, door)), [own])]
+    if lan and door:
+        servers.append((_server(lan_application(served, door, lan, number), lan), list(of_lan)))
+    ending = list[asyncio.Task[None]]()
+
+    def stop() -> None:
+        for server, _ in servers:
+            server.stop()
 
     def end() -> None:
         """First the prints end, heaters off; asked again, the workbench goes at once, and they end by themselves."""
         if ending or not prints.running:
-            server.stop()
+            stop()
         else:
-            ending.append(loop.create_task(_end_prints(prints, server.stop)))
+            ending.append(loop.create_task(_end_prints(prints, stop)))
 
     def interrupt() -> None:
         loop.call_soon_threadsafe(end)
@@ -124,10 +113,12 @@ async def _serve(
         first = await sessions.run(open_first())
         keep_stops_quick()
         with calling(interrupt):
-            answering = asyncio.create_task(server.serve(sockets=[own]))
-            while not server.started and not answering.done():
+            answering = asyncio.gather(*(server.serve(sockets=those) for server, those in servers))
+            while not all(server.started for server, _ in servers) and not answering.done():
                 await asyncio.sleep(0.01)
-            announce(f"http://{HOST}:{number}/{token}/{first}/")
+            announce(f"http://{HOST}:{number}/{token}/{first}/", *(lan.urls(number) if lan else ()))
+            if door:
+                door.announce()
             await answering
     finally:
         prints.close()
@@ -136,6 +127,25 @@ async def _serve(
                 await sessions.run(_close(workbench))
         await hear_the_ends(GRACE_S)
         await sessions.end(GRACE_S)
+
+
+def _server(app: ASGIApp, lan: Lan | None = None) -> Server:
+    """lan: the network that it answers in, None: it answers this computer alone."""
+    certificate = lan.certificate if lan else None
+    settings = uvicorn.Config(
+        app,
+        log_config=None,
+        lifespan="off",
+        ws="websockets-sansio",
+        ws_max_size=MOST_SENT,
+        ws_per_message_deflate=False,  # what goes no further than this computer or its network is not worth it
+        timeout_graceful_shutdown=GRACE_S,
+        server_header=False,
+        proxy_headers=False,
+        ssl_certfile=certificate.chain if certificate else None,
+        ssl_keyfile=certificate.key if certificate else None,
+    )
+    return Server(settings)
 
 
 async def _close(workbench: Workbench) -> None:

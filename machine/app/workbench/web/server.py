@@ -1,15 +1,19 @@
 """Server: the addresses of the workbench: its page, its sessions' models, files and lines."""
 
-from collections.abc import Awaitable, Callable
-from dataclasses import replace
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, replace
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.routing import Route, Router, WebSocketRoute
+from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from machine.app.workbench.access.door import Door
+from machine.app.workbench.access.gate import Gate
+from machine.app.workbench.access.guard import NAMES, Guard
+from machine.app.workbench.access.lan import Lan
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.page_words import page_words
 from machine.app.workbench.bench.settings import settings_list
@@ -20,6 +24,7 @@ from machine.app.workbench.session.commands import Need, check_need
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.benches import bench_routes
+from machine.app.workbench.web.devices_line import devices_line
 from machine.app.workbench.web.downloads import (
     folder,
     gcode,
@@ -31,7 +36,6 @@ from machine.app.workbench.web.downloads import (
     profile,
     shared_page,
 )
-from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, refuse_closed, talk
 from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.prints_line import print_log, print_webcam, prints_line
@@ -45,27 +49,49 @@ Act = Callable[[Session, Request], Awaitable[Response]]
 BELOW = "/{token}/{session:int}/"
 
 
-def application(
-    workbench: Workbench, sessions: SessionsThread, prints: Prints, token: str, port: int, uploads: Uploads
-) -> ASGIApp:
-    """The whole server, below `/TOKEN/`; the number of a session follows. What is of the prints is answered in the server's own
-    event loop, all else in that of the sessions."""
+@dataclass(frozen=True)
+class Served:
+    """What all pages are served: the benches in their own event loop, the prints, the files that pages send."""
+
+    workbench: Workbench
+    sessions: SessionsThread
+    prints: Prints
+    uploads: Uploads
+
+
+def application(served: Served, token: str, port: int, door: Door | None = None) -> ASGIApp:
+    """The server of this computer, below `/TOKEN/`; the number of a session follows. door: of the network, where it is open."""
+    page = workbench_page((f"ws://{name}:{port}" for name in NAMES), "open" if door else "")
+    of_door = [WebSocketRoute(BELOW + "devices", devices_line(door))] if door else []
+    return Guard(_router(served, page, of_door), token, port)
+
+
+def lan_application(served: Served, door: Door, lan: Lan, port: int) -> ASGIApp:
+    """The server of paired devices, the same below `/paired/`."""
+    scheme = lan.scheme.replace("http", "ws")
+    page = workbench_page((f"{scheme}://{host}" for host in lan.hosts(port)), "paired")
+    return Gate(_router(served, page), door, lan, port)
+
+
+def _router(served: Served, page: tuple[bytes, str], further: Sequence[BaseRoute] = ()) -> ASGIApp:
+    """What is of the prints, and further, is answered in the server's own event loop, all else in that of the sessions."""
+    workbench, prints = served.workbench, served.prints
     of_prints = [
         Route(BELOW + "prints/{print:int}/log", print_log(prints)),
         Route(BELOW + "prints/{print:int}/webcam", print_webcam(prints)),
         WebSocketRoute(BELOW + "prints", prints_line(prints, workbench)),
     ]
-    others = sessions.application(_of_sessions(workbench, port, uploads))
-    return Guard(Router(of_prints, redirect_slashes=False, default=others), token, port)
+    others = served.sessions.application(_of_sessions(workbench, page, served.uploads))
+    return Router([*of_prints, *further], redirect_slashes=False, default=others)
 
 
-def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
+def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads) -> ASGIApp:
 
     def route(path: str, act: Act, method: str = "GET", need: Need = Need.NOTHING) -> Route:
         return Route(BELOW + path, _answering(workbench, act, need), methods=[method])
 
     routes = [
-        route("", _page(port)),
+        route("", _page(*page)),
         route("model/{key}", _model),
         route("marks/{key}", _marks),
         route("pedestal/{key}", _pedestal),
@@ -91,9 +117,7 @@ def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
     return Starlette(routes=[*bench_routes(workbench), *routes])
 
 
-def _page(port: int) -> Act:
-    content, policy = workbench_page(port)
-
+def _page(content: bytes, policy: str) -> Act:
     async def answer(session: Session, request: Request) -> Response:
         return Response(content, media_type="text/html", headers={"content-security-policy": policy})
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from machine.app.workbench.access.limits import DEVICE, check_model_name, check_profile
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.profile_files import ProfileFiles
 from machine.app.workbench.work.kept_work import folders_kept, read_work
@@ -32,7 +33,15 @@ class Uploads:
     async def take(self, session: Session, request: Request) -> Response:
         """A file that the person has chosen or dropped; what is refused is not kept."""
         name = Path(request.query_params.get("name", "")).name
-        return await self._open(session, name, lambda path: _receive(request, path, name, self._most_mib))
+
+        async def receive(path: Path) -> None:
+            await _receive(request, path, name, self._most_mib)
+            if DEVICE in request.scope and path.suffix.lower() == TEXT_SUFFIX:
+                check_profile(path)
+
+        if DEVICE in request.scope:
+            check_model_name(name)
+        return await self._open(session, name, receive)
 
     async def list_left(self, session: Session, request: Request) -> Response:
         """What has been left and is still there."""

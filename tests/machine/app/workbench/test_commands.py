@@ -11,6 +11,7 @@ import pytest
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.printing.commands import COMMANDS as OF_PRINTS
 from machine.app.workbench.session.commands import COMMANDS, obey
+from machine.app.workbench.web.devices_line import COMMANDS as OF_DEVICES
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
@@ -49,8 +50,8 @@ def test_the_page_knows_the_very_same_names() -> None:
     scripts = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith(".js"))
     said = {*re.findall(r'\bdo: "(\w+)"', scripts), *re.findall(r'command\("(\w+)"', scripts)}
     never_said_so = {"undo", "redo", "resume", "pause", "feed", "flow"}  # by variables
-    assert {*COMMANDS, *OF_PRINTS} - said <= never_said_so
-    assert said <= {*COMMANDS, *OF_PRINTS}
+    assert {*COMMANDS, *OF_PRINTS, *OF_DEVICES} - said <= never_said_so
+    assert said <= {*COMMANDS, *OF_PRINTS, *OF_DEVICES}
 
 
 def test_the_documentation_lists_every_command_and_no_other() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from machine.app.workbench.web.serve import listen
+from machine.app.workbench.access.listening import listen
 from machine.app.workbench.work.kept_work import kept_folder
 from mdp.save import stl
 from profiles.errors import OutputError

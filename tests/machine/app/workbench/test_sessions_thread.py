@@ -15,7 +15,7 @@ from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
-from machine.app.workbench.web.server import application
+from machine.app.workbench.web.server import Served, application
 from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.uploads import Uploads
 from profiles.profile import load
@@ -49,7 +49,7 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
         said: asyncio.Queue[Any] = asyncio.Queue()
         messages: asyncio.Queue[Any] = asyncio.Queue()
         await sessions.run(begin())
-        app = application(workbench, sessions, prints, TOKEN, PORT, Uploads(1))
+        app = application(Served(workbench, sessions, prints, Uploads(1)), TOKEN, PORT)
         line = asyncio.create_task(app(scope(f"/{TOKEN}/1/prints"), said.get, messages.put))  # type: ignore[arg-type]
         said.put_nowait({"type": "websocket.connect"})
         while (await messages.get())["type"] != "websocket.send":

@@ -4,6 +4,9 @@ import { made } from "../../../../view/template/page.js";
 
 export const AGAIN_MS = 1000;
 const CLOSED_CODE = 4404; // of a line whose bench is not open any more
+const UNPAIRED_CODE = 4403; // of one whose device is let go
+
+const ENDINGS = { [CLOSED_CODE]: "closed", [UNPAIRED_CODE]: "unpaired" };
 
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
 export const LINE_TOLD = {
@@ -11,6 +14,7 @@ export const LINE_TOLD = {
   lost: "The line to tiltprint is lost; trying again.",
   ended: "tiltprint has ended. Start it again and open the address that it tells; if it was killed, the files dropped here can be opened there.",
   replaced: "This page is of a tiltprint that has ended. Another one is here now: open the address that its terminal has told.",
+  unpaired: "This device is not paired any more: load this page again to pair it by another code.",
   closed: "This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.",
 };
 
@@ -23,21 +27,21 @@ export function lineAt(path, heard, stands) {
     socket.onopen = () => { opened = true; stands("open"); };
     socket.onmessage = ({ data }) => heard(JSON.parse(data));
     socket.onclose = async ({ code }) => {
-      const how = code === CLOSED_CODE ? "closed" : opened ? "lost" : await whyUnanswered();
+      const how = ENDINGS[code] || (opened ? "lost" : await whyUnanswered());
       stands(how);
-      if (how !== "closed" && how !== "replaced") setTimeout(open, AGAIN_MS);
+      if (!["closed", "unpaired", "replaced"].includes(how)) setTimeout(open, AGAIN_MS);
     };
   };
   open();
   return { isOpen: () => socket.readyState === WebSocket.OPEN, send: (command) => socket.send(JSON.stringify(command)) };
 }
 
-/** Why no line can be opened: nobody is there, or one that does not know the page's address, which has another token at each start. */
+/** Why no line can be opened: nobody is there, or one that does not know the page's address, which has another token at each start, or its device. */
 export const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
-  ({ status }) => (status === 404 ? "replaced" : "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
+  ({ status }) => ({ 403: "unpaired", 404: "replaced" }[status] || "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
 
 let line = null, asked = new Map(), count = 0; // asked: what is called when a command is answered, by its name
-const page = crypto.randomUUID(); // this page's name, which no other one has
+const page = crypto.getRandomValues(new Uint32Array(4)).join("-"); // this page's name, which no other one has; a page that is not encrypted has no randomUUID
 
 /** A state as this page tells it: what others were refused is theirs to see. */
 function toldHere(state) {

@@ -7,6 +7,7 @@ import { tabsOf } from "../../../../view/template/tabs.js";
 import { axesOf } from "./axes.js";
 import { benchesPanel } from "./benches.js";
 import { clicksOf, press } from "./clicks.js";
+import { devicesPanel } from "./devices.js";
 import { elapsedTimes } from "./elapsed.js";
 import { facetsOf } from "./facets.js";
 import { handlesOf } from "./handles.js";
@@ -53,6 +54,7 @@ function main() {
   elapsedTimes();
   onState(({ stopped }) => notice(stopped, "stopped"));
   benchesPanel();
+  devicesPanel();
   modelPanel();
   sizePanel();
   partsPanel();

@@ -1,0 +1,101 @@
+"""Guard: who is answered here: only pages of this server, under a name of this computer, by an address that holds the token.
+
+Other users of this computer reach its ports too, so the address is secret. A page from elsewhere could reach the server by the
+person's own browser: its Origin is refused, and a name of its own that points here (DNS rebinding) is no name of this computer.
+"""
+
+import re
+import secrets
+from collections.abc import Collection, Iterable, Mapping
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+HOST = "127.0.0.1"
+NAMES = (HOST, "localhost")
+HEADERS = {
+    "cache-control": "no-store",
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+}
+SAFE = ("GET", "HEAD")
+REFUSED_SOCKET = 1008  # policy violation, RFC 6455
+FOREIGN = "this page is for this computer only\n"
+LONG_NUMBER = re.compile(r"/\d{10}\d*(/|$)")  # nothing here has such a one
+UNKNOWN = "the workbench is at the address that tiltprint edit has told, which is another one with each start\n"
+
+Headers = Iterable[tuple[bytes, bytes]]
+
+
+def values_of(headers: Headers, wanted: bytes) -> list[str]:
+    """What stands in all headers of a name, in small letters."""
+    return [value.decode("latin-1") for name, value in headers if name.lower() == wanted]
+
+
+def method_of(scope: Scope) -> str:
+    """Of a request; WEBSOCKET of a websocket."""
+    return "WEBSOCKET" if scope["type"] == "websocket" else scope["method"]
+
+
+def is_foreign(headers: Headers, method: str, own: Collection[str], scheme: str = "http") -> bool:
+    """Whether a request goes to a name that is not the server's own, or comes from a page that is not.
+
+    own: names with the port, in small letters; scheme: of the server's pages.
+    """
+    headers = list(headers)
+    hosts, origins = values_of(headers, b"host"), values_of(headers, b"origin")
+    if len(hosts) != 1 or hosts[0].lower() not in own:
+        return True
+    return bool(origins or method not in SAFE) and origins != [f"{scheme}://{hosts[0].lower()}"]
+
+
+def refusal(headers: Headers, method: str, path: str, token: str, port: int) -> tuple[int, str] | None:
+    """Status and sentence for a request that gets no answer, None for one that does. method: WEBSOCKET for a websocket."""
+    if is_foreign(headers, method, [f"{name}:{port}" for name in NAMES]):
+        return 403, FOREIGN
+    first = path.removeprefix("/").partition("/")[0]
+    if not secrets.compare_digest(first.encode(), token.encode()) or LONG_NUMBER.search(path):
+        return 404, UNKNOWN
+    return None
+
+
+class Guard:
+    """An ASGI application that lets through to another one what may pass, with headers that keep its answers to its pages."""
+
+    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+        self._app, self._token, self._port = app, token, port
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        refused = refusal(scope["headers"], method_of(scope), scope["path"], self._token, self._port)
+        if refused is None:
+            await self._app(scope, receive, with_headers(send))
+        else:
+            await refuse(scope, send, *refused)
+
+
+async def refuse(scope: Scope, send: Send, status: int, sentence: str) -> None:
+    """Answer a request with a sentence alone, a websocket by closing it before it is open."""
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": REFUSED_SOCKET})
+        return
+    start = {"type": "http.response.start", "status": status, "headers": [(b"content-type", b"text/plain; charset=utf-8")]}
+    await with_headers(send)(start)
+    await send({"type": "http.response.body", "body": sentence.encode()})
+
+
+def with_headers(send: Send, headers: Mapping[str, str] = HEADERS) -> Send:
+    """Answers with the headers of ours that they do not have themselves."""
+
+    async def wrapped(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            given = list(message.get("headers", ()))
+            there = {name.lower() for name, _ in given}
+            own = [(name.encode(), value.encode()) for name, value in headers.items() if name.encode() not in there]
+            message = {**message, "headers": [*given, *own]}
+        await send(message)
+
+    return wrapped
