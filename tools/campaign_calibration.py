@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machine.app.printer.prober import PrinterProber, ProbingSession
+from machine.app.commands.measuring.prober import PrinterProber, ProbingSession
 from machine.calibration.fit import calibrate
 from machine.calibration.piece.fit import correct
 from machine.calibration.piece.pads import Piece

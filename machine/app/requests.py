@@ -190,16 +190,23 @@ class CalibrationRequest:
 
 
 @dataclass(frozen=True)
-class ProbeRequest:
-    """A printer that measures a ball by itself. ball_mm: its diameter; offset_mm: from the nozzle's tip to what touches, 0 where
-    the nozzle senses; png: picture of what is left over; log as for a print."""
+class PortRequest:
+    """A printer whose axes are measured; log as for a print."""
 
     port: str
     baud: int = 115200
+    log: Path | None = None
+
+
+@dataclass(frozen=True)
+class ProbeRequest:
+    """A printer that measures a ball by itself. ball_mm: its diameter; offset_mm: from the nozzle's tip to what touches, 0 where
+    the nozzle senses; png: picture of what is left over."""
+
+    at: PortRequest
     ball_mm: float = 20.0
     offset_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     png: Path | None = None
-    log: Path | None = None
 
 
 @dataclass(frozen=True)

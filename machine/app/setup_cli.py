@@ -57,8 +57,8 @@ def calibrate(
 ) -> int:
     """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
 
-    Without -o and --measured a terminal asks for the touches one by one; with --probe the machine measures a ball by itself;
-    with --printed it is read off a piece that was printed.
+    With --port the machine goes from touch to touch and you take the tip onto the mark by keys; with --probe it measures a ball
+    by itself. Without a port a terminal asks for the touches one by one; with --printed they are read off a printed piece.
     """
     from machine.app.commands.measuring.calibrate import ask_for_touches, evaluate_sheet, write_program
 
@@ -83,8 +83,16 @@ def calibrate(
         if out is not None or measured is not None:
             raise typer.BadParameter("--probe measures by itself: -o and --measured are for touches by hand")
         return probe_axes(request, probing.request(), machine_profile(machine, settings))
-    if probing.port is not None or probing.png is not None:
-        raise typer.BadParameter("--port and --png go with --probe")
+    if probing.png is not None:
+        raise typer.BadParameter("--png goes with --probe")
+    if probing.at is not None:
+        from machine.app.commands.measuring.calibrate_by_keys import touch_by_keys
+
+        if out is not None or measured is not None:
+            raise typer.BadParameter(
+                "--port takes the machine to the touches: -o and --measured are for a program sent otherwise"
+            )
+        return touch_by_keys(request, probing.at, machine_profile(machine, settings))
     if out is not None and measured is None:
         return write_program(request, machine_profile(machine, settings), out)
     if measured is not None and out is None:

@@ -51,7 +51,7 @@ def plan_touches(machine: Machine, mark_height_mm: float, mark_radius_mm: float 
     tilts = _tilts(machine, mark)
     turns = turns_deg(machine)
     poses = tuple(Pose(tilt, value) for tilt in (machine.tilt.zero_deg, *tilts) for value in turns)
-    expected = tuple(_expected_mm(machine, pose, mark) for pose in poses)
+    expected = tuple(expected_mm(machine, pose, mark) for pose in poses)
     return TouchPlan(poses, expected, safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
 
 
@@ -83,7 +83,7 @@ def calibration_lines(profile: Profile, touches: TouchPlan) -> Iterator[str]:
         yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
         yield from turn_lines(pose, pen)
         yield f"G1 X{x:.3f} Y{y:.3f} F{across:.0f}"
-        yield f"G1 Z{_hover(machine, z, touches.safe_z_mm):.3f} F{up:.0f}"
+        yield f"G1 Z{hover_z_mm(machine, z, touches.safe_z_mm):.3f} F{up:.0f}"
         yield from (line.format(text=f"touch {index} {name} note X Y Z") for line in dialect.wait_for_person)
     yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
     yield from turn_lines(level(machine), pen)
@@ -125,10 +125,14 @@ def _fill(block: str, pen: Pen) -> list[str]:
     return fill_block(block, BLOCKS[0], pen.values, pen.dialect.longest_line)
 
 
-def _hover(machine: Machine, expected_z_mm: float, safe_z_mm: float) -> float:
+def unsure_signs(machine: Machine) -> tuple[str, ...]:
+    """The rotary axes of which nobody knows yet which way they turn."""
+    return tuple(axis for axis in ("tilt", "turn") if f"machine.{axis}.sign" in machine.uncalibrated)
+
+
+def hover_z_mm(machine: Machine, expected_z_mm: float, safe_z_mm: float) -> float:
     """Over the mark where it is expected; at the safe height while a sign may be wrong and the mark on the other side."""
-    unsure = any(key.endswith(".sign") for key in machine.uncalibrated)
-    return safe_z_mm if unsure else min(safe_z_mm, expected_z_mm + ABOVE_MM)
+    return safe_z_mm if unsure_signs(machine) else min(safe_z_mm, expected_z_mm + ABOVE_MM)
 
 
 def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, float]:
@@ -158,7 +162,7 @@ def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: flo
     if least_tip_height_mm(clipped_head(machine, mark), Pose(tilt_deg, machine.turn.zero_deg)) > mark[2]:
         return False
     limits = np.array([axis.limits_mm for axis in (machine.x, machine.y, machine.z)])
-    places = np.array([_expected_mm(machine, Pose(tilt_deg, value), mark) for value in turns_deg(machine)])
+    places = np.array([expected_mm(machine, Pose(tilt_deg, value), mark) for value in turns_deg(machine)])
     return bool((places >= limits[:, 0]).all() and (places <= limits[:, 1]).all())
 
 
@@ -182,7 +186,8 @@ def turns_deg(machine: Machine) -> list[float]:
     return [value for value in inside if value is not None]
 
 
-def _expected_mm(machine: Machine, pose: Pose, mark: tuple[float, float, float]) -> tuple[float, float, float]:
+def expected_mm(machine: Machine, pose: Pose, mark: tuple[float, float, float]) -> tuple[float, float, float]:
+    """X Y Z at which the tip touches a mark at a pose."""
     x, y, z = machine_points(machine, pose, np.array([mark]))[0].tolist()
     return x, y, z
 

@@ -5,8 +5,9 @@ import re
 import select
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from time import monotonic
+from types import MappingProxyType
 from typing import Any, Self
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
@@ -100,11 +101,12 @@ _ACTS: dict[str, Callable[[Keyboard], None]] = {
 class Typing:
     """`with Typing(press):` keys go to press() from a thread of its own; the terminal is as before afterwards.
 
-    Ctrl-C still interrupts; Ctrl-Z is switched off, for a stopped sender leaves a hot nozzle standing on the print.
+    named: by its sequence the key that an arrow or function key counts as; others are none. Ctrl-C still interrupts; Ctrl-Z is
+    switched off, for a stopped sender leaves a hot nozzle standing on the print.
     """
 
-    def __init__(self, press: Callable[[str], None]) -> None:
-        self._press = press
+    def __init__(self, press: Callable[[str], None], named: Mapping[bytes, bytes] = MappingProxyType({})) -> None:
+        self._press, self._named = press, named
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
@@ -147,7 +149,7 @@ class Typing:
                 return
             if not typed:
                 return
-            typed = SEQUENCE.sub(b"", begun + typed)
+            typed = SEQUENCE.sub(lambda sequence: self._named.get(sequence[0], b""), begun + typed)
             half = BEGUN.search(typed)
             begun = half[0] if half else b""
             for key in typed.removesuffix(begun).decode("ascii", "ignore"):
@@ -180,10 +182,10 @@ class ConsoleTyping:
                     self._press(key)
 
 
-def typing(press: Callable[[str], None]) -> "Typing | ConsoleTyping":
-    """What hands keys to press() on this system."""
+def typing(press: Callable[[str], None], named: Mapping[bytes, bytes] = MappingProxyType({})) -> "Typing | ConsoleTyping":
+    """What hands keys to press() on this system; named: as Typing takes it."""
     console = _windows_console()
-    return Typing(press) if console is None else ConsoleTyping(press, console)
+    return Typing(press, named) if console is None else ConsoleTyping(press, console)
 
 
 def can_type() -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from machine.app.requests import Cuts, Given, ModelRequest, ProbeRequest
+from machine.app.requests import Cuts, Given, ModelRequest, PortRequest, ProbeRequest
 
 if TYPE_CHECKING:
     from profiles.profile import Profile
@@ -183,7 +183,8 @@ class ProbeOptions:
 
     probe: Annotated[bool, typer.Option("--probe", help="the machine at --port measures a ball on its plate by itself")] = False
     port: Annotated[
-        str | None, typer.Option("--port", metavar="PORT|sim", help="of --probe: serial port; sim: the simulated printer")
+        str | None,
+        typer.Option("--port", metavar="PORT|sim", help="serial port of the machine to measure; sim: simulated"),
     ] = None
     baud: Baud = 115200
     ball_mm: Annotated[float, typer.Option("--ball-mm", metavar="MM", min=4, max=60, help="diameter of the ball")] = 20.0
@@ -194,9 +195,14 @@ class ProbeOptions:
     png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="of --probe: picture of what is left over")] = None
     log: LogFile = None
 
+    @property
+    def at(self) -> PortRequest | None:
+        """The printer at --port, None: there is none."""
+        return None if self.port is None else PortRequest(self.port, self.baud, self.log)
+
     def request(self) -> ProbeRequest:
         """What is asked for with --probe; raises BadParameter."""
-        if self.port is None:
+        if self.at is None:
             raise typer.BadParameter("--probe needs --port PORT, or sim for the simulated printer")
         try:
             x, y, z = (float(word) for word in self.probe_offset.split(","))
@@ -204,4 +210,4 @@ class ProbeOptions:
             raise typer.BadParameter(f"--probe-offset {self.probe_offset}: three numbers X,Y,Z in mm are expected") from None
         if not all(-200.0 <= value <= 200.0 for value in (x, y, z)):
             raise typer.BadParameter(f"--probe-offset {self.probe_offset}: -200 to 200 mm are allowed")
-        return ProbeRequest(self.port, self.baud, self.ball_mm, (x, y, z), self.png, self.log)
+        return ProbeRequest(self.at, self.ball_mm, (x, y, z), self.png)

@@ -25,7 +25,7 @@ def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> i
     for file in (out, sheet):
         check_writable(file)
         refuse_to_overwrite(file, request.replace)
-    height = _mark_height_mm(request)
+    height = mark_height_mm(request)
     touches = plan_touches(profile.machine, height, request.mark_radius_mm)
     write_lines(out, calibration_lines(profile, touches))
     write_bytes(sheet, sheet_text(request.machine, profile.machine, touches).encode())
@@ -45,7 +45,7 @@ def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
     sheet = read_sheet(measured, request.mark_height_mm)
     if sheet.machine not in (None, name):
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
-    calibration, off = _calibrated(request, machine, sheet)
+    calibration, off = judged(request, machine, sheet)
     if off:
         raise ProfileError(f"{off}: look at touch {calibration.worst} first")
     save_calibration(request, machine, calibration, sheet.mark_angle_deg is not None)
@@ -60,7 +60,7 @@ def ask_for_touches(request: CalibrationRequest) -> int:
 
     def judge(sheet: Sheet) -> str | int | None:
         try:
-            calibration, off = _calibrated(request, machine, sheet)
+            calibration, off = judged(request, machine, sheet)
         except ProfileError as error:  # the person is asked again
             return str(error)
         if off:
@@ -69,12 +69,13 @@ def ask_for_touches(request: CalibrationRequest) -> int:
         accepted.append(calibration)
         return None
 
-    sheet = ask_touches(name, machine, _mark_height_mm(request), request.mark_radius_mm, judge)
+    sheet = ask_touches(name, machine, mark_height_mm(request), request.mark_radius_mm, judge)
     save_calibration(request, machine, accepted[-1], sheet.mark_angle_deg is not None)
     return 0
 
 
-def _mark_height_mm(request: CalibrationRequest) -> float:
+def mark_height_mm(request: CalibrationRequest) -> float:
+    """As asked for, or the usual one."""
     return MARK_HEIGHT_MM if request.mark_height_mm is None else request.mark_height_mm
 
 
@@ -88,7 +89,7 @@ def tilting_machine(request: CalibrationRequest) -> Machine:
     return machine
 
 
-def _calibrated(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple[Calibration, str]:
+def judged(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple[Calibration, str]:
     """What follows from the touches, which is shown, and why it is not taken; "" when it is."""
     calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg, request.directions)
     show(comparison(machine, calibration, sheet.mark_angle_deg is not None))

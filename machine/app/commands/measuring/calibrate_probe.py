@@ -1,20 +1,15 @@
 """Calibrate by probe: the machine at a port measures a ball on its own plate, and its axes follow from that."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from math import inf
 from pathlib import Path
 
+from machine.app.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
 from machine.app.commands.measuring.calibrate import MOST_OFF_MM, comparison, save_calibration, tilting_machine
 from machine.app.commands.measuring.calibrate_dialogue import read_reply
+from machine.app.commands.measuring.prober import PrinterProber, ProbingSession
 from machine.app.output import check_writable, refuse_to_overwrite
-from machine.app.printer.compatibility import check_machine, describe_answer, identify_printer
-from machine.app.printer.prober import HOT_C, PrinterProber, ProbingSession
-from machine.app.printer.serial_log import TappedWire, new_log
 from machine.app.printer.server_checks import check_no_server
-from machine.app.requests import SIMULATED, CalibrationRequest, ProbeRequest
-from machine.app.terminal.interrupts import interrupting
+from machine.app.requests import CalibrationRequest, ProbeRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.calibration.fit import Calibration, calibrate
@@ -24,11 +19,9 @@ from machine.calibration.program import calibration_pen, usual_radius_mm
 from machine.calibration.saved import own_profile
 from machine.firmware import dialect_of, firmware_of
 from machine.firmware.probing import ProbingRules
-from machine.link.port import open_port
 from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.contact.surface import TrueBall
-from machine.simulator.simulator import SimulatedPrinter
-from profiles.errors import PrinterError, ProfileError, UserError
+from profiles.errors import PrinterError, ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -42,15 +35,15 @@ PLACE = (
 def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Profile) -> int:
     """Measure, tell what follows, save it as calibrate saves. Raises UserError, the tip raised and nothing saved."""
     machine, name = tilting_machine(request), Path(request.machine).stem
-    check_no_server(probing.port)
+    check_no_server(probing.at.port)
     refuse_to_overwrite(own_profile("machine", request.save or name, request.machine, {})[0], request.replace)
     if probing.png is not None:
         check_writable(probing.png)
     ball, probe = _ball(request, probing, machine), _probe(probing, machine)
-    with _session(probing, machine, ball, probe) as session:
+    with cold_session(probing.at, machine, _table(machine, ball, probe)) as session:
         prober = PrinterProber(session, calibration_pen(profile), _rules(machine), probe.offset_mm[2])
         measuring = Measuring(machine, ball, prober, probe, say)
-        with _tip_raised_after(prober):
+        with tip_raised_after(prober):
             _begin(session, prober, machine, ball)
             touches = measuring.run()
     calibration = calibrate(machine, touches, ball.centre_mm[2], directions=True)
@@ -104,56 +97,15 @@ def _rules(machine: Machine) -> ProbingRules:
     return rules
 
 
-@contextmanager
-def _session(probing: ProbeRequest, machine: Machine, ball: Ball, probe: Probe) -> Iterator[ProbingSession]:
-    """A conversation with the machine at the port, or with the simulated one."""
-    with ExitStack() as stack:
-        path = probing.port
-        if path == SIMULATED:
-            table = ProbedTable(
-                machine,
-                TrueBall(ball.radius_mm, ball.centre_mm),
-                offset_mm=probe.offset_mm,
-                flat_mm=probe.flat_mm,
-                noise_mm=NOISE_MM,
-            )
-            path = stack.enter_context(SimulatedPrinter(machine, inf, table=table)).path
-        log = stack.enter_context(new_log("calibrate", f"calibrate at {probing.port}", probing.log))
-        wire = stack.enter_context(open_port(path, probing.baud))
-        if log.trouble:
-            say(f"the traffic is not logged: {log.file}: {log.trouble}")
-        stack.enter_context(interrupting())
-        answer = identify_printer(wire, probing.baud)
-        say(describe_answer(answer, probing.baud))
-        check_machine(answer, machine, False)
-        session = ProbingSession(TappedWire(wire, log.note), dialect_of(machine).longest_line)
-        session.greet()
-        yield session
-
-
-@contextmanager
-def _tip_raised_after(prober: PrinterProber) -> Iterator[None]:
-    """Raise the tip whatever has gone wrong, and say so."""
-    try:
-        yield
-    except UserError as error:
-        prober.retreat()
-        raise type(error)(f"{error}; {prober.raised}nothing is saved") from None
-    except KeyboardInterrupt:
-        prober.retreat()
-        say(f"interrupted: {prober.raised}nothing is saved, the table stands as it stood")
-        raise
+def _table(machine: Machine, ball: Ball, probe: Probe) -> ProbedTable:
+    """What a simulated printer has on its plate."""
+    there = TrueBall(ball.radius_mm, ball.centre_mm)
+    return ProbedTable(machine, there, offset_mm=probe.offset_mm, flat_mm=probe.flat_mm, noise_mm=NOISE_MM)
 
 
 def _begin(session: ProbingSession, prober: PrinterProber, machine: Machine, ball: Ball) -> None:
     """Cold and homed, with a person's word that the ball stands there."""
-    if hot := session.heated():
-        say(f"{hot}: switched off, measuring is done cold")
-        session.switch_off()
-    if (nozzle_c := session.nozzle_c()) > HOT_C:
-        say(f"the nozzle is {nozzle_c:.0f} deg C hot: plastic that hangs from it falsifies every contact")
-    prober.start()
-    prober.rise(machine.z.limits_mm[1])
+    begin_cold(session, prober, machine)
     if not _rules(machine).limited:
         say(f"{dialect_of(machine).firmware} probes down to the axis' end where nothing is met: keep a hand at the switch")
     place = PLACE.format(diameter=2.0 * ball.radius_mm, height=ball.centre_mm[2], radius=ball.centre_mm[0])

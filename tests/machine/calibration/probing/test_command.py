@@ -81,7 +81,7 @@ def test_a_printer_without_the_command_is_told_what_it_needs(capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--port", "sim"], "--port and --png go with --probe"),
+        (["--port", "sim", "--png", "left.png"], "--png goes with --probe"),
         (["--probe"], "--probe needs --port PORT"),
         (["--probe", "--port", "sim", "--probe-offset", "1,2"], "three numbers X,Y,Z in mm are expected"),
         (["--probe", "--port", "sim", "-o", "touch.gcode"], "-o and --measured are for touches by hand"),

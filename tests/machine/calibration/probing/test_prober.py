@@ -2,7 +2,7 @@
 
 import pytest
 
-from machine.app.printer.prober import PrinterProber
+from machine.app.commands.measuring.prober import PrinterProber
 from machine.calibration.program import calibration_pen
 from machine.firmware import firmware_of
 from profiles.errors import FirmwareError, PrinterError

@@ -1,23 +1,18 @@
 """Prober: a printer at the other end of a command session that is told to move, and to seek contact along Z."""
 
 import re
-from contextlib import suppress
 
+from machine.app.commands.measuring.mover import PrinterMover
 from machine.app.printer.command_session import CommandSession
-from machine.calibration.program import cold_start, turn_lines
 from machine.firmware.probing import ProbingRules
 from machine.gcode.pen import Pen
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.protocol.events import Echo, Event, Unknown
 from machine.link.protocol.framing import LINE_LIMIT
-from machine.link.shutdown import lift_tip
-from mdp.pose import Pose
 from profiles.errors import FirmwareError, PrinterError
 
 SEEK_MM_S = 3.0
-CROSS_MM_S = 100.0
 TOLD_MM = 0.006  # what M114 rounds to hundredths of a mm
-HOT_C = 50.0  # a nozzle from which plastic may hang
 
 
 class ProbingSession(CommandSession):
@@ -38,41 +33,16 @@ class ProbingSession(CommandSession):
             self.heard.append(event.text)
 
 
-class PrinterProber:
-    """Implements machine.calibration.probing.measure.Prober. offset_z_mm: from the nozzle's tip to what touches.
-
-    z_mm: where the tip is.
-    """
+class PrinterProber(PrinterMover):
+    """Implements machine.calibration.probing.measure.Prober. offset_z_mm: from the nozzle's tip to what touches."""
 
     def __init__(self, session: ProbingSession, pen: Pen, rules: ProbingRules, offset_z_mm: float = 0.0) -> None:
-        self._session, self._pen, self._rules, self._offset_z_mm = session, pen, rules, offset_z_mm
-        self._up = 60.0 * pen.machine.z.speed_mm_s
-        self._across = 60.0 * min(pen.machine.x.speed_mm_s, pen.machine.y.speed_mm_s, CROSS_MM_S)
-        self.z_mm = 0.0
-        self._top: float | None = None  # the greatest height it has been sent to; None: it has not been homed
-
-    def start(self) -> None:
-        """Home as the profile's start block does, without heat."""
-        for line in cold_start(self._pen):
-            self._session.command(line)
-
-    def turn(self, pose: Pose) -> None:
-        """Turn the table, the head standing still."""
-        for line in turn_lines(pose, self._pen):
-            self._session.command(line)
-
-    def rise(self, z_mm: float) -> None:
-        """Bring the tip to a height."""
-        self._session.command(f"G1 Z{z_mm:.3f} F{self._up:.0f}")
-        self.z_mm, self._top = z_mm, z_mm if self._top is None else max(self._top, z_mm)
-
-    def cross(self, x_mm: float, y_mm: float) -> None:
-        """Bring the tip over a place."""
-        self._session.command(f"G1 X{x_mm:.3f} Y{y_mm:.3f} F{self._across:.0f}")
+        super().__init__(session, pen)
+        self._probing, self._rules, self._offset_z_mm = session, rules, offset_z_mm
 
     def seek(self, low_mm: float) -> float | None:
         """The tip's Z at contact on the way down to a height; None: there was none."""
-        session, rules = self._session, self._rules
+        session, rules = self._probing, self._rules
         session.heard.clear()
         began, self.z_mm = self.z_mm, low_mm if rules.limited else self._pen.machine.z.limits_mm[0]
         try:
@@ -83,23 +53,6 @@ class PrinterProber:
             raise PrinterError(f"the printer does not know {session.unknown[0]!r}: {rules.needs} is needed")
         self.z_mm = self._answered() if rules.contact else self._stopped()
         return None if rules.limited and self.z_mm <= low_mm + TOLD_MM else self.z_mm
-
-    @property
-    def raised(self) -> str:
-        """What retreat() has done, as words before others."""
-        return "" if self._top is None else "the tip is raised, "
-
-    def retreat(self) -> None:
-        """After an error: the tip up to the greatest height it has been at, whatever the printer is able to hear."""
-        if self._top is None:
-            return
-        try:
-            self.rise(self._top)
-            self._session.exchange.drain()
-        except PrinterError:
-            exchange = self._session.exchange
-            with suppress(PrinterError):
-                lift_tip(exchange.wire, exchange.medium, f"Z{self._top - self.z_mm:.3f}", self._up, lambda: None)
 
     def _said_by(self, error: FirmwareError, began_mm: float) -> float | None:
         """What an error of the firmware's own means for the contact."""
@@ -118,7 +71,7 @@ class PrinterProber:
 
     def _answered(self) -> float:
         """The tip's Z that the firmware has answered."""
-        text = "\n".join(self._session.heard)
+        text = "\n".join(self._probing.heard)
         if corrected := re.search(self._rules.corrected, text):
             return float(corrected[1]) - self._offset_z_mm
         if contact := re.search(self._rules.contact, text):
