@@ -201,8 +201,8 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
         refused = page.until(lambda state: state["problem"])
         assert refused["problem"].startswith("part 2 cannot be cut off: its plane misses the model")
         page.do("move", part=2, normal=[1, 0, 0], offset_mm=9.5)
-        page.until(lambda state: state["undo"] == "move a plane")
-        page.do("lock", part=2, locked=True)
+        page.do("lock", part=2, locked=True)  # while the move is under way
+        page.until(lambda state: state["locked"] == [True])
         page.do("search")
         searched = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
         assert (searched["cuts"][-1], searched["locked"][-1]) == ({"normal": [1.0, 0.0, 0.0], "offset_mm": 9.5}, True)
