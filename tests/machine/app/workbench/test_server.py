@@ -52,6 +52,10 @@ def test_a_line_from_another_origin_or_without_the_token_is_refused(bench: Runni
     assert refused.value.response.status_code == 403
 
 
+def test_to_ask_for_a_model_that_has_gone_from_the_bench_is_no_fault_of_a_page(bench: Running) -> None:
+    assert bench.ask("model/another") == (204, b"")
+
+
 def test_a_broken_model_is_told_as_the_command_line_tells_it(
     bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
