@@ -22,8 +22,9 @@ SLIPPED = """(({ add, scaled, sub, unit }, { faceMet }) => { let seed = 7;
     return faceMet({ corners: [a, b, c, b, a, d].flat(), count: 2 }, from, unit(sub(on, from)));
   }).filter((face) => face < 0).length; })(modules["template/math"], modules["page/triangles"])"""
 MENU = ["Remove", "Lock", "Print earlier", "Print later", "Settings of this part"]
-# A key of the page's, whatever has the focus then.
-DELETE = "document.body.dispatchEvent(new KeyboardEvent('keydown', { key: 'Delete', bubbles: true }))"
+# The key comes before the page is drawn anew, which is when a browser takes the focus from what is hidden.
+LOCK_AND_DELETE = """{ document.querySelector('#part-menu button:nth-child(2)').click();
+  document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { key: 'Delete', bubbles: true })); }"""
 MENU_OF = """((part) => document.querySelector(`#parts-list tr:has([value="${part}"])`)
   .dispatchEvent(new MouseEvent("contextmenu", { bubbles: true, cancelable: true, clientX: 50, clientY: 50 })))"""
 TURNED = "$('undo').getAttribute('aria-label') === 'undo: turn the model'"
@@ -117,13 +118,12 @@ def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser:
     browser.click("#parts-list input[value='1']")
     browser.value(f"{MENU_OF}(2)")
     assert browser.value("[...$('part-menu').children].map((entry) => entry.textContent)") == MENU
-    browser.click("#part-menu button:nth-child(2)")
+    browser.value(LOCK_AND_DELETE)
     browser.wait("$('parts-list').querySelectorAll('[type=checkbox]:checked').length === 1 && $('part-menu').hidden")
-    browser.value(DELETE)
     browser.wait("$('problem').textContent === 'the plane of part 2 is locked: unlock it first'")
     browser.click("#undo")
     browser.wait("$('problem').hidden && $('parts-list').querySelectorAll('[type=checkbox]:checked').length === 0")
-    browser.value(DELETE)
+    browser.key("Delete")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: remove a plane'")
     assert browser.value("$('parts-list').querySelectorAll('tbody tr').length") == 1
 

@@ -300,7 +300,7 @@ def test_a_model_that_was_another_one_when_it_was_asked_for_is_asked_for_again(b
     browser.open(bench.address)
     browser.wait("document.documentElement.dataset.version")
     late = (
-        "(at, ...more) => `${at}`.startsWith('model/') && late-- > 0 ? new Response(null, { status: 404 }) : asking(at, ...more)"
+        "(at, ...more) => `${at}`.startsWith('model/') && late-- > 0 ? new Response(null, { status: 204 }) : asking(at, ...more)"
     )
     browser.value(f"{{ window.late = 2; const asking = window.fetch; window.fetch = async {late}; }}")
     choose(browser, "tee.stl", stl(tee()))

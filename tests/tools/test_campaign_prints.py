@@ -112,11 +112,11 @@ def test_a_campaign_that_is_started_again_runs_what_is_missing(tmp_path: Path, m
     out = tmp_path / "out"
     monkeypatch.setattr("tools.campaign_prints.warm_up", lambda limits: None)
     for count in ("1", "2", "2"):
-        arguments = ["--forms", "24", "--varied-share", "0", "--only", "threads", "--sample", count]
+        arguments = ["--forms", "24", "--varied-share", "0", "--only", "stairs", "--sample", count]
         monkeypatch.setattr("sys.argv", ["campaign", str(out), *arguments])
         main()
     names = [record["name"] for record in read(out / "runs.jsonl")]
-    assert names == [run.name for run in all_runs({}, 24, 0.0) if "threads" in run.name][:2]
+    assert names == [run.name for run in all_runs({}, 24, 0.0) if "stairs" in run.name][:2]
     assert "| forms | 2 | 2 (100.0%) |" in (out / "table.md").read_text()
 
 

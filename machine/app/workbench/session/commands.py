@@ -71,6 +71,10 @@ def _place(word: str, orders: Callable[[Bench, Asked], list[tuple[Cuts, int]]]) 
     return Command(Need.MODEL, act)
 
 
+def _lock(session: Session, asked: Asked) -> Work:
+    return session.trials.after_edits(lambda: session.do("lock a plane", lock(session.bench, asked)))
+
+
 def _marks(task: str) -> Command:
     return Command(Need.MODEL, lambda session, asked: session.marking.take(task, asked))
 
@@ -123,7 +127,7 @@ COMMANDS: dict[str, Command] = {
     "remove": _planes("remove a plane", remove_plane),
     "reorder": _planes("print a part at another time", reorder, _too_early),
     "neck": Command(Need.MODEL, lambda session, asked: session.trials.take_neck(asked)),
-    "lock": _change("lock a plane", lock),
+    "lock": Command(Need.MODEL, _lock),
     "mark": _marks("mark"),
     "unmark": _marks("unmark"),
     "add_stop": _change("add a pause", add_stop),

@@ -17,8 +17,9 @@ BY_DEFAULT = SearchWay()
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A search under way: the bench that it began with, and how far it is."""
+    """A search under way: its number, the bench that it began with, and how far it is."""
 
+    number: int
     bench: Bench
     searched: Searched
 
@@ -39,6 +40,7 @@ class Finding:
         self.notes: tuple[str, ...] = ()
         self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
         self._session = session
+        self._count = 0
         self._task: asyncio.Task[None] | None = None
         self._pricing: asyncio.Task[None] | None = None  # of the best of a search that was stopped
         session.followers.append(self._follow)
@@ -49,8 +51,10 @@ class Finding:
         if self.search is None:
             if self._pricing is not None:
                 self._pricing.cancel()
-            self.search = Search(bench, Searched(WAITING if self._session.long.pool.full else "beginning"))
-            self._task = self._session.start(self._find(bench, way))
+            self._count += 1
+            begins = WAITING if self._session.long.pool.full else "beginning"
+            self.search = Search(self._count, bench, Searched(begins))
+            self._task = self._session.start(self._find(self.search, way))
 
     def stop(self) -> str:
         """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known.
@@ -67,22 +71,26 @@ class Finding:
         self._pricing = self._session.start(self._price(self._session.bench))
         return f"The search was stopped, and the best so far is taken: {best.parts} parts."
 
-    async def _find(self, bench: Bench, way: SearchWay) -> None:
+    async def _find(self, begun: Search, way: SearchWay) -> None:
         def follow(searched: Searched) -> None:
-            if self.search is not None and self.search.bench is bench:
-                self.search = Search(bench, searched)
+            if self._is_under_way(begun):
+                self.search = replace(begun, searched=searched)
                 self._session.notify()
 
         try:
-            outcome: Found = await self._session.long.run("find_parts", bench, way, tell=follow)
+            outcome: Found = await self._session.long.run("find_parts", begun.bench, way, tell=follow)
             self.notes = outcome.notes
             now = self._session.bench
             laid = now if outcome.turn is None else with_rotation(now, (outcome.turn @ np.array(now.rotation)).tolist())
             self.laid = None if laid is now else (now.rotation, laid.rotation)
             self._session.do("find parts", with_front(laid, outcome.front))
         finally:
-            if self.search is not None and self.search.bench is bench:
+            if self._is_under_way(begun):
                 self.search = None
+
+    def _is_under_way(self, begun: Search) -> bool:
+        """Whether a search is still the one: another one may have begun with the same bench as soon as it was stopped."""
+        return self.search is not None and self.search.number == begun.number
 
     async def _price(self, taken: Bench) -> None:
         rows = await self._session.long.run("measure_plan", taken, plan_of_bench(taken, "the search"))

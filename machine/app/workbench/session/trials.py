@@ -78,6 +78,11 @@ class PlaneTrials:
             self.trial = now, cuts, trial
             self._session.do(word, with_cuts(now, cuts))
 
+    async def after_edits(self, act: Callable[[], None]) -> None:
+        """Do something to the planes that the edits asked for before leave."""
+        async with self._edits:
+            act()
+
     async def take_neck(self, asked: Asked) -> None:
         """Take the neck near the plane of a `part`. Raises PlanError where there is none, or it cannot be cut."""
         bench = self._session.bench

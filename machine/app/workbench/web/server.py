@@ -158,7 +158,7 @@ def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
 async def _model(session: Session, request: Request) -> Response:
     model = session.bench.model
     if model is None or model.key != request.path_params["key"]:
-        return Response("this model is not on the workbench any more\n", 404)
+        return Response(status_code=204)  # there is another one by now, which the page asks for next
     return FileResponse(model.mesh_file, media_type="application/octet-stream")
 
 

@@ -52,6 +52,10 @@ def test_a_line_from_another_origin_or_without_the_token_is_refused(bench: Runni
     assert refused.value.response.status_code == 403
 
 
+def test_to_ask_for_a_model_that_has_gone_from_the_bench_is_no_fault_of_a_page(bench: Running) -> None:
+    assert bench.ask("model/another") == (204, b"")
+
+
 def test_a_broken_model_is_told_as_the_command_line_tells_it(
     bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -207,8 +211,8 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
         refused = page.until(lambda state: state["problem"])
         assert refused["problem"].startswith("part 2 cannot be cut off: its plane misses the model")
         page.do("move", part=2, normal=[1, 0, 0], offset_mm=9.5)
-        page.until(lambda state: state["undo"] == "move a plane")
-        page.do("lock", part=2, locked=True)
+        page.do("lock", part=2, locked=True)  # while the move is under way
+        page.until(lambda state: state["locked"] == [True])
         page.do("search")
         searched = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
         assert (searched["cuts"][-1], searched["locked"][-1]) == ({"normal": [1.0, 0.0, 0.0], "offset_mm": 9.5}, True)

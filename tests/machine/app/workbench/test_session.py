@@ -18,7 +18,7 @@ from machine.app.workbench.session.base import hear_from
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.finding import Search
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.work.cutting import Searched
+from machine.app.workbench.work.cutting import Found, Searched
 from machine.app.workbench.work.standing import Standing
 from machine.app.workbench.work.tasks import TASKS
 from machine.app.workbench.work.worker_pool import WorkerPools
@@ -60,6 +60,12 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
         return session
 
     return asyncio.run(asyncio.wait_for(run(), 20.0))
+
+
+def under_way(session: Session) -> Search:
+    """The search that a session has under way."""
+    assert session.finding.search is not None
+    return session.finding.search
 
 
 async def settled(session: Session) -> None:
@@ -134,6 +140,21 @@ def test_an_edit_whose_bench_is_another_one_meanwhile_is_not_done_and_says_so() 
     assert session.problem == "add a plane: what lies on the workbench has changed meanwhile, so it was not done"
 
 
+@pytest.mark.parametrize("turns", range(4))  # of the loop between the two commands
+def test_a_plane_that_is_locked_while_it_is_moved_is_locked_where_it_comes_to_stand(turns: int) -> None:
+    async def work(session: Session) -> None:
+        obey(session, {"do": "add", "normal": [*UP], "offset_mm": 5, "after": 1})
+        await settled(session)
+        obey(session, {"do": "move", "part": 2, "normal": [*UP], "offset_mm": 9})
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        obey(session, {"do": "lock", "part": 2, "locked": True})
+
+    session = when_done(work)
+    assert session.bench.locked == {PlannedPart(UP, 9.0)}
+    assert session.problem == ""
+
+
 def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
     async def work(session: Session) -> None:
         scales = []
@@ -166,7 +187,7 @@ def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_tol
         session.long.run = price  # type: ignore[method-assign]
         session.finding.begin()
         await asyncio.sleep(0)
-        session.finding.search = Search(session.bench, Searched("", best))
+        session.finding.search = replace(under_way(session), searched=Searched("", best))
         session.finding.stop()
         assert (session.bench.cuts, session.bench.rows[0].time_s) == ((PlannedPart(UP, 5.0),), None)
 
@@ -280,8 +301,7 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
         for best in (None, FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0)):
             obey(session, {"do": "search"})
             await asyncio.sleep(0)
-            assert session.finding.search is not None
-            session.finding.search = Search(session.bench, Searched("stage 1", best))
+            session.finding.search = replace(under_way(session), searched=Searched("stage 1", best))
             obey(session, {"do": "stop"})
             told.append(session.stopped)
             await settled(session)
@@ -294,3 +314,26 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
         "The search was stopped, and the best so far is taken: 2 parts.",
         "",
     ]
+
+
+def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on() -> None:
+    found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
+
+    async def work(session: Session) -> None:
+        async def find(task: str, *given: Any, **more: Any) -> Any:
+            for _ in range(5):
+                await asyncio.sleep(0)
+            return Found((found,), ())
+
+        session.long.run = find  # type: ignore[method-assign]
+        session.long.warm = partial(asyncio.sleep, 0)  # type: ignore[method-assign]
+        obey(session, {"do": "search"})
+        await asyncio.sleep(0)
+        obey(session, {"do": "stop"})
+        obey(session, {"do": "search"})
+        for _ in range(3):  # the end of the one that was stopped comes meanwhile
+            await asyncio.sleep(0)
+        assert session.finding.search is not None
+
+    session = when_done(work)
+    assert (session.bench.parts, session.finding.search) == (2, None)

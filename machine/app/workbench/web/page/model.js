@@ -22,12 +22,12 @@ export async function fetchModel(model, picture, again) {
   let triangles = null;
   if (model?.drawn) {
     if (model.faces > MANY_FACES) notice(`${model.faces.toLocaleString("en")} faces are on their way into the picture …`, "model");
-    const answer = await fetch(`model/${model.key}`).catch(() => null), content = answer?.ok ? await answer.arrayBuffer().catch(() => null) : null;
+    const answer = await fetch(`model/${model.key}`).catch(() => null), content = answer?.status === 200 ? await answer.arrayBuffer().catch(() => null) : null;
     if (key !== model.key) return;
     if (!content) {
       key = ""; // the next state asks again, as that of a line that is back
       picture?.show(null);
-      if (!answer || answer.ok) return notice(MISSING, "model");
+      if (answer?.status !== 204) return notice(MISSING, "model");
       return void setTimeout(() => { if (!key) again(); }, AGAIN_MS); // another model lies there by now
     }
     triangles = trianglesFrom(content);

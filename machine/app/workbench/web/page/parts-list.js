@@ -79,7 +79,11 @@ export function openMenu(part, x, y) {
   if (!store.state.parts) return;
   choosePart(part);
   const menu = $("part-menu"), back = document.activeElement;
-  const close = (act) => { menu.hidden = true; if (act) act(); else if (back?.isConnected) back.focus(); };
+  const close = (act) => {
+    menu.hidden = true;
+    if (back?.isConnected) back.focus();
+    act?.();
+  };
   menu.replaceChildren(...entriesOf(part).map(([text, can, act]) => made("button", { type: "button", role: "menuitem", text, disabled: !can, onclick: () => close(act) })));
   menu.ariaLabel = `Part ${part}`;
   menu.close = close;
@@ -93,6 +97,7 @@ function menuKeys() {
   const menu = $("part-menu");
   addEventListener("pointerdown", ({ target }) => { if (!menu.hidden && !menu.contains(target)) menu.hidden = true; }, true);
   menu.addEventListener("keydown", (event) => {
+    if (menu.hidden) return; // an entry keeps the focus until the page is drawn anew: that key is the page's
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key], all = [...menu.querySelectorAll("button:enabled")];
     if (step) all[(all.indexOf(document.activeElement) + step + all.length) % all.length].focus();
     if (["Escape", "Tab"].includes(event.key)) menu.close();
