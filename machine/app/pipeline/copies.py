@@ -25,7 +25,7 @@ def check_copies(count: int) -> None:
 
 
 def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tuple[Decomposition, Profile]:
-    """A decomposition in one part, so many times on the plate, and what it is printed with.
+    """A decomposition in one part, so many times about its place on the plate, and what it is printed with.
 
     Raises PlanError for one in several parts, and for more copies than the plate has places for.
     """
@@ -41,15 +41,17 @@ def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tup
         process = process.model_copy(update={"brim_mm": process.small_base_brim_mm})  # judged alone: together they stand wider
     width, depth = (float(side) for side in np.ptp(part.mesh.vertices[:, :2], axis=0))
     gap_mm = GAP_MM + 2.0 * process.brim_mm
-    places = places_on_plate((width, depth), gap_mm, count, profile.machine)
+    x, y = process.place_mm
+    places = places_on_plate((width, depth), gap_mm, count, profile.machine, process.place_mm)
     if len(places) < count:
         raise PlanError(
             f"--copies {count}: {decomposition.name} measures {width:.1f} x {depth:.1f} mm, the plate of {profile.machine.name} "
             f"has room for {len(places)} with {gap_mm:g} mm between them"
         )
+    places = [(at_x - x, at_y - y) for at_x, at_y in places]  # all are moved to that place together
     mesh = _repeated(part.mesh, places)
     middle = part.mesh.bounds_mm[:, :2].mean(axis=0)
-    shifts = [(x - float(middle[0]), y - float(middle[1]), 0.0) for x, y in places]
+    shifts = [(at_x - float(middle[0]), at_y - float(middle[1]), 0.0) for at_x, at_y in places]
     many = replace(
         part,
         mesh=mesh,

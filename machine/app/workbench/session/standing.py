@@ -51,5 +51,5 @@ def _asked(bench: Bench) -> tuple[object, ...]:
     if bench.model is None:
         return ()
     process = bench.profile.of_part(1).process
-    decides = process.self_supporting_angle_deg, process.line_width_mm, bench.profile.machine
+    decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
     return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides

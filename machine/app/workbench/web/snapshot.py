@@ -79,6 +79,7 @@ def _state(session: Session) -> dict[str, Any]:
         "priced": bench.priced,
         "stops": [asdict(stop) for stop in bench.stops],
         "copies": bench.copies,
+        "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "benches": [asdict(bench) for bench in session.benches],
         "material": bench.profile.material.name,

@@ -20,6 +20,7 @@ import { partsList } from "./parts-list.js";
 import { partsPanel } from "./parts-panel.js";
 import { pictureOf } from "./picture.js";
 import { apartPanel } from "./pieces.js";
+import { placePanel } from "./place-panel.js";
 import { planesPanel } from "./planes-panel.js";
 import { printFrame } from "./print-frame.js";
 import { titleOfModel } from "./print-news.js";
@@ -55,6 +56,7 @@ function main() {
   benchesPanel();
   modelPanel();
   sizePanel();
+  placePanel(picture);
   partsPanel();
   planesPanel(picture);
   partsList();
