@@ -1,7 +1,10 @@
 """The model's place on the plate in a real browser: dragged, stepped by keys, typed, and undone in one step."""
 
+from io import BytesIO
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
@@ -27,6 +30,13 @@ def knob_drawn(browser: Browser) -> tuple[float, float]:
     browser.wait("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(() => drawn(true))))")
     x, y = browser.value(KNOB)
     return x, y
+
+
+def pixels(browser: Browser) -> np.ndarray:
+    knob_drawn(browser)
+    width, height = browser.value("[$('canvas').clientWidth, $('canvas').clientHeight]")
+    with Image.open(BytesIO(browser.screenshot())) as picture:
+        return np.array(picture.convert("RGB"))[-height:, :width]
 
 
 def press(browser: Browser, key: str, shift: bool = False) -> None:
@@ -77,3 +87,23 @@ def test_a_drag_of_the_knob_moves_the_model_by_whole_mm_under_the_hand(browser: 
     waits_for_place(browser, x, y)
     assert x == pytest.approx(2.0 * y, abs=1.5)
     assert x >= 4.0
+
+
+def test_copies_stand_in_the_picture_where_they_are_printed_and_more_than_there_is_room_for_are_told(
+    browser: Browser, bench: Running
+) -> None:
+    open_in_the_middle(browser, bench, "many.stl")
+    browser.click("#tab-slices")
+    drag_slider(browser, "copies", 6, "change")
+    browser.wait("$('copies-told').textContent === 'All 6 stand on the plate.'")
+    browser.click("#fit")
+    six = pixels(browser)
+    drag_slider(browser, "copies", 1, "change")
+    browser.wait("$('copies-told').textContent === ''")
+    assert (six != pixels(browser)).any(axis=2).mean() > 0.05
+    drag_slider(browser, "copies", 900, "change")
+    browser.wait("$('copies-told').textContent.startsWith('900 copies: many.stl measures 40.0 x 10.0 mm')")
+    assert "has room for" in browser.value("$('copies-told').textContent")
+    browser.click("#undo")
+    browser.wait("$('copies').value === '1' && $('copies-told').textContent === ''")
+    assert browser.complaints == []

@@ -56,7 +56,6 @@ function main() {
   benchesPanel();
   modelPanel();
   sizePanel();
-  placePanel(picture);
   partsPanel();
   planesPanel(picture);
   partsList();
@@ -69,6 +68,7 @@ function main() {
   printPanel();
   clicksOf(picture);
   modelOf(picture);
+  placePanel(picture);
   thumbnailsOf(picture);
   apartPanel(picture);
   if (picture) {

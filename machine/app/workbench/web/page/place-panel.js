@@ -1,5 +1,6 @@
-// Place: where on the plate the model stands: dragged there in the picture, by arrow keys, or typed.
+// Place: where on the plate the model and its copies stand: dragged there in the picture, by arrow keys, or typed.
 
+import { add, sub } from "../../../../view/template/math.js";
 import { $ } from "../../../../view/template/page.js";
 import { alike, putAt } from "./elements.js";
 import { gripOf } from "./grip.js";
@@ -31,10 +32,11 @@ export function placePanel(picture) {
     const [x, y] = table.size_mm || [2 * table.radius_mm, 2 * table.radius_mm];
     $("place-told").textContent = `The plate goes from ${-x / 2} to ${x / 2} mm along x, from ${-y / 2} to ${y / 2} mm along y.`.replaceAll("-", "−");
   });
-  let told = "";
+  let told = "", copies = [[...MIDDLE, 0]]; // where they stand; the first is the one that hands turn, cut and mark
   subscribe(() => {
     const now = JSON.stringify(placeNow());
-    picture?.place(placeNow());
+    if (store.state.copies_mm) copies = store.state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
+    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])));
     if (now === told) return;
     told = now;
     fields.forEach((field, axis) => { field.value = placeNow()[axis]; });
