@@ -12,12 +12,12 @@ from contextlib import contextmanager, suppress
 import uvicorn
 
 from machine.app.requests import UPLOAD_MIB
+from machine.app.serving.guard import HOST
 from machine.app.terminal.interrupts import calling
 from machine.app.terminal.progress import say
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
-from machine.app.workbench.web.guard import HOST
 from machine.app.workbench.web.server import application
 from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.uploads import Uploads

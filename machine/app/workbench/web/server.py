@@ -10,6 +10,7 @@ from starlette.routing import Route, Router, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from machine.app.serving.guard import Guard
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.page_words import page_words
 from machine.app.workbench.bench.settings import settings_list
@@ -31,7 +32,6 @@ from machine.app.workbench.web.downloads import (
     profile,
     shared_page,
 )
-from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, refuse_closed, talk
 from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.prints_line import print_log, print_webcam, prints_line

@@ -7,8 +7,10 @@ person's own browser: its Origin is refused, and a name of its own that points h
 import re
 import secrets
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")
@@ -23,7 +25,7 @@ SAFE = ("GET", "HEAD")
 REFUSED_SOCKET = 1008  # policy violation, RFC 6455
 FOREIGN = "this page is for this computer only\n"
 LONG_NUMBER = re.compile(r"/\d{10}\d*(/|$)")  # nothing here has such a one
-UNKNOWN = "the workbench is at the address that tiltprint edit has told, which is another one with each start\n"
+UNKNOWN = "this page is at the address that tiltprint has told, which is another one with each start\n"
 
 
 def refusal(headers: Iterable[tuple[bytes, bytes]], method: str, path: str, token: str, port: int) -> tuple[int, str] | None:
@@ -44,10 +46,10 @@ def refusal(headers: Iterable[tuple[bytes, bytes]], method: str, path: str, toke
 class Guard:
     """An ASGI application that lets through to another one what may pass, with headers that keep its answers to its pages."""
 
-    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+    def __init__(self, app: "ASGIApp", token: str, port: int) -> None:
         self._app, self._token, self._port = app, token, port
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: "Scope", receive: "Receive", send: "Send") -> None:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -68,8 +70,8 @@ class Guard:
             await send({"type": "http.response.body", "body": sentence.encode()})
 
 
-def _with_headers(send: Send) -> Send:
-    async def wrapped(message: Message) -> None:
+def _with_headers(send: "Send") -> "Send":
+    async def wrapped(message: "Message") -> None:
         if message["type"] == "http.response.start":
             own = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
             message = {**message, "headers": [*message.get("headers", ()), *own]}
