@@ -128,6 +128,7 @@ class _Search:
             request.name,
             request.profile,
             on_stage=self._show,
+            on_phase=self._report,
             on_record=None if request.outputs.record is None else record.append,
             by_hand=given,
             **asked,

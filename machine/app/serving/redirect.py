@@ -1,5 +1,5 @@
-"""Redirect: a file that leads a browser to a page of this computer. What a browser is started with every user of the computer can read, and
-the address holds the token; Jupyter does it so, too (jupyter_server/serverapp.py, write_browser_open_file)."""
+"""Redirect: a file that leads a browser to a page of this computer. What a browser is started with every user of the computer can
+read, and the address holds the token; Jupyter does it so, too (jupyter_server/serverapp.py, write_browser_open_file)."""
 
 import os
 import tempfile
