@@ -7,7 +7,7 @@ from profiles.settings.infill import Infill
 from profiles.settings.interface import Interface
 from profiles.settings.layers import Layers
 from profiles.settings.motion import Motion
-from profiles.settings.plate import Plate
+from profiles.settings.plate import FARTHEST_MM, Plate
 from profiles.settings.shell import Shell
 from profiles.settings.support import Support
 
@@ -40,6 +40,8 @@ class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
         return MOST_SHARE * min(width for width in widths if width is not None)
 
     def _problems(self) -> Iterable[str]:
+        if max(map(abs, self.place_mm)) > FARTHEST_MM:
+            yield f"place_mm is {list(self.place_mm)}: each must lie between {-FARTHEST_MM:g} and {FARTHEST_MM:g} mm"
         for wide, width in ((wide, getattr(self, wide)) for wide in WIDTHS):
             first = wide == "first_layer_line_width_mm"
             for key in ("first_layer_height_mm",) if first else self.heights:

@@ -123,7 +123,7 @@ def edit(
             "--port", metavar="N", min=0, max=65535, show_default=False, help="serve it on this port; else on any free one"
         ),
     ] = 0,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="only tell the address")] = False,
+    no_browser: options.NoBrowser = False,
     upload_mib: Annotated[
         int, typer.Option("--upload-mib", metavar="N", min=1, max=1024, help="the largest file that is taken from a page")
     ] = UPLOAD_MIB,

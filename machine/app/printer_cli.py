@@ -22,6 +22,7 @@ def print_(
     speed: options.SimSpeed = 0.0,
     watch: options.Watch = False,
     watch_port: options.WatchPort = None,
+    no_browser: options.NoBrowser = False,
     log: options.LogFile = None,
     journal: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="for resume; else a new file in the state folder")
@@ -37,7 +38,7 @@ def print_(
     """
     from machine.app.commands.print import print_model
 
-    printing = PrintRequest(port, baud, speed, log, journal, options.page_port(watch, watch_port))
+    printing = PrintRequest(port, baud, speed, log, journal, options.page_port(watch, watch_port), not no_browser)
     return print_model(options.program_request(model, program, given, force=force), printing)
 
 
@@ -88,6 +89,7 @@ def resume(
     yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
     watch: options.Watch = False,
     watch_port: options.WatchPort = None,
+    no_browser: options.NoBrowser = False,
     further: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="journal of the rest; else a new file in the state folder")
     ] = None,
@@ -103,7 +105,8 @@ def resume(
     if port is None:
         raise JournalError(f"journal {journal}: at which port is the printer? --port PORT is expected")
     named = None if machine is None else options.machine_profile(machine)
-    return resume(journal, PrintRequest(port, baud, 0.0, log, further, options.page_port(watch, watch_port)), named, yes)
+    printing = PrintRequest(port, baud, 0.0, log, further, options.page_port(watch, watch_port), not no_browser)
+    return resume(journal, printing, named, yes)
 
 
 def ports(

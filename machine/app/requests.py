@@ -129,7 +129,7 @@ class PrintRequest:
 
     sim_speed: times real time on the simulated printer, 0: as fast as possible. log: file for what is sent and received,
     journal: for what a resume needs; None: a new one in the state folder. watch_port: serve the print's page on this port of
-    this computer, 0: on any free one; None: serve nothing.
+    this computer, 0: on any free one; None: serve nothing. browser: open it there.
     """
 
     port: str
@@ -138,6 +138,7 @@ class PrintRequest:
     log: Path | None = None
     journal: Path | None = None
     watch_port: int | None = None
+    browser: bool = True
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from typing import Any
 
 from machine.quantities import duration, filament_cm3, filament_g, price
 from profiles.profile import Profile
+from profiles.settings.plate import MIDDLE
 
 LONGEST_COMMENT = 190
 CONFIG_BEGIN, CONFIG_END = "; tiltprint_config = begin", "; tiltprint_config = end"
@@ -29,8 +30,11 @@ def foot(profile: Profile, filament_mm: float, seconds: float) -> Iterator[str]:
         yield f"; filament cost = {price(filament_mm, material):.2f}"
     yield f"; estimated printing time (normal mode) = {duration(seconds)}"
     yield CONFIG_BEGIN
-    unpriced = {"material": {"price_per_kg", "currency"}} if material.price_per_kg is None else None
-    for key, value in flat(profile.model_dump(exclude=unpriced), ""):
+    unsaid = {
+        "material": {"price_per_kg", "currency"} if material.price_per_kg is None else set(),
+        "process": {"place_mm"} if profile.process.place_mm == MIDDLE else set(),
+    }
+    for key, value in flat(profile.model_dump(exclude=unsaid), ""):
         yield comment(f"{key} = {value}")
     yield CONFIG_END
 

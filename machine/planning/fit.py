@@ -10,25 +10,27 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.errors import MoveError
-from profiles.machine import Machine, Table
+from profiles.machine import Table
 from profiles.profile import Profile
+from profiles.settings.plate import MIDDLE
 
 
 def check_parts(parts: Sequence[Part], profile: Profile) -> None:
-    """Raise MoveError when the machine has no room for a part.
+    """Raise MoveError when the machine has no room for a part of a model about the turn axis, at its place on the plate.
 
     A part that stands as its pose has it reaches outside X, Y or Z, or the first one stands over the plate's edge. Half a line
     is left at the sides, for the tip stays so far inside what it prints.
     """
     for part in parts:
         inset_mm = 0.5 * profile.of_part(part.index).process.line_width_mm
-        _check_reach(part, inset_mm, profile.machine)
+        _check_reach(part, inset_mm, profile)
         if part.index == 1:
             check_standing(part.mesh, profile)
 
 
-def _check_reach(part: Part, inset_mm: float, machine: Machine) -> None:
-    reached = machine_points(machine, part.pose, part.mesh.vertices)
+def _check_reach(part: Part, inset_mm: float, profile: Profile) -> None:
+    machine = profile.machine
+    reached = machine_points(machine, part.pose, part.mesh.vertices + _shift(profile))
     inset = inset_mm * np.array([1.0, 1.0, 0.0])
     low, high = reached.min(axis=0) + inset, reached.max(axis=0) - inset
     for axis, (letter, limits) in enumerate(list(axis_limits(machine).items())[:3]):
@@ -37,25 +39,37 @@ def _check_reach(part: Part, inset_mm: float, machine: Machine) -> None:
                 where = f"{machine.tilt.letter}{part.pose.tilt_deg:.1f} {machine.turn.letter}{part.pose.turn_deg:.1f}"
                 raise MoveError(
                     f"part {part.index} reaches {letter} {value:.1f} mm at {where}, {letter} goes from {limits[0]:g} to "
-                    f"{limits[1]:g} mm on {machine.name}: process.scale makes the model smaller"
+                    f"{limits[1]:g} mm on {machine.name}: {_advice(profile)}"
                 )
 
 
 def check_standing(mesh: Mesh, profile: Profile) -> None:
-    """Raise MoveError when what stands on the platform, in the workpiece frame, lies over the plate's edge.
+    """Raise MoveError when what stands on the platform of a model about the turn axis lies over the plate's edge at its place.
 
     Brims and supports are not known yet: the dry run looks at them.
     """
     machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
-    standing = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM, :2]
+    standing = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM, :2] + _shift(profile)[:2]
     over, edge = over_edge_mm(np.maximum(np.abs(standing) - inset_mm, 0.0), machine.table)
     over_mm = float(over.max(initial=-np.inf))
     if over_mm > ROUNDING:
         x, y = np.ptp(standing, axis=0)
         raise MoveError(
             f"part 1 stands on {x:.1f} x {y:.1f} mm, {over_mm:.1f} mm over the edge of the plate of {machine.name}, {edge}: "
-            "process.scale makes the model smaller"
+            f"{_advice(profile)}"
         )
+
+
+def _shift(profile: Profile) -> Floats:
+    """(3,) what moves the model to its place, mm."""
+    return np.array([*profile.process.place_mm, 0.0])
+
+
+def _advice(profile: Profile) -> str:
+    if profile.process.place_mm == MIDDLE:
+        return "process.scale makes the model smaller"
+    x, y = profile.process.place_mm
+    return f"process.place_mm moves it from {x:g}, {y:g} mm back towards the middle"
 
 
 def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:

@@ -229,7 +229,7 @@ def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fra
 
 def _find_hindrance(problem: Problem, node: Node, plane: Plane) -> str | None:
     """Why no pose serves a part that the sweep found nothing against; None: one does."""
-    points, machine = corners_above(node.remainder.mesh, plane), problem.machine
+    points, machine = corners_above(node.remainder.mesh, plane) + problem.place_mm, problem.machine
     if len(points) == 0:
         return "nothing lies above its plane"
     obstacles = [find_obstacle(machine, pose, points) for pose in poses(machine, plane.normal)]

@@ -106,7 +106,7 @@ def _outside(problem: Problem, points: Floats, plane: Plane) -> Obstacle | None:
     """The places of a part that the axes do not reach, the farthest for each axis and side."""
     machine, outside = problem.machine, []
     for pose in poses(machine, plane.normal)[:1] if len(points) else []:
-        reached = points @ rotation(machine, pose).T + shift(machine, pose)
+        reached = (points + problem.place_mm) @ rotation(machine, pose).T + shift(machine, pose)
         for axis, limits in enumerate(axis.limits_mm for axis in (machine.x, machine.y, machine.z)):
             low, high = int(np.argmin(reached[:, axis])), int(np.argmax(reached[:, axis]))
             outside += [points[low]] if reached[low, axis] < limits[0] else []

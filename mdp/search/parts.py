@@ -37,7 +37,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
         normal = bases[position].normal
         if not clearance:
             return poses(machine, normal, near_turn_deg)
-        return allowed_poses(machine, normal, pieces[position].mesh.vertices, near_turn_deg)
+        return allowed_poses(machine, normal, pieces[position].mesh.vertices + problem.place_mm, near_turn_deg)
 
     def fits(position: int, pose: Pose) -> bool:
         return not clearance or pose in allowed(position, pose.turn_deg)

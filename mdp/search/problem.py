@@ -47,12 +47,14 @@ FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the orig
 class Problem:
     """Settings, machine and bounds of a search, its root, and how many candidates were looked at.
 
-    start: the node that the search goes on from, the root unless a person's planes have cut that already.
+    start: the node that the search goes on from, the root unless a person's planes have cut that already. place_mm: (3,) what
+    moves the model, which lies about the turn axis here, to its place on the plate: what the machine reaches depends on it.
     """
 
     def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
         self.settings = settings = profile.search.effective
         self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
+        self.place_mm = np.array([*profile.process.place_mm, 0.0])
         self.mesh, self.zones = mesh, zones.on(mesh)
         solid = solid_of(mesh, apart=self.zones.by_face)
         surface, need = ModelSurface.of(mesh, solid), None
@@ -237,7 +239,7 @@ class Problem:
         if self.settings.clearance:
             lower = child.remainder.mesh.vertices
             corners = np.vstack([upper, lower[plane.heights_mm(lower) >= -BASE_TOLERANCE_MM]])
-            if not allowed_poses(self.machine, plane.normal, corners):
+            if not allowed_poses(self.machine, plane.normal, corners + self.place_mm):
                 return None
         return child
 

@@ -60,6 +60,7 @@ def decompose(
     *,
     ranker: str = "classic",
     on_stage: Callable[[Progress], None] | None = None,
+    on_phase: Callable[[str], None] | None = None,
     on_record: Callable[[bytes], None] | None = None,
     by_hand: PlanFile | None = None,
     parts: int | None = None,
@@ -67,10 +68,10 @@ def decompose(
 ) -> Decomposition:
     """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible.
 
-    on_record is given what the search looked at and what became of it, as the content of an .npz file. by_hand: planes that are
-    cut first and stay, and zones; parts: so many at most, instead of as many as pay; price: what parts take to print, for the
-    rows of the front and the choice between them: without it nothing is searched for one part. Raises PlanError for a plane by
-    hand that cannot be cut.
+    on_phase is told in words what is done while no stage is; on_record is given what the search looked at and what became of it,
+    as the content of an .npz file. by_hand: planes that are cut first and stay, and zones; parts: so many at most, instead of as
+    many as pay; price: what parts take to print, for the rows of the front and the choice between them: without it nothing is
+    searched for one part. Raises PlanError for a plane by hand that cannot be cut.
     """
     began = perf_counter()
     if parts is not None:
@@ -84,18 +85,21 @@ def decompose(
     planned = PlanFile("") if by_hand is None else by_hand
     check_model(planned, mesh, name)
     check_zones(planned, mesh, name)
-    problem = Problem(mesh, profile, planned.zones)
-    problem.start = cut_by_hand(problem, planned)
-    if parts is not None and parts <= len(problem.start.cuts):
-        raise PlanError(f"--parts {parts}: the planes by hand of {planned.name} alone make {len(problem.start.cuts) + 1} parts")
-    copy = None if on_record is not None else coarse_copy(given, profile, planned.zones)
+    tell = on_phase or (lambda text: None)
+    measure = cache(partial(_measure, mesh, profile, planned, tell))
+    if planned.parts or profile.search.time_limit_s is not None:  # refused at once, or on time; else a copy is searched before
+        measure()
+    if parts is not None and parts <= len(planned.parts):
+        raise PlanError(f"--parts {parts}: the planes by hand of {planned.name} alone make {len(planned.parts) + 1} parts")
+    copy = None if on_record is not None else _copy_to_search(given, profile, planned, tell)
     if copy is not None:
-        asked: dict[str, Any] = {"ranker": ranker, "on_stage": on_stage, "parts": parts, "price": price}
+        asked: dict[str, Any] = {"ranker": ranker, "on_stage": on_stage, "on_phase": on_phase, "parts": parts, "price": price}
         with suppress(PlanError):  # of a plane by hand that cuts the mesh and not its copy
             found = decompose(copy, name, as_it_is(profile), by_hand=replace(planned, sha256=""), **asked)
-            fine = cut_as_copy(problem, found, price)
+            fine = cut_as_copy(measure(), found, price)
             if fine is not None:
                 return fine
+    problem = measure()
     trace = None if on_record is None else Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
     report = on_stage or (lambda progress: None)
     if uncut:
@@ -113,6 +117,21 @@ def decompose(
     taken = _take(problem, front, best, parts, price)
     notes = (*_notes(problem, taken, parts), *_zone_notes(problem), *_front_note(planned))
     return made_of(problem, taken, Outcome(name, ranker, rounds, problem.evaluated, perf_counter() - began, notes))
+
+
+def _measure(mesh: Mesh, profile: Profile, planned: PlanFile, tell: Callable[[str], None]) -> Problem:
+    """The problem of a mesh, cut by a person's planes. Raises PlanError."""
+    tell(f"measuring overhangs and seams of {len(mesh.faces):,} faces")
+    problem = Problem(mesh, profile, planned.zones)
+    problem.start = cut_by_hand(problem, planned)
+    return problem
+
+
+def _copy_to_search(mesh: Mesh, profile: Profile, planned: PlanFile, tell: Callable[[str], None]) -> Mesh | None:
+    """See `coarse_copy`."""
+    if 0 < profile.search.effective.simplify_faces < len(mesh.faces):
+        tell(f"looking for a copy of {len(mesh.faces):,} faces with fewer of them")
+    return coarse_copy(mesh, profile, planned.zones)
 
 
 def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None) -> Taken:

@@ -78,6 +78,7 @@ SUPPORT = {
     "support_least_mm2": advanced("Smallest place that is supported", "supports minimum area remove small overhangs"),
 }
 PLATE = {
+    "place_mm": advanced("Place on the plate", "position move offset centre center xy arrange"),
     "skirt_loops": simple("Skirt loops", "skirts outline"),
     "skirt_distance_mm": advanced("Skirt distance", "skirts from object"),
     "brim_mm": simple("Brim width", "adhesion"),

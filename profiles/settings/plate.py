@@ -4,10 +4,17 @@ from pydantic import Field
 
 from profiles.frozen import Frozen
 
+FARTHEST_MM = 1000.0  # no plate reaches so far from its turn axis
+MIDDLE = (0.0, 0.0)
+
 
 class Plate(Frozen):
     """Part 1 on the plate."""
 
+    place_mm: tuple[float, float] = Field(
+        MIDDLE,
+        description="where the middle of the model stands on the plate: x and y from the turn axis; copies stand about it, mm",
+    )
     skirt_loops: int = Field(1, ge=0, le=20, description="loops around part 1's first layer, not touching it")
     skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from part 1, mm")
     brim_mm: float = Field(

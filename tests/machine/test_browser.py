@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from machine.app.printer.watch_page import serve
+from machine.app.serving.watch_page import serve
 from machine.dryrun.dryrun import dry_run
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
@@ -438,7 +438,7 @@ def test_without_webgl_the_report_is_shown_and_a_sentence_says_why(tmp_path: Pat
 
 
 def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.app.printer.watch_page.LAST_WORD_S", 0.0)
+    monkeypatch.setattr("machine.app.serving.watch_page.LAST_WORD_S", 0.0)
     profile, printed = program()
     line = int(printed.run.program.line[40])
     heat = Temperature(nozzle_c=209.6, nozzle_target_c=210.0)

@@ -323,6 +323,13 @@ def test_a_printer_is_heated_homed_and_moved_by_hand_from_the_page_and_let_go_of
         browser.value("{ $('hand-step').value = '10'; }")
         browser.click("[data-jog='X-']")
         browser.wait("$('run-state').textContent === 'in hand · X would be -169.00 mm: -160 to 160 are allowed'")
+        browser.wait("!$('heat').hidden && $('heat-nozzle').getAttribute('d').split('L').length > 2")
+        began = browser.value("modules['page/temperature-graph'].SAMPLES.get(Number($('which').value)).at(0).at_s")
+        browser.open(sliced.address)
+        browser.wait("!$('heat').hidden")
+        assert browser.value("modules['page/temperature-graph'].SAMPLES.get(Number($('which').value)).at(0).at_s") == began
+        browser.click("#take")
+        browser.wait("$('held').hidden")
         browser.click("[data-hand=let_go]")
         browser.wait(f"{PRINTING} === 'over' && $('run-state').textContent === 'let go of; the heaters are off'")
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)

@@ -1,17 +1,15 @@
 """The edit command: the workbench, served on this computer until Ctrl-C."""
 
-import asyncio
-import webbrowser
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from machine.app.requests import GCODE_SUFFIXES, EditRequest
+from machine.app.serving.browser import lead_browser
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.app.workbench.access.lan import Lan, open_lan
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.web.redirect import redirecting
 from machine.app.workbench.web.serve import serve_workbench
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import DEMO, check_file, locate, plan_beside
@@ -47,7 +45,7 @@ def edit(request: EditRequest) -> int:
         show("".join(f"{each}\n" for each in (address, *of_lan)))
         say(f"the workbench is there, for this computer{'' if of_lan else ' alone'}; Ctrl-C ends it")
         if request.browser:
-            _lead_browser(address, until_end)
+            lead_browser(address, until_end)
 
     with ExitStack() as until_end:
         serve_workbench(make, begin, announce, request.port, request.upload_mib, lan)
@@ -88,18 +86,3 @@ def _of_plan(file: Path, plan: PlanFile) -> Opened:
         reason = f"its model {plan.model} is not beside it" if plan.model else "it names no model"
         raise PlanError(f"plan {file}: {reason}: open the model first, then choose the plan in the page")
     return Opened(path, plan.model, plan)
-
-
-def _lead_browser(address: str, until_end: ExitStack) -> None:
-    """Open a browser beside the event loop, by a file that is there until the program ends."""
-    try:
-        file = until_end.enter_context(redirecting(address))
-    except OSError as error:
-        say(f"no browser is opened, for no file can be written that leads it: {error.strerror}; open the address in one")
-        return
-    asyncio.get_running_loop().run_in_executor(None, _show_in_browser, file.as_uri())
-
-
-def _show_in_browser(address: str) -> None:
-    if not webbrowser.open(address):
-        say("no browser could be opened: open the address in one")

@@ -6,11 +6,12 @@ from machine.app.commands.send import print_on_server
 from machine.app.file_roles import check_model_files, printing_files, program_beside
 from machine.app.output import check_writable
 from machine.app.pipeline.programs import load_program
+from machine.app.printer.attendance import AtTerminal
 from machine.app.printer.compatibility import check_machine, check_port, ready_program
 from machine.app.printer.journal_folder import check_new_journal
 from machine.app.printer.stream import print_program
-from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
+from machine.app.serving.watch_page import serve_watch_page
 from machine.app.terminal.plain import show
 from machine.app.terminal.report import print_table
 from machine.firmware.line import check_baud
@@ -37,7 +38,8 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     program = ready_program(answer, loaded.program, loaded.profile, name=loaded.name, printing=printing, force=request.force)
     show(print_table(program, loaded.profile))
     job = replace(loaded, program=program)
-    with serve_watch_page(job, printing.watch_port) as watched:
-        code = print_program(job, printing, watched.follow)
+    person = AtTerminal()
+    with serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched:
+        code = print_program(job, printing, watched.follow, person)
         watched.end("stopped" if code else "done")
     return code

@@ -11,8 +11,8 @@ from machine.app.printer.attendance import AtServerTerminal, Observers
 from machine.app.printer.network_print import hand_over, print_there, server_session
 from machine.app.printer.serial_log import SerialLog
 from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
-from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
+from machine.app.serving.watch_page import serve_watch_page
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import print_table
@@ -55,8 +55,9 @@ def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
         )
     with _session(request, printing.port, printing.log, "print") as (server, log):
         job = _checked(request, server, printing.port, True)
-        with serve_watch_page(job, printing.watch_port) as watched:
-            end = print_there(server, job, Observers(log, None, watched.follow), AtServerTerminal(server.name))
+        person = AtServerTerminal(server.name)
+        with serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched:
+            end = print_there(server, job, Observers(log, None, watched.follow), person)
             watched.end("done" if end is End.DONE else "stopped")
     return 0 if end is End.DONE else 130
 

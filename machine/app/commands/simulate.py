@@ -13,6 +13,7 @@ from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import find_starvation
 from machine.firmware.line import check_baud
+from machine.planning.arrange import mesh_moved
 from machine.view.page import print_page
 from mdp.model_file import check_file, locate
 from mdp.read import read_mesh
@@ -38,6 +39,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     mesh = None if program.decomposition is None else program.decomposition.mesh
     if reference is not None:
         mesh, _ = read_mesh(locate(reference), profile.process.scale, profile.process.rotate_deg)
+        mesh = mesh_moved(mesh, profile.process.place_mm)
     agreed = None
     if mesh is not None:
         agreed, run = agreement(program.run, mesh, profile)

@@ -9,6 +9,7 @@ from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
 from machine.dryrun.dryrun import DryRun
+from machine.planning.arrange import standing_at
 from machine.program import Alternative, Program, joints_of_print
 from machine.quantities import duration, filament_g
 from mdp.cost.cost import weight_of_stairs
@@ -33,7 +34,8 @@ def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternati
     """This print, then the two in one part."""
     if program.decomposition is None:
         return ()
-    return in_parts(program, profile), *in_one_part(program.decomposition, profile)
+    x, y = profile.process.place_mm
+    return in_parts(program, profile), *in_one_part(standing_at(program.decomposition, (-x, -y)), profile)
 
 
 def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = None) -> tuple[Alternative, Alternative]:
@@ -41,7 +43,7 @@ def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = N
     they would fail.
 
     An alternative that the machine cannot print stays in the list, with the reason. report: where progress is shown; None: on the
-    terminal.
+    terminal. The model lies about the turn axis.
     """
     tell = say if report is None else report
     tell("comparing: straight up")

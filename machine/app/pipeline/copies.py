@@ -9,6 +9,7 @@ from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
 from profiles.errors import PlanError
+from profiles.process import Process
 from profiles.profile import Profile
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import clean
@@ -25,31 +26,17 @@ def check_copies(count: int) -> None:
 
 
 def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tuple[Decomposition, Profile]:
-    """A decomposition in one part, so many times on the plate, and what it is printed with.
+    """A decomposition in one part, so many times about its place on the plate, and what it is printed with.
 
     Raises PlanError for one in several parts, and for more copies than the plate has places for.
     """
     if count == 1:
         return decomposition, profile
-    if len(decomposition.parts) > 1:
-        raise PlanError(
-            f"--copies {count}: {decomposition.name} is cut into {len(decomposition.parts)} parts, copies are printed in one "
-            "piece each: --parts 1"
-        )
-    (part,), process = decomposition.parts, profile.process
-    if process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and _tips_over(part.mesh, profile):
-        process = process.model_copy(update={"brim_mm": process.small_base_brim_mm})  # judged alone: together they stand wider
-    width, depth = (float(side) for side in np.ptp(part.mesh.vertices[:, :2], axis=0))
-    gap_mm = GAP_MM + 2.0 * process.brim_mm
-    places = places_on_plate((width, depth), gap_mm, count, profile.machine)
-    if len(places) < count:
-        raise PlanError(
-            f"--copies {count}: {decomposition.name} measures {width:.1f} x {depth:.1f} mm, the plate of {profile.machine.name} "
-            f"has room for {len(places)} with {gap_mm:g} mm between them"
-        )
+    part = decomposition.parts[0]
+    places, process = places_of_copies(part.mesh, decomposition.name, len(decomposition.parts), count, profile)
     mesh = _repeated(part.mesh, places)
     middle = part.mesh.bounds_mm[:, :2].mean(axis=0)
-    shifts = [(x - float(middle[0]), y - float(middle[1]), 0.0) for x, y in places]
+    shifts = [(at_x - float(middle[0]), at_y - float(middle[1]), 0.0) for at_x, at_y in places]
     many = replace(
         part,
         mesh=mesh,
@@ -63,6 +50,29 @@ def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tup
     risky_mm2, residual_mm2 = count * decomposition.risky_area_mm2, count * decomposition.residual_area_mm2
     plated = replace(decomposition, mesh=mesh, parts=(many,), risky_area_mm2=risky_mm2, residual_area_mm2=residual_mm2, front=())
     return plated, profile.model_copy(update={"process": process})
+
+
+def places_of_copies(mesh: Mesh, name: str, parts: int, count: int, profile: Profile) -> tuple[list[Place], Process]:
+    """Where the middles of so many copies of a model are, from the middle of the plate's place for it, the nearest first, and the
+    process that prints them. parts: how many it is cut into.
+
+    Raises PlanError for several parts, and for more copies than the plate has places for.
+    """
+    if parts > 1:
+        raise PlanError(f"--copies {count}: {name} is cut into {parts} parts, copies are printed in one piece each: --parts 1")
+    process = profile.process
+    if process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and _tips_over(mesh, profile):
+        process = process.model_copy(update={"brim_mm": process.small_base_brim_mm})  # judged alone: together they stand wider
+    width, depth = (float(side) for side in np.ptp(mesh.vertices[:, :2], axis=0))
+    gap_mm = GAP_MM + 2.0 * process.brim_mm
+    x, y = process.place_mm
+    places = places_on_plate((width, depth), gap_mm, count, profile.machine, process.place_mm)
+    if len(places) < count:
+        raise PlanError(
+            f"--copies {count}: {name} measures {width:.1f} x {depth:.1f} mm, the plate of {profile.machine.name} "
+            f"has room for {len(places)} with {gap_mm:g} mm between them"
+        )
+    return [(at_x - x, at_y - y) for at_x, at_y in places], process  # all are moved to that place together
 
 
 def _tips_over(mesh: Mesh, profile: Profile) -> bool:

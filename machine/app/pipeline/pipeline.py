@@ -23,6 +23,7 @@ from machine.firmware import dialect_of
 from machine.gcode.blocks import check_blocks
 from machine.gcode.lines import Lines
 from machine.gcode.writer import write_gcode
+from machine.planning.arrange import standing_at
 from machine.planning.fit import check_parts, check_standing
 from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
@@ -127,6 +128,7 @@ class _Search:
             request.name,
             request.profile,
             on_stage=self._show,
+            on_phase=self._report,
             on_record=None if request.outputs.record is None else record.append,
             by_hand=given,
             **asked,
@@ -155,8 +157,8 @@ def build(
     report: Report | None = None,
     on_slices: OnProgress | None = None,
 ) -> Program:
-    """Slice, plan, write and dry-run a decomposition. Before slicing it raises MoveError for a part that the machine has no
-    room for, ProfileError for a G-code block that the machine's firmware refuses.
+    """Slice, plan, write and dry-run a decomposition, at its place on the plate. Before slicing it raises MoveError for a part
+    that the machine has no room for, ProfileError for a G-code block that the machine's firmware refuses.
 
     pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
     for a person. report: where progress is shown; None: on the terminal. on_slices: is shown the parts while they are sliced.
@@ -164,6 +166,8 @@ def build(
     parts = decomposition.parts
     check_blocks(profile)
     check_parts(parts, profile)
+    decomposition = standing_at(decomposition, profile.process.place_mm)
+    parts = decomposition.parts
     compilers.wait_for(compilers.PROGRAM, report)
     return_unused()  # of the search
     with reporting() if report is None else nullcontext(report) as tell:

@@ -13,14 +13,14 @@ from pathlib import Path
 
 from machine.app.file_roles import check_roles, printing_files
 from machine.app.pipeline.programs import LoadedProgram
-from machine.app.printer.attendance import Attendance, Observers
+from machine.app.printer.attendance import Attendance, AtTerminal, Observers
 from machine.app.printer.compatibility import check_dialect
 from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import new_log
 from machine.app.printer.server_checks import check_no_server
 from machine.app.printer.stream import report_end, stream_program
-from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import SIMULATED, PrintRequest
+from machine.app.serving.watch_page import serve_watch_page
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialect_of
@@ -118,6 +118,7 @@ def print_rest(
     for none; may raise JournalError. The journal of the request is a new one. attendance: of a person who is not at the terminal.
     Raises PrinterError.
     """
+    person = attendance or AtTerminal()
     job = LoadedProgram(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
     with _further_journal(cut_off, printing) as further:
 
@@ -140,9 +141,9 @@ def print_rest(
 
         with (
             new_log("print", f"the rest of {job.name} to {printing.port}", printing.log) as log,
-            serve_watch_page(job, printing.watch_port) as watched,
+            serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched,
         ):
-            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin=begin, attendance=attendance)
+            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin=begin, attendance=person)
             watched.end("stopped" if outcome.cancelled else "done")
         if outcome.cancelled and outcome.heaters_off is None:
             say("nothing was moved or heated")

@@ -44,7 +44,8 @@ LogFile = Annotated[
 Baud = Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")]
 PortOrSim = Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")]
 SimSpeed = Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")]
-Watch = Annotated[bool, typer.Option("--watch", help="serve a page on this computer that follows the print")]
+Watch = Annotated[bool, typer.Option("--watch", help="open a page of this computer that follows and commands the print")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="only tell the address")]
 WatchPort = Annotated[
     int | None, typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one")
 ]

@@ -1,13 +1,15 @@
-// Live: follows a running print, asking the computer that served the page for what the printer has acknowledged.
+// Live: follows a running print and commands it, asking the computer that served the page for what the printer has acknowledged.
 
 import { $, duration } from "./page.js";
 
 const ASK_EVERY_MS = 1000;
-const OVER = ["done", "stopped"];
+const OVER = ["done", "stopped"], AWAY = ["pausing", "paused"]; // the tip, from the print
+const NOT_ARRIVED = "that has not arrived: use the terminal, or the printer's own switch";
 
 export function follow(scene, player) {
   const badge = $("live");
   badge.hidden = false;
+  orders(badge);
   let shown = -1;
   const ask = async () => {
     let state;
@@ -18,6 +20,9 @@ export function follow(scene, player) {
       return setTimeout(ask, 5 * ASK_EVERY_MS);
     }
     badge.textContent = liveTold(state);
+    $("orders").hidden = OVER.includes(state.state);
+    document.querySelector("[data-order=pause]").hidden = AWAY.includes(state.state);
+    document.querySelector("[data-order=resume]").hidden = !AWAY.includes(state.state);
     if (state.line && state.line !== shown && !player.playing) {
       shown = state.line;
       scene.goToLine(state.line);
@@ -25,6 +30,18 @@ export function follow(scene, player) {
     return OVER.includes(state.state) ? null : setTimeout(ask, ASK_EVERY_MS);
   };
   ask();
+}
+
+/** The buttons, which do what keys in the terminal do; a stop is asked about once more, an emergency stop is not. */
+function orders(badge) {
+  const sure = (asked) => { $("stop-surely").hidden = !asked; $("stop").hidden = asked; };
+  $("stop").addEventListener("click", () => sure(true));
+  $("go-on").addEventListener("click", () => sure(false));
+  document.querySelectorAll("[data-order]").forEach((button) => button.addEventListener("click", async () => {
+    sure(false);
+    const answer = await fetch(`order/${button.dataset.order}`, { method: "POST" }).catch(() => null);
+    if (!answer?.ok) badge.textContent = NOT_ARRIVED;
+  }));
 }
 
 function liveTold(told) {

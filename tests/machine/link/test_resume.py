@@ -503,7 +503,9 @@ def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
     with SimulatedPrinter(PROFILE.machine, speed=100.0) as printer:
         journal = cancelled(text, printer.path)
         further = str(journal.with_name("rest"))
-        assert main(["resume", str(journal), "--port", printer.path, "--yes", "--journal", further, "--watch"]) == 0
+        assert (
+            main(["resume", str(journal), "--port", printer.path, "--yes", "--journal", further, "--watch", "--no-browser"]) == 0
+        )
         record = printer.record
         assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
     errors = capsys.readouterr().err

@@ -142,3 +142,17 @@ def test_a_plane_that_leaves_a_sliver_is_moved_to_the_nearest_that_cuts() -> Non
 def test_a_plane_that_misses_has_no_other_beside_it() -> None:
     problem = Problem(shapes.tee(), _profile(0))
     assert cut_near(problem, problem.root, Plane(np.array([1.0, 0.0, 0.0]), 30.0)) is None
+
+
+def test_a_copy_is_searched_before_the_mesh_itself_is_measured_and_every_phase_is_told(fine: Mesh) -> None:
+    heard: list[str] = []
+    decompose(
+        fine,
+        "post",
+        _profile(2000, "search.beam_width=2"),
+        on_stage=lambda progress: heard.append("stage"),
+        on_phase=lambda text: heard.append(text.partition(" of ")[0]),
+    )
+    measured = [k for k, text in enumerate(heard) if text == "measuring overhangs and seams"]
+    assert heard[0] == "looking for a copy"
+    assert measured[0] < heard.index("stage") < measured[1] == len(heard) - 1

@@ -9,9 +9,9 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from machine.app.serving.guard import HEADERS, LONG_NUMBER, SAFE, is_foreign, method_of, refuse, values_of, with_headers
 from machine.app.workbench.access.devices import Device
 from machine.app.workbench.access.door import Door
-from machine.app.workbench.access.guard import HEADERS, LONG_NUMBER, SAFE, is_foreign, method_of, refuse, values_of, with_headers
 from machine.app.workbench.access.lan import Lan
 from machine.app.workbench.access.limits import DEVICE
 from machine.app.workbench.access.pairing import Verdict

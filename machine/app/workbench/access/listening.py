@@ -4,7 +4,7 @@ import os
 import socket
 from collections.abc import Iterable
 
-from machine.app.workbench.access.guard import HOST
+from machine.app.serving.guard import HOST
 from profiles.errors import OutputError, reason
 
 TRIES = 20  # ports of the system's choice, each free here, until one is free at all addresses

@@ -247,6 +247,11 @@ def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
     return replace(changed, rows=tuple(replace(row, time_s=None, filament_mm=None) for row in bench.rows), priced=False)
 
 
+def with_rows(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
+    """Fewer rows of the front; which of them is recommended is seen when they are priced."""
+    return replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
+
+
 def rows_to_price(bench: Bench) -> list[int]:
     """The rows of the front, by their places, whose time and plastic a person is told."""
     return [row for row, good in enumerate(pays(bench.rows)) if good]

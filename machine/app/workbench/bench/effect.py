@@ -1,4 +1,5 @@
-"""Effect: what a changed setting does to a front that was found before: nothing, other prices, or it may be another front.
+"""Effect: what a changed setting does to a front that was found before: nothing, other prices, the machine may reach less of it,
+or it may be another front.
 
 A search reads few of the settings, and what it finds has prices only afterwards. What neither reads is listed here, and what the
 search reads of process and material; of a machine, whose shape decides nearly all, what it does not.
@@ -16,7 +17,8 @@ class Effect(IntEnum):
 
     NONE = 0
     PRICES = 1
-    FRONT = 2
+    REACH = 2
+    FRONT = 3
 
 
 # Read by neither: heat, air, retraction, what only moves between strokes, and what only the G-code's text has.
@@ -44,6 +46,7 @@ SEARCHED = frozenset(
         *(f"material.{key}" for key in ("interlayer_strength_mpa", "cold_weld_factor", "bridge_longest_mm")),
     }
 )
+PLACE = "process.place_mm"  # a search reads it, but the same planes are the best wherever they are reached
 # Of a machine's keys those that only make it quicker or slower.
 PACES = ("heating_c_s", "speed_mm_s", "acceleration_mm_s2", "speed_deg_s", "acceleration_deg_s2")
 
@@ -53,6 +56,8 @@ def effect_of(key: str) -> Effect:
     section, _, name = key.partition(".")
     if key in UNREAD:
         return Effect.NONE
+    if key == PLACE:
+        return Effect.REACH
     if section in ("process", "material"):
         return Effect.FRONT if key in SEARCHED else Effect.PRICES
     return Effect.PRICES if section == "machine" and name.endswith(PACES) else Effect.FRONT

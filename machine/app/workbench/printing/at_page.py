@@ -9,7 +9,7 @@ from typing import Any
 
 from machine.app.printer.attendance import Observers
 from machine.app.printer.serial_log import SerialLog
-from machine.app.printer.watch_page import state_of
+from machine.app.serving.watch_page import state_of
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.printer_messages import PrinterMessages
 from machine.app.terminal.progress import Report

@@ -52,7 +52,7 @@ class Readiness:
         """Whether what was made ready serves another profile: planes read of it what a search does."""
         if profile is self._profile:
             return True
-        serves = self._profile is not None and effect_of_change(self._profile, profile) < Effect.FRONT
+        serves = self._profile is not None and effect_of_change(self._profile, profile) < Effect.REACH
         if serves:
             self._profile = profile
         return serves

@@ -13,12 +13,14 @@ from machine.app.pipeline.given_plan import with_plan_settings
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import (
     Bench,
+    parts_of,
     with_cuts,
     with_model,
     with_model_turned_as_read,
     with_plan,
     with_profile,
     with_rotation,
+    with_rows,
     with_scaled_model,
 )
 from machine.app.workbench.bench.effect import Effect, effect_of_change
@@ -228,8 +230,8 @@ class Session(SessionBase):
                 self.do(word, bench, refused)
 
     async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
-        """A bench with another profile; planes that it forbids go, with the reason, and a model that it scales or turns otherwise
-        is read again."""
+        """A bench with another profile; planes that it forbids go, with the reason, so do rows of the front that cannot be cut at
+        another place on the plate, and a model that it scales or turns otherwise is read again."""
         bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
         if model is not None and _reads(bench.profile) != _reads(before.profile):
@@ -240,7 +242,11 @@ class Session(SessionBase):
                 turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
                 return with_model_turned_as_read(bench, model, turn, new.scale / old.scale), ""
             bench = with_scaled_model(bench, model, new.scale / old.scale)
-        if bench.cuts is not None and effect_of_change(before.profile, bench.profile) == Effect.FRONT:
+        effect = effect_of_change(before.profile, bench.profile)
+        if effect == Effect.REACH and bench.rows:
+            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, parts_of(row))).refused]
+            bench = with_rows(bench, rows)
+        if bench.cuts is not None and effect >= Effect.REACH:
             trial = await self.trials.attempt(bench, bench.cuts)
             if trial.refused:
                 why = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"

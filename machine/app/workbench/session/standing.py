@@ -51,5 +51,7 @@ def _asked(bench: Bench) -> tuple[object, ...]:
     if bench.model is None:
         return ()
     process = bench.profile.of_part(1).process
-    decides = process.self_supporting_angle_deg, process.line_width_mm, bench.profile.machine
-    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides
+    decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
+    brims = process.brim_mm, process.small_base_brim_mm, process.first_layer_height_mm
+    copies = (bench.copies, max(bench.parts, 1), *brims) if bench.copies > 1 else ()
+    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, copies

@@ -12,10 +12,10 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from machine.app.requests import UPLOAD_MIB
+from machine.app.serving.guard import HOST
 from machine.app.terminal.interrupts import calling
 from machine.app.terminal.progress import say
 from machine.app.workbench.access.door import Door
-from machine.app.workbench.access.guard import HOST
 from machine.app.workbench.access.lan import Lan
 from machine.app.workbench.access.listening import listen_at_all
 from machine.app.workbench.printing.prints import Prints

@@ -10,9 +10,9 @@ from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from machine.app.serving.guard import NAMES, Guard
 from machine.app.workbench.access.door import Door
 from machine.app.workbench.access.gate import Gate
-from machine.app.workbench.access.guard import NAMES, Guard
 from machine.app.workbench.access.lan import Lan
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.page_words import page_words

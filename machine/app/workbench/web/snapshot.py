@@ -22,7 +22,7 @@ from mdp.zone import Zone
 MOST_FACES = 2_000_000  # that a page draws
 # Of the state: what holds sentences.
 SENTENCES = (
-    *("problem", "problems", "answers", "busy", "stopped", "lacking", "notes", "standing", "resting"),
+    *("problem", "problems", "answers", "busy", "stopped", "lacking", "notes", "standing", "resting", "copies_told"),
     *("search", "trial", "refused", "slicing", "sliced", "comparing", "compared"),
 )
 
@@ -79,11 +79,22 @@ def _state(session: Session) -> dict[str, Any]:
         "priced": bench.priced,
         "stops": [asdict(stop) for stop in bench.stops],
         "copies": bench.copies,
+        "copies_mm": standing and [[round(x, 3), round(y, 3)] for x, y in standing.copies_mm],
+        "copies_told": _copies_told(session),
+        "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "benches": [asdict(bench) for bench in session.benches],
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }
+
+
+def _copies_told(session: Session) -> str:
+    """How many copies stand on the plate, or why they cannot."""
+    standing, count = session.standing.now, session.bench.copies
+    if standing is None or count == 1:
+        return ""
+    return standing.copies_problem or f"All {count} stand on the plate."
 
 
 def marks_key(bench: Bench) -> str:

@@ -69,7 +69,9 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
 
     def search(lying: Mesh) -> Decomposition:
         otherwise = "" if lying is mesh else "laid down otherwise: "
-        tell(Searched(f"{otherwise}measuring overhangs and seams of {len(lying.faces):,} faces", best))
+
+        def say(phase: str) -> None:
+            tell(Searched(f"{otherwise}{phase}", best))
 
         def show(progress: Progress) -> None:
             nonlocal best
@@ -82,7 +84,7 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
                 best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
             tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
 
-        return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, by_hand=locked, price=price)
+        return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=locked, price=price)
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if way.orient and untouched and lies_freely(profile):

@@ -15,6 +15,7 @@ from machine.app.workbench.work.processes import Tell
 from machine.app.workbench.work.walls import walls
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
+from machine.planning.arrange import standing_at
 from machine.program import Alternative
 from machine.view.page import print_page, with_comparison
 from mdp.decomposition import Decomposition
@@ -60,6 +61,7 @@ def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
     """The parts on the bench sliced, planned, written to these files and dry-run, as `export --plan` does with its pauses and
     copies; uncut, the model in one piece."""
     decomposition, profile = _plated(bench)
+    standing = standing_at(decomposition, profile.process.place_mm)
     shares: tuple[float, ...] = ()
     ready: set[int] = set()
     said = ""
@@ -73,7 +75,7 @@ def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
         )
         ready.update(fresh)
         if fresh:
-            drawn = {number: walls(decomposition.parts[number - 1], piece) for number, piece in fresh.items()}
+            drawn = {number: walls(standing.parts[number - 1], piece) for number, piece in fresh.items()}
             tell(SlicesSoFar(said or "slicing", shares, drawn))
 
     def report(text: str, share: float | None = None) -> None:

@@ -4,30 +4,38 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from machine.app.pipeline.copies import places_of_copies
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import mesh_blocks
 from machine.app.workbench.bench.values import vector_of
 from machine.app.workbench.work.cutting import turned_mesh
 from machine.app.workbench.work.pieces import out_of_reach
 from machine.app.workbench.work.processes import Tell
+from machine.planning.arrange import Place
+from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.pedestal import on_pedestal, pedestal_under
 from mdp.search.parts import one_piece
-from profiles.errors import MeshError
+from profiles.errors import MeshError, PlanError
 from profiles.frozen import Vector
+from profiles.settings.plate import MIDDLE
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
     """size_mm: along the platform's axes, without the pedestal; overhang_mm2: area that overhangs too far and does not stand on
     the platform; problem: what the machine does not reach in one piece, in the sentence of `export`, "" where it reaches all;
-    pedestal: as `mesh_blocks` puts it for the page, b"": there is none; refusal: why there is none although one is wanted."""
+    pedestal: as `mesh_blocks` puts it for the page, b"": there is none; refusal: why there is none although one is wanted;
+    copies_mm: x, y of the middles of its copies from its place, the nearest first, where they have no room of one alone;
+    copies_problem: why they have none, "": they have."""
 
     size_mm: Vector
     overhang_mm2: float
     problem: str
     pedestal: bytes = b""
     refusal: str = ""
+    copies_mm: tuple[Place, ...] = (MIDDLE,)
+    copies_problem: str = ""
 
 
 def stand(tell: Tell, bench: Bench) -> Standing:
@@ -43,4 +51,16 @@ def stand(tell: Tell, bench: Bench) -> Standing:
             pedestal, refusal = b"", str(error)
     risky = risky_upright(mesh, profile.process.self_supporting_angle_deg)
     problem = out_of_reach((one_piece(mesh, profile.machine),), profile)
-    return Standing(size_mm, float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal)
+    copies_mm, none = _copies(mesh, bench)
+    return Standing(size_mm, float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal, copies_mm, none)
+
+
+def _copies(mesh: Mesh, bench: Bench) -> tuple[tuple[Place, ...], str]:
+    """Where the copies stand, and why they cannot."""
+    if bench.copies == 1 or bench.model is None:
+        return (MIDDLE,), ""
+    try:
+        places, _ = places_of_copies(mesh, bench.model.name, bench.parts, bench.copies, bench.profile)
+    except PlanError as error:
+        return (MIDDLE,), str(error)
+    return tuple(places), ""

@@ -1,10 +1,10 @@
 """The edit command: what a browser is started with."""
 
-import asyncio
 import stat
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
@@ -20,14 +20,18 @@ def test_a_browser_is_started_with_a_file_of_this_user_alone_that_leads_to_the_a
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     started_with: list[str] = []
-    monkeypatch.setattr(webbrowser, "open", lambda address: not started_with.append(address))
+    started = Event()
+
+    def start(address: str) -> bool:
+        started_with.append(address)
+        started.set()
+        return True
+
+    monkeypatch.setattr(webbrowser, "open", start)
 
     def serve(make: object, begin: object, announce: Callable[[str], None], *rest: Any) -> None:
-        async def run() -> None:
-            announce(ADDRESS)
-            await asyncio.get_running_loop().shutdown_default_executor()
-
-        asyncio.run(run())
+        announce(ADDRESS)
+        assert started.wait(60.0)
         file = Path(unquote(urlsplit(started_with[0]).path))
         assert oct(stat.S_IMODE(file.stat().st_mode)) == "0o600"
         assert f'content="0; url={ADDRESS}"' in file.read_text()

@@ -57,7 +57,7 @@ def test_a_file_is_sent_and_started_where_that_is_asked_for(capsys: pytest.Captu
 @pytest.mark.parametrize(("kind", "file"), [("octoprint", MARLIN), ("moonraker", KLIPPER)])
 def test_a_print_on_a_server_is_followed_to_its_end(kind: str, file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with stand_in(kind, steppers=("stepper_a", "stepper_c")) as (job, address):
-        assert main(["print", str(file), "--port", address, "--force", "--watch"]) == 0
+        assert main(["print", str(file), "--port", address, "--force", "--watch", "--no-browser"]) == 0
     said = capsys.readouterr()
     assert "there is no journal to resume from after a power cut" in said.err
     assert f"printed {file.name} on {address}" in said.out

@@ -69,7 +69,7 @@ def test_a_search_reads_only_what_takes_the_front_away_and_prices_nothing_that_l
     with reading(profile) as by_prices:
         pricing(profile)(decomposition.parts)
     assert "process.self_supporting_angle_deg" in by_search
-    assert {key for key in by_search if effect_of(key) != Effect.FRONT} == set()
+    assert {key for key in by_search if effect_of(key) < Effect.REACH} == set()
     assert "process.infill_density" in by_prices
     assert {key for key in by_prices if effect_of(key) == Effect.NONE} == set()
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import with_profile
+from machine.app.workbench.bench.bench import Bench, with_front, with_profile
 from machine.app.workbench.session.base import hear_from
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.finding import Search
@@ -291,6 +291,35 @@ def test_a_plane_that_is_refused_is_put_at_the_nearest_place_when_that_is_asked_
 
     session = when_done(work)
     assert (session.bench.cuts, session.problem) == ((PlannedPart(UP, 30.0),), "")
+
+
+def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_and_undo_brings_it_back() -> None:
+    low, high = (Plane(np.array(UP), offset_mm) for offset_mm in (5.0, 25.0))
+    rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((low,), 1.0, 2.0, 3.0), FrontRow((low, high), 1.0, 1.0, 2.0, chosen=True))
+
+    async def work(session: Session) -> None:
+        async def answer(task: str, *given: Any, **more: Any) -> Any:
+            if task != "try_cuts":
+                return Standing((40.0, 8.0, 40.0), 0.0, "") if task == "stand" else None
+            far = given[1].profile.process.place_mm[0] > 50.0 and any(cut.offset_mm > 20.0 for cut in given[2])
+            return Trial((), 3, "Z would go too far") if far else Trial(())
+
+        async def price(task: str, bench: Bench, row: int, **more: Any) -> Any:
+            return bench.rows[row]
+
+        session.hand.run, session.long.run = answer, price  # type: ignore[method-assign, assignment]
+        session.do("find", with_front(session.bench, rows))
+        for x in (30, 60):
+            obey(session, {"do": "set", "key": "process.place_mm", "value": f"[{x}, 0]"})
+            await settled(session)
+            cut.append((session.bench.parts, len(session.bench.rows), session.problem))
+        obey(session, {"do": "undo"})
+
+    cut: list[tuple[int, int, str]] = []
+    session = when_done(work)
+    why = "set process.place_mm: the planes were taken away, for part 3 cannot be cut off: Z would go too far"
+    assert cut == [(3, 3, ""), (0, 2, why)]
+    assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
 
 
 def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is_done() -> None:

@@ -11,6 +11,7 @@ from machine.app.workbench.work import standing as work
 from machine.app.workbench.work.standing import Standing, stand
 from mdp.directions.turns import turned_by
 from mdp.mesh import Mesh
+from mdp.plans.plan_file import PlannedPart
 from profiles.errors import MeshError
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
@@ -43,6 +44,17 @@ def test_what_overhangs_is_what_is_seen_from_below_and_does_not_stand_on_the_pla
 
 def test_what_is_larger_than_the_machine_reaches_is_told_in_the_sentence_of_export() -> None:
     assert standing(tee(height=300.0)).problem.startswith("part 1 reaches Z 300.0 mm at A0.0 C0.0, Z goes from ")
+
+
+def test_copies_stand_beside_the_model_and_what_has_no_room_or_is_in_parts_is_told_in_the_sentence_of_export() -> None:
+    bench = replace(with_model(Bench(load(settings=["process.place_mm=[10, 5]"])), model(mesh=tee())), copies=3)
+    stood = stand(lambda report: None, bench)
+    assert (len(stood.copies_mm), stood.copies_mm[0], stood.copies_problem) == (3, (0.0, 0.0), "")
+    crowd = stand(lambda report: None, replace(bench, copies=500))
+    assert crowd.copies_mm == ((0.0, 0.0),)
+    assert crowd.copies_problem.startswith("--copies 500: ")
+    cut = replace(bench, cuts=(PlannedPart((0.0, 0.0, 1.0), 20.0),))
+    assert stand(lambda report: None, cut).copies_problem.endswith("copies are printed in one piece each: --parts 1")
 
 
 def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_its_height() -> None:

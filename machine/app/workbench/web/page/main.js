@@ -21,6 +21,7 @@ import { partsList } from "./parts-list.js";
 import { partsPanel } from "./parts-panel.js";
 import { pictureOf } from "./picture.js";
 import { apartPanel } from "./pieces.js";
+import { placePanel } from "./place-panel.js";
 import { planesPanel } from "./planes-panel.js";
 import { printFrame } from "./print-frame.js";
 import { titleOfModel } from "./print-news.js";
@@ -69,6 +70,7 @@ function main() {
   printPanel();
   clicksOf(picture);
   modelOf(picture);
+  placePanel(picture);
   thumbnailsOf(picture);
   apartPanel(picture);
   if (picture) {

@@ -84,14 +84,14 @@ export function sizePanel() {
   }));
   let shown = null; // the standing that was told last
   $("scale-as-read").addEventListener("click", () => send({ do: "set", key: "process.scale", value: null }));
-  onState(({ standing, scale: factor, machine, problem }, before) => {
+  onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;
     const fresh = problem !== before?.problem || !alike(standing, shown);
     shown = standing;
     const fill = (input, value) => { if (fresh || document.activeElement !== input) input.value = value; };
     fill($("scale"), Number((100 * factor).toPrecision(6)));
     sides.forEach((side, k) => fill(side, standing.size_mm[k].toFixed(2)));
-    $("fit-told").textContent = standing.problem ? `Too large in one piece: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
+    $("fit-told").textContent = standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
     $("fit-told").classList.toggle("refused", Boolean(standing.problem));
   });
 }

@@ -7,7 +7,7 @@ import { outlive } from "../../../../view/template/gl.js";
 import { linesOf } from "../../../../view/template/lines.js";
 import { add, bounds, carried, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone, unit } from "../../../../view/template/math.js";
 import { beside, cutsOf, planesOf } from "../../../../view/template/model.js";
-import { MOST_CUTS, solidOf } from "../../../../view/template/solids.js";
+import { boxEdges, MOST_CUTS, solidOf, trianglesOf } from "../../../../view/template/solids.js";
 import { markedOver } from "./marks-panel.js";
 import { piecesOn } from "./pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
@@ -16,14 +16,16 @@ const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156];
 
 const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
 
+const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
+
 const PLANE_COLOUR = [30, 120, 190];
 
 const cornersOf = (box) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => box[(i >> axis) & 1][axis]));
 
-/** Corners of boxes about all that is drawn but the table: the model or its parts, or the walls of all copies, planes, marks and what is in the way. */
-export function placesDrawn({ box, pieces, shifts, walls, wallsAlone, plane, pedestal, extras }) {
-  const bands = (pieces ? null : walls) || [], whole = pieces ? pieces.parts.map((part, k) => part.box.map((place) => add(place, shifts[k]))) : bands.map(({ places }) => bounds(places));
-  if (!pieces && !(wallsAlone && bands.length)) whole.push(box, pedestal ? bounds(pedestal.vertices) : []);
+/** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
+export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shifts, walls, plane, pedestal, extras }) {
+  const bands = (pieces ? null : walls) || [], whole = pieces ? pieces.parts.map((part, k) => part.box.map((place) => add(place, shifts[k]))) : bands.map(({ places }) => bounds(places).map((corner) => sub(corner, place)));
+  if (!pieces) whole.push(pedestal ? bounds(pedestal.vertices) : [], ...[[0, 0, 0], ...copies].map((shift) => box.map((corner) => add(corner, shift))));
   const rim = plane ? beside(plane.normal).flatMap((way) => [1, -1].map((sign) => add(plane.centre_mm, scaled(way, sign * plane.radius_mm)))) : [];
   const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((shape) => shape && shape.places.length)
     .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
@@ -35,8 +37,8 @@ export function placesDrawn({ box, pieces, shifts, walls, wallsAlone, plane, ped
 export function pictureOf(canvas, camera) {
   const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
   if (!gl) return null;
-  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, pedestal: null, machine: null, dark: false, marks: null, extras: {} };
-  let card = null, asked = false, count = 0;
+  const scene = { model: null, matrix: IDENTITY, place: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, pedestal: null, machine: null, dark: false, marks: null, extras: {} };
+  let card = null, asked = false, count = 0, placed = "";
   const drawn = [], drawnOf = {}, stale = new Set(); // of what the card holds: made anew before it is drawn, once however often it has changed by then
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
@@ -54,6 +56,7 @@ export function pictureOf(canvas, camera) {
     stale.forEach((part) => (typeof part === "string" ? extra(part) : part()));
     stale.clear();
   };
+  const bodies = () => Math.floor(MOST_FACES / Math.max(scene.model?.count || 0, 1));
   const release = (thing) => { if (thing) thing.free(); };
   const table = () => {
     if (!scene.machine) return;
@@ -77,18 +80,20 @@ export function pictureOf(canvas, camera) {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     const view = camera.toEye(), lens = camera.lens(width / height);
-    const seenAs = (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
-    const flat = seenAs(IDENTITY), below = camera.eye()[2] < 0;
+    const seenFrom = (view) => (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
+    const plate = seenFrom(view)(IDENTITY), seenAs = seenFrom(multiply(view, moved(scene.place))), flat = seenAs(IDENTITY), below = camera.eye()[2] < 0;
     card.frame.begin(width, height);
-    if (card.table && !below) paintPlate(flat);
+    if (card.table && !below) paintPlate(plate);
     if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
     else if (card.solid) {
-      (card.walls || []).forEach((wall) => wall.draw(flat));
-      const ghost = card.walls ? FAINT : 0, alone = scene.wallsAlone && card.walls?.length;
-      if (!alone) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost });
-      if (!alone && card.pedestal) card.pedestal.draw(flat, { ghost });
+      (card.walls || []).forEach((wall) => wall.draw(plate));
+      const ghost = card.walls ? FAINT : 0;
+      for (const shift of [[0, 0, 0], ...scene.copies.slice(0, bodies())]) {
+        card.solid.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost });
+        if (card.pedestal) card.pedestal.draw(seenAs(moved(shift)), { ghost });
+      }
     }
-    if (card.table && below) paintPlate(flat, { strength: 0.18 });
+    if (card.table && below) paintPlate(plate, { strength: 0.18 });
     if (card.plane) {
       card.plane.rim.draw(flat.toClip, { lift: 1e-4 });
       card.plane.disc.draw(flat, { strength: 0.3 });
@@ -196,9 +201,8 @@ export function pictureOf(canvas, camera) {
       if (same && !(found && repainted)) ask();
       else anew(same && card.pieces ? chosenPiece : pieces);
     },
-    /** The walls of what is sliced, triangles of each part, with the model as a ghost about them, or without it; null: none. */
-    walls: (found, alone) => {
-      scene.wallsAlone = alone;
+    /** The walls of what is sliced, triangles of each part, with the model and its copies as ghosts about them; null: none. */
+    walls: (found) => {
       const same = (scene.walls || []).length === (found || []).length && (found || []).every((wall, k) => wall === scene.walls[k]);
       if (same && Boolean(found) === Boolean(scene.walls)) return;
       scene.walls = found;
@@ -212,12 +216,22 @@ export function pictureOf(canvas, camera) {
       scene.pedestal = body;
       anew(pedestal);
     },
+    /** Where the middle of all that is drawn but the walls stands on the plate, and its copies, from there. */
+    place(place, copies) {
+      const told = JSON.stringify([place, copies, scene.box]);
+      if (told === placed) return;
+      placed = told;
+      Object.assign(scene, { place, copies });
+      const boxes = copies.slice(bodies()).flatMap((shift) => boxEdges(...scene.box.map((corner) => add(corner, shift))));
+      this.extra("copies", boxes.length ? told : "", () => (boxes.length ? [{ lines: trianglesOf([{ corners: boxes, colour: [...MODEL_COLOUR, 255] }]) }] : []));
+      ask();
+    },
     /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
     placeOf: (place) => {
       const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
       return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
     },
-    eye: () => camera.eye(),
+    eye: () => sub(camera.eye(), scene.place),
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
     matrix: () => scene.matrix,
@@ -231,15 +245,15 @@ export function pictureOf(canvas, camera) {
     },
     /** All that is drawn brought into view, and other places. */
     fit: (others = []) => {
-      camera.fit([...placesDrawn(scene), ...others], canvas.clientWidth / Math.max(canvas.clientHeight, 1));
+      camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), canvas.clientWidth / Math.max(canvas.clientHeight, 1));
       ask();
     },
-    /** From where and along what an event on the canvas looks, in the frame of the platform. */
-    sight: (event) => {
+    /** From where and along what an event on the canvas looks, in the frame of the platform, the model in its middle. */
+    sight(event) {
       const box = canvas.getBoundingClientRect(), eye = camera.eye();
       const x = ((event.clientX - box.left) / box.width * 2 - 1) * (box.width / box.height) * HALF_HEIGHT;
       const y = (1 - ((event.clientY - box.top) / box.height) * 2) * HALF_HEIGHT;
-      return [eye, add(unit(sub(camera.target, eye)), add(scaled(camera.right(), x), scaled(camera.up(), y)))];
+      return [this.eye(), add(unit(sub(camera.target, eye)), add(scaled(camera.right(), x), scaled(camera.up(), y)))];
     },
     /** The same in the frame of the model as it is read. */
     ray(event) {

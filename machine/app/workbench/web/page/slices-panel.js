@@ -83,7 +83,8 @@ export function stopsPanel() {
     adding = true;
     send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
   });
-  onState(({ copies, stops, problem }, before) => {
+  onState(({ copies, copies_told: told, stops, problem }, before) => {
+    $("copies-told").textContent = told;
     if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
     if (alike(stops, before?.stops)) return;
     if (adding) $("stop-at").value = "";

@@ -1,21 +1,25 @@
 // Temperature graph: nozzle and bed of the print that is looked at, over the last ten minutes, with what they are to be.
 
 import { $ } from "../../../../view/template/page.js";
+import { keptInTab } from "./kept.js";
 
 const KEPT_S = 600, WIDTH = 300, HEIGHT = 80; // of the drawing
 const HEATS = ["nozzle", "bed"];
-const SAMPLES = new Map(); // by the number of a print: {at_s, nozzle, bed, nozzleTarget, bedTarget}, oldest first
+const kept = keptInTab("heats", { samples: [] }); // a reload loses nothing of them
+export const SAMPLES = new Map(kept.now.samples); // by the number of a print: {at_s, nozzle, bed, nozzleTarget, bedTarget}, oldest first
+
+addEventListener("pagehide", () => kept.keep({ samples: [...SAMPLES] }));
 
 /** Keep what is told of the temperatures of prints, once each. */
 export function keepHeats(prints) {
   for (const number of SAMPLES.keys()) if (!prints.some((print) => print.number === number)) SAMPLES.delete(number);
   for (const { number, progress } of prints) {
     if (!progress || progress.nozzle_c == null) continue;
-    const kept = SAMPLES.get(number) || [];
-    if (kept.at(-1)?.at_s === progress.heat_s) continue;
-    kept.push({ at_s: progress.heat_s, nozzle: progress.nozzle_c, bed: progress.bed_c, nozzleTarget: progress.nozzle_target_c, bedTarget: progress.bed_target_c });
-    while (kept[0].at_s < progress.heat_s - KEPT_S) kept.shift();
-    SAMPLES.set(number, kept);
+    const own = SAMPLES.get(number) || [];
+    if (own.at(-1)?.at_s === progress.heat_s) continue;
+    own.push({ at_s: progress.heat_s, nozzle: progress.nozzle_c, bed: progress.bed_c, nozzleTarget: progress.nozzle_target_c, bedTarget: progress.bed_target_c });
+    while (own[0].at_s < progress.heat_s - KEPT_S) own.shift();
+    SAMPLES.set(number, own);
   }
 }
 

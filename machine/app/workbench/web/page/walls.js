@@ -1,4 +1,4 @@
-// Walls: what is seen of the parts that are sliced, drawn as they become ready, over the faint model; copies, which stand elsewhere, without it.
+// Walls: what is seen of the parts that are sliced, drawn as they become ready, over the faint model and its copies.
 
 import { PLAIN, rgb } from "../../../../view/template/colours.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/math.js";
@@ -34,7 +34,7 @@ export function wallsOf(picture) {
     if (!answer) asked.delete(part); // the line is lost: the next state asks again
     if (answer?.ok) update({ walls: new Map(store.walls).set(part, bandsOf(await answer.arrayBuffer(), store.state.colours[part - 1] || PLAIN)) });
   };
-  subscribe(({ state: { slicing, sliced, copies }, tab, triangles }) => {
+  subscribe(({ state: { slicing, sliced }, tab, triangles }) => {
     const slices = tab !== "slices" ? null : slicing || (sliced && !sliced.stale ? sliced : null);
     if (slices && slices.number !== number) {
       [number, asked] = [slices.number, new Set()];
@@ -42,7 +42,7 @@ export function wallsOf(picture) {
     }
     slices?.ready.filter((part) => !asked.has(part)).forEach((part) => fetchPart(part, number));
     const shown = slices && triangles && store.walls.size > 0;
-    picture.walls(shown ? [...store.walls.values()] : null, copies > 1);
+    picture.walls(shown ? [...store.walls.values()] : null);
     document.documentElement.dataset.walls = shown ? [...store.walls.keys()].sort((a, b) => a - b).join(" ") : "";
   });
 }

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
-from machine.app.printer.watch_page import Watched, serve, state_of
+from machine.app.serving.watch_page import Watched, serve, state_of
+from machine.link.pending_commands import Command, Control, PendingCommand
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
 from profiles.errors import OutputError
@@ -26,9 +27,14 @@ HALF = Progress(
 
 
 @pytest.fixture
-def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
-    monkeypatch.setattr("machine.app.printer.watch_page.LAST_WORD_S", 0.0)
-    with serve(b"<p>the page</p>") as running:
+def control() -> Control:
+    return Control()
+
+
+@pytest.fixture
+def watched(monkeypatch: pytest.MonkeyPatch, control: Control) -> Iterator[Watched]:
+    monkeypatch.setattr("machine.app.serving.watch_page.LAST_WORD_S", 0.0)
+    with serve(b"<p>the page</p>", control=control) as running:
         yield running
 
 
@@ -50,6 +56,12 @@ def asked_without_token(watched: Watched, path: str, method: str = "GET", **head
     return answer, content
 
 
+def ordered(watched: Watched, name: str, method: str = "POST", **headers: str) -> int:
+    """The status of what a page of the print's own asks for."""
+    own = {"Origin": f"http://127.0.0.1:{port_of(watched)}"}
+    return asked(watched, f"/order/{name}", method, **own | headers)[0].status
+
+
 def test_the_page_and_the_state_are_served(watched: Watched) -> None:
     assert asked(watched, "/")[1] == b"<p>the page</p>"
     assert json.loads(asked(watched, "/state")[1]) == {"state": "waiting"}
@@ -67,7 +79,10 @@ def test_nothing_else_is_served(watched: Watched, path: str) -> None:
 @pytest.mark.parametrize("path", ["/", "/state", "/AAAAAAAAAAAAAAAAAAAAAA/", "/AAAAAAAAAAAAAAAAAAAAAA/state", "//state"])
 def test_who_does_not_know_the_token_of_the_address_is_shown_nothing(watched: Watched, path: str) -> None:
     answer, content = asked_without_token(watched, path)
-    assert (answer.status, content) == (404, b"this page is at the address that the print has told\n")
+    assert (answer.status, content) == (
+        404,
+        b"this page is at the address that tiltprint has told, which is another one with each start\n",
+    )
 
 
 def test_every_print_has_another_token(watched: Watched) -> None:
@@ -75,20 +90,55 @@ def test_every_print_has_another_token(watched: Watched) -> None:
     assert Watched(b"").token != watched.token
 
 
-@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS"])
-def test_nothing_can_be_ordered(watched: Watched, method: str) -> None:
-    assert asked(watched, "/state", method)[0].status == 405
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("pause", Command.PAUSE),
+        ("resume", Command.RESUME),
+        ("stop", Command.CANCEL),
+        ("emergency", Command.EMERGENCY_STOP),
+    ],
+)
+def test_a_button_asks_of_the_print_what_a_key_does(watched: Watched, control: Control, name: str, command: Command) -> None:
+    assert ordered(watched, name) == 204
+    assert control.take() == PendingCommand(command)
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "headers", "status"),
+    [
+        ("pause", "GET", {}, 405),
+        ("pause", "PUT", {}, 405),
+        ("line", "POST", {}, 404),
+        ("pause", "POST", {"Origin": "http://evil.example"}, 403),
+        ("pause", "POST", {"Origin": "null"}, 403),
+        ("pause", "POST", {"Host": "evil.example"}, 403),
+    ],
+)
+def test_nothing_else_can_be_ordered_nor_by_another_page(
+    watched: Watched, control: Control, name: str, method: str, headers: dict[str, str], status: int
+) -> None:
+    assert ordered(watched, name, method, **headers) == status
+    assert control.take() is None
+
+
+def test_without_the_token_or_the_origin_of_the_page_nothing_is_ordered(watched: Watched, control: Control) -> None:
+    own = {"Origin": f"http://127.0.0.1:{port_of(watched)}"}
+    assert asked_without_token(watched, "/AAAAAAAAAAAAAAAAAAAAAA/order/pause", "POST", **own)[0].status == 404
+    assert asked(watched, "/order/pause", "POST")[0].status == 403
+    assert control.take() is None
 
 
 @pytest.mark.parametrize(
     ("host", "status"),
     [
-        ("localhost", 200), ("localhost:8420", 200), ("127.0.0.1:1", 200),
-        ("evil.example", 400), ("evil.example:80", 400), ("127.0.0.1.evil.example:80", 400), ("", 400), ("[::1]:80", 400),
+        ("localhost:{port}", 200), ("127.0.0.1:{port}", 200), ("localhost", 403), ("127.0.0.1:1", 403),
+        ("evil.example", 403), ("evil.example:{port}", 403), ("127.0.0.1.evil.example:{port}", 403),
+        ("", 403), ("[::1]:{port}", 403),
     ],
 )  # fmt: skip
 def test_only_this_computer_by_name_is_answered(watched: Watched, host: str, status: int) -> None:
-    answer, content = asked(watched, "/state", Host=host)
+    answer, content = asked(watched, "/state", Host=host.format(port=port_of(watched)))
     assert answer.status == status
     assert (b"waiting" in content) == (status == 200)
 
@@ -101,13 +151,13 @@ def test_no_other_page_may_frame_it_or_keep_it(watched: Watched) -> None:
 
 
 def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.app.printer.watch_page.LAST_WORD_S", 0.0)
+    monkeypatch.setattr("machine.app.serving.watch_page.LAST_WORD_S", 0.0)
     with serve(b"x" * 20_000_000) as running:
         port = port_of(running)
         for _ in range(3):
             with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as rude:
                 rude.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                rude.sendall(f"GET /{running.token}/ HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+                rude.sendall(f"GET /{running.token}/ HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n".encode())
                 rude.recv(10)
         assert asked(running, "/state")[0].status == 200
     assert capfd.readouterr().err == ""
@@ -160,16 +210,29 @@ def test_print_watch_follows_the_print_to_its_end(
     pages: list[Watched] = []
 
     @contextmanager
-    def remembered(page: bytes, port: int) -> Iterator[Watched]:
-        with serve(page, port) as running:
+    def remembered(page: bytes, port: int, control: Control) -> Iterator[Watched]:
+        with serve(page, port, control) as running:
             pages.append(running)
             yield running
 
-    monkeypatch.setattr("machine.app.printer.watch_page.serve", remembered)
+    monkeypatch.setattr("machine.app.serving.watch_page.serve", remembered)
     file = tmp_path / "moves.gcode"
     file.write_text("G28\nM109 S200\nG1 Z0.2 F6000\nG1 X10 E1\nG1 Y10 E2\nM104 S0\nM140 S0\n")
-    assert main(["print", str(file), "--port", "sim", "--watch", "--force"]) == 0
+    assert main(["print", str(file), "--port", "sim", "--watch", "--no-browser", "--force"]) == 0
     state, (header, _) = json.loads(pages[0].state()), opened(pages[0].page)
     assert (state["state"], state["acknowledged"], state["total"]) == ("done", 7, 7)
     assert header["live"] is True
     assert f"watch the print at {pages[0].address}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("more", "opened_in"), [((), 1), (("--no-browser",), 0)])
+def test_print_watch_opens_the_browser_unless_it_is_told_not_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...], opened_in: int
+) -> None:
+    monkeypatch.setattr("machine.app.serving.watch_page.LAST_WORD_S", 0.0)
+    shown: list[str] = []
+    monkeypatch.setattr("machine.app.serving.watch_page.lead_browser", lambda address, until_end: shown.append(address))
+    file = tmp_path / "moves.gcode"
+    file.write_text("G28\nM109 S200\nG1 Z0.2 F6000\nG1 X10 E1\nM104 S0\nM140 S0\n")
+    assert main(["print", str(file), "--port", "sim", "--watch", "--force", *more]) == 0
+    assert len(shown) == opened_in

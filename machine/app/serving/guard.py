@@ -7,8 +7,10 @@ person's own browser: its Origin is refused, and a name of its own that points h
 import re
 import secrets
 from collections.abc import Collection, Iterable, Mapping
+from typing import TYPE_CHECKING
 
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")
@@ -23,7 +25,7 @@ SAFE = ("GET", "HEAD")
 REFUSED_SOCKET = 1008  # policy violation, RFC 6455
 FOREIGN = "this page is for this computer only\n"
 LONG_NUMBER = re.compile(r"/\d{10}\d*(/|$)")  # nothing here has such a one
-UNKNOWN = "the workbench is at the address that tiltprint edit has told, which is another one with each start\n"
+UNKNOWN = "this page is at the address that tiltprint has told, which is another one with each start\n"
 
 Headers = Iterable[tuple[bytes, bytes]]
 
@@ -33,7 +35,7 @@ def values_of(headers: Headers, wanted: bytes) -> list[str]:
     return [value.decode("latin-1") for name, value in headers if name.lower() == wanted]
 
 
-def method_of(scope: Scope) -> str:
+def method_of(scope: "Scope") -> str:
     """Of a request; WEBSOCKET of a websocket."""
     return "WEBSOCKET" if scope["type"] == "websocket" else scope["method"]
 
@@ -63,10 +65,10 @@ def refusal(headers: Headers, method: str, path: str, token: str, port: int) -> 
 class Guard:
     """An ASGI application that lets through to another one what may pass, with headers that keep its answers to its pages."""
 
-    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+    def __init__(self, app: "ASGIApp", token: str, port: int) -> None:
         self._app, self._token, self._port = app, token, port
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: "Scope", receive: "Receive", send: "Send") -> None:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -77,7 +79,7 @@ class Guard:
             await refuse(scope, send, *refused)
 
 
-async def refuse(scope: Scope, send: Send, status: int, sentence: str) -> None:
+async def refuse(scope: "Scope", send: "Send", status: int, sentence: str) -> None:
     """Answer a request with a sentence alone, a websocket by closing it before it is open."""
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": REFUSED_SOCKET})
@@ -87,10 +89,10 @@ async def refuse(scope: Scope, send: Send, status: int, sentence: str) -> None:
     await send({"type": "http.response.body", "body": sentence.encode()})
 
 
-def with_headers(send: Send, headers: Mapping[str, str] = HEADERS) -> Send:
+def with_headers(send: "Send", headers: Mapping[str, str] = HEADERS) -> "Send":
     """Answers with the headers of ours that they do not have themselves."""
 
-    async def wrapped(message: Message) -> None:
+    async def wrapped(message: "Message") -> None:
         if message["type"] == "http.response.start":
             given = list(message.get("headers", ()))
             there = {name.lower() for name, _ in given}

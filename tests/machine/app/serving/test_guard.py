@@ -2,7 +2,7 @@
 
 import pytest
 
-from machine.app.workbench.access.guard import refusal
+from machine.app.serving.guard import refusal
 
 PORT, TOKEN = 8123, "secret"
 OWN = "http://127.0.0.1:8123"

@@ -1,20 +1,22 @@
 """Watch page: the page and the state of a running print, served to this computer alone while the print lasts.
 
-Nothing can be ordered through it. The address holds a token, for other users of this computer reach its ports too. Only requests
-for the local host by name are answered, or a page from elsewhere could try by letting its own name point here (DNS rebinding).
+Its buttons ask of the print what keys in the terminal do. Who is answered: see `machine.app.serving.guard`.
 """
 
 import json
 import secrets
 import socket
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from machine.app.pipeline.programs import LoadedProgram
+from machine.app.serving.browser import lead_browser
+from machine.app.serving.guard import HOST, UNKNOWN, Guard
 from machine.app.terminal.progress import say
+from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
 from machine.view.page import print_page
 from profiles.errors import OutputError, reason
@@ -22,17 +24,15 @@ from profiles.errors import OutputError, reason
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
-HOST = "127.0.0.1"
 LAST_WORD_S = 2.0  # a page that is open asks twice in this time, so it sees how the print ended
 GRACE_S = 1  # for answers under way when the print ends
 TOLD = ("acknowledged", "total", "share", "elapsed_s", "left_s", "part", "layer", "message")
-UNKNOWN = "this page is at the address that the print has told\n"
-HEADERS = {
-    "Cache-Control": "no-store",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Content-Security-Policy": "frame-ancestors 'none'",
+FRAMED = {"Content-Security-Policy": "frame-ancestors 'none'"}
+ORDERS = {
+    "pause": Command.PAUSE,
+    "resume": Command.RESUME,
+    "stop": Command.CANCEL,
+    "emergency": Command.EMERGENCY_STOP,
 }
 
 
@@ -79,19 +79,24 @@ class Watched:
 
 
 @contextmanager
-def serve_watch_page(job: LoadedProgram, port: int | None) -> Iterator[Watched]:
-    """Serve the page of a print on a port of this computer, 0: on any free one; None: nobody watches. Raises OutputError."""
+def serve_watch_page(job: LoadedProgram, port: int | None, control: Control, browser: bool = True) -> Iterator[Watched]:
+    """Serve the page of a print on a port of this computer, 0: on any free one; None: nobody watches. control: of the print,
+    asked by the page's buttons; browser: open it there. Raises OutputError."""
     if port is None:
         yield Watched()
         return
-    with serve(print_page(job.name, job.program, job.profile, live=True), port) as watched:
+    page = print_page(job.name, job.program, job.profile, live=True)
+    with serve(page, port, control) as watched, ExitStack() as until_end:
         say(f"watch the print at {watched.address}")
+        if browser:
+            lead_browser(watched.address, until_end)
         yield watched
 
 
 @contextmanager
-def serve(page: bytes, port: int = 0) -> Iterator[Watched]:
-    """Serve the page on a port of this computer, 0: any free one, until the block ends. Raises OutputError for a port in use."""
+def serve(page: bytes, port: int = 0, control: Control | None = None) -> Iterator[Watched]:
+    """Serve the page on a port of this computer, 0: any free one, until the block ends. control: of the print; None: nothing can
+    be asked of it. Raises OutputError for a port in use."""
     from uvicorn import Config, Server
 
     watched = Watched(page)
@@ -99,10 +104,10 @@ def serve(page: bytes, port: int = 0) -> Iterator[Watched]:
         own = socket.create_server((HOST, port))
     except OSError as error:
         raise OutputError(f"--watch-port {port} cannot be used: {reason(error)}") from None
-    watched.address = f"http://{HOST}:{own.getsockname()[1]}/{watched.token}/"
-    config = Config(
-        _application(watched), log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=GRACE_S
-    )
+    there = own.getsockname()[1]
+    watched.address = f"http://{HOST}:{there}/{watched.token}/"
+    guarded = Guard(_application(watched, control), watched.token, there)
+    config = Config(guarded, log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=GRACE_S)
     server = Server(config)
     thread = Thread(target=server.run, args=([own],), daemon=True)
     thread.start()
@@ -119,30 +124,27 @@ def serve(page: bytes, port: int = 0) -> Iterator[Watched]:
         own.close()
 
 
-def _application(watched: Watched) -> "ASGIApp":
-    """The page and the state below the token."""
+def _application(watched: Watched, control: Control | None) -> "ASGIApp":
+    """The page, the state and what may be asked of the print, below the token."""
     from starlette.applications import Starlette
-    from starlette.middleware import Middleware
-    from starlette.middleware.trustedhost import TrustedHostMiddleware
     from starlette.requests import Request
     from starlette.responses import Response
     from starlette.routing import Route
 
-    async def unknown(request: Request, error: Exception) -> Response:
-        return Response(UNKNOWN, 404, HEADERS)
+    async def page(request: Request) -> Response:
+        return Response(watched.page, 200, FRAMED, "text/html")
 
-    def route(path: str, content: Callable[[], bytes], media_type: str) -> Route:
-        async def answer(request: Request) -> Response:
-            if not secrets.compare_digest(request.path_params["token"].encode(), watched.token.encode()):
-                return Response(UNKNOWN, 404, HEADERS)
-            return Response(content(), 200, HEADERS, media_type)
+    async def state(request: Request) -> Response:
+        return Response(watched.state(), 200, FRAMED, "application/json")
 
-        return Route("/{token}/" + path, answer)
+    async def order(request: Request) -> Response:
+        command = ORDERS.get(request.path_params["name"])
+        if command is None or control is None:
+            return Response(UNKNOWN, 404)
+        control.ask(command)
+        return Response(status_code=204)
 
-    app = Starlette(
-        routes=[route("", lambda: watched.page, "text/html"), route("state", watched.state, "application/json")],
-        middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
-        exception_handlers={404: unknown},
-    )
+    asked = [] if control is None else [Route("/{token}/order/{name}", order, methods=["POST"])]
+    app = Starlette(routes=[Route("/{token}/", page), Route("/{token}/state", state), *asked])
     app.router.redirect_slashes = False
     return app

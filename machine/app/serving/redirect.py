@@ -1,5 +1,5 @@
-"""Redirect: a file that leads a browser to the workbench. What a browser is started with every user of the computer can read, and
-the address holds the token; Jupyter does it so, too (jupyter_server/serverapp.py, write_browser_open_file)."""
+"""Redirect: a file that leads a browser to a page of this computer. What a browser is started with every user of the computer can
+read, and the address holds the token; Jupyter does it so, too (jupyter_server/serverapp.py, write_browser_open_file)."""
 
 import os
 import tempfile
@@ -16,7 +16,7 @@ OLD_S = 24 * 3600.0  # no browser takes so long to start: what a program that wa
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>tiltprint</title><meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0; url={address}"></head>
-<body><p><a href="{address}">The workbench</a></p></body></html>
+<body><p><a href="{address}">tiltprint</a></p></body></html>
 """
 
 
