@@ -57,6 +57,14 @@ class Config:
         return None if text is None else text.lower() in ("1", "true", "yes")
 
 
+def width_of_nozzle(text: str, nozzle: str) -> str:
+    """A line's width that is in percent of the nozzle, in mm, "0" where the nozzle is not told; any other as it is."""
+    if not text.strip().endswith("%"):
+        return text
+    diameter = first_of(nozzle)
+    return f"{float(text.strip()[:-1]) / 100.0 * float(diameter):g}" if diameter else "0"
+
+
 def first_of(text: str) -> str:
     """The first extruder's value of a list; quoted texts stay whole."""
     stripped = text.strip()

@@ -32,6 +32,11 @@ def _fan_most(config: Config, key: str) -> Converted:
     return share(config, key)
 
 
+def _bridge_fan(config: Config, key: str) -> Converted:
+    """The fan over bridges; below 0 SuperSlicer has it as elsewhere."""
+    return Left("below 0: as elsewhere") if (config.number(key) or 0.0) < 0.0 else share(config, key)
+
+
 def _override(own: str, convert: Convert = number) -> Convert:
     """The filament's own value where it has one, else the printer's."""
 
@@ -80,7 +85,7 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("material.fan", "max_fan_speed", _fan_most),
     ("material.fan_least", "min_fan_speed", _fan_least),
     ("material.fan_layer_time_s", "fan_below_layer_time", above_zero("no layer is cooled by its time")),
-    ("material.fan_bridge", "bridge_fan_speed", share),
+    ("material.fan_bridge", "bridge_fan_speed", _bridge_fan),
     ("material.fan_off_layers", "disable_fan_first_layers", whole),
     ("material.fan_full_layer", "full_fan_speed_layer", whole),
     ("material.retract_mm", "retract_length", _override("filament_retract_length")),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from profiles.errors import ProfileError, reason
-from profiles.foreign.config import Config, Entry, first_of
+from profiles.foreign.config import Config, Entry, width_of_nozzle
 
 PROGRAM = "OrcaSlicer"
 TYPES = {"process": "process", "filament": "material", "machine": "printer"}
@@ -132,9 +132,8 @@ def _own(values: Mapping[str, str]) -> str:
 
 def _said(key: str, name: str, text: str, values: Mapping[str, str]) -> str:
     """A value as PrusaSlicer would say it."""
-    if name in WIDTHS and text.strip().endswith("%"):
-        nozzle = first_of(values.get("nozzle_diameter", ""))
-        return f"{float(text.strip()[:-1]) / 100.0 * float(nozzle):g}" if nozzle else "0"
+    if name in WIDTHS:
+        return width_of_nozzle(text, values.get("nozzle_diameter", ""))
     return WORDS.get(key, {}).get(text, text)
 
 

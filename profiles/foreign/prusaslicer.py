@@ -8,10 +8,15 @@ import re
 from collections.abc import Iterator, Mapping
 
 from profiles.errors import ProfileError
-from profiles.foreign.config import Config, Entry
+from profiles.foreign.config import Config, Entry, width_of_nozzle
 
 KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # of a bundle's sections, and the options' names
 SECTION = re.compile(r"\[(.+)\]")
+# SuperSlicer has the widths of lines by their distance, too; its percentages of widths and of layers are of the nozzle, and
+# flows are percentages (supermerill/SuperSlicer, src/libslic3r/PrintConfig.cpp, ratio_over).
+OF_SUPERSLICER = frozenset({"extrusion_spacing", "perimeter_extrusion_spacing", "external_perimeter_extrusion_spacing"})
+OF_NOZZLE = ("extrusion_width", "min_layer_height", "max_layer_height")
+FLOWS = ("bridge_flow_ratio", "over_bridge_flow_ratio")
 SHOWN = 8  # presets that a sentence names
 
 Presets = dict[str, dict[str, dict[str, str]]]  # kind, name, key
@@ -22,7 +27,7 @@ def read_settings(lines: list[str], program: str, chosen: Mapping[str, str]) -> 
     presets = _sections(lines)
     if not any(presets[kind] for kind in KINDS):
         plain = presets[""].get("", {})
-        return _config(program, plain, plain.get("print_settings_id", ""), plain.get("filament_settings_id", ""))
+        return _config(program, plain, plain.get("print_settings_id", ""), _unquoted(plain))
     names = {kind: _chosen(presets, kind, chosen.get(option, "")) for kind, option in KINDS.items()}
     values: dict[str, str] = {}
     for kind in ("printer", "filament", "print"):
@@ -42,9 +47,12 @@ def gcode_settings(text: str) -> dict[str, str]:
 
 def of_gcode(settings: Mapping[str, str]) -> Config:
     """The settings of a G-code file that PrusaSlicer or SuperSlicer wrote."""
-    return _config(
-        "PrusaSlicer", settings, settings.get("print_settings_id", ""), settings.get("filament_settings_id", "").strip('"')
-    )
+    return _config("PrusaSlicer", settings, settings.get("print_settings_id", ""), _unquoted(settings))
+
+
+def _unquoted(settings: Mapping[str, str]) -> str:
+    """The name of the first filament."""
+    return settings.get("filament_settings_id", "").split(";")[0].strip().strip('"')
 
 
 def _sections(lines: list[str]) -> Presets:
@@ -99,4 +107,14 @@ def _parents(text: str) -> Iterator[str]:
 
 
 def _config(program: str, values: Mapping[str, str], process: str, material: str) -> Config:
-    return Config(program, {key: Entry(key, value) for key, value in values.items()}, (), process, material)
+    if not OF_SUPERSLICER & values.keys():
+        return Config(program, {key: Entry(key, value) for key, value in values.items()}, (), process, material)
+    entries = {key: Entry(key, _said(key, value, values.get("nozzle_diameter", ""))) for key, value in values.items()}
+    return Config("SuperSlicer", entries, (), process, material)
+
+
+def _said(key: str, text: str, nozzle: str) -> str:
+    """A value of SuperSlicer as PrusaSlicer would say it."""
+    if key.endswith(OF_NOZZLE):
+        return width_of_nozzle(text, nozzle)
+    return f"{float(text[:-1]) / 100.0:g}" if key in FLOWS and text.endswith("%") else text

@@ -78,6 +78,11 @@ def test_what_cannot_be_said_here_is_left_with_the_reason(values: dict[str, str]
     assert why in row.how
 
 
+def test_a_fan_over_bridges_that_is_as_elsewhere_is_left() -> None:
+    (row,) = (row for row in imported(config(bridge_fan_speed="-1"), "material").rows if row.name == "bridge_fan_speed")
+    assert (row.taken, row.how) == (False, "below 0: as elsewhere")
+
+
 def test_pressure_advance_on_a_condition_is_left_to_the_person() -> None:
     block = '"{if nozzle_diameter[0]==0.4}M900 K0.05{endif}"'
     (row,) = imported(config(start_filament_gcode=block), "material").rows
