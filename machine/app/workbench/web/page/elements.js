@@ -70,7 +70,7 @@ export function putTable(table, told, head, rows) {
   if (table.dataset.shown === fresh) return;
   table.dataset.shown = fresh;
   const name = table.contains(document.activeElement) ? document.activeElement.name : "", body = rows();
-  const titles = made("tr", {}, ...head.map(([text, className = ""]) => made(text ? "th" : "td", { text, scope: "col", className })));
+  const titles = made("tr", {}, ...head.map(([text, className = ""]) => (text ? made("th", { text, scope: "col", className }) : made("td"))));
   table.replaceChildren(...(body.length && head.length ? [made("thead", {}, titles)] : []), ...(body.length ? [made("tbody", {}, ...body)] : []));
   if (name) table.querySelector(`[name=${name}]:checked`)?.focus();
 }
