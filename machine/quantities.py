@@ -22,6 +22,11 @@ def minutes(seconds: float) -> str:
     return f"{whole // 60}h {whole % 60}m" if whole >= 60 else f"{whole}m"
 
 
+def about(seconds: float) -> str:
+    """Seconds to the minute where there are some, as an estimate deserves."""
+    return minutes(seconds) if seconds >= 60.0 else duration(seconds)
+
+
 def newtons(force_n: float) -> str:
     """A force to two digits, as an estimate deserves."""
     return f"{float(f'{force_n:.2g}'):.12g}"

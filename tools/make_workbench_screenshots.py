@@ -8,7 +8,8 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,12 +107,21 @@ def every(folder: Path) -> None:
             walk(browser, running.address, STEPS, keep)
 
 
-if __name__ == "__main__":
+@contextmanager
+def without_earlier_work() -> Iterator[None]:
+    """What was kept of other pictures' work is not offered."""
     with tempfile.TemporaryDirectory() as state:
-        os.environ["XDG_STATE_HOME"] = state  # no earlier work in the pictures
-        if len(sys.argv) > 1:
+        os.environ["XDG_STATE_HOME"] = state
+        yield
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        with without_earlier_work():
             every(Path(sys.argv[1]))
-        else:
-            picture(DOCS / "workbench.png", DESKTOP, "plane")
-            picture(DOCS / "workbench-phone.png", PHONE, "parts")
+    else:
+        for name, size, step in (("workbench.png", DESKTOP, "plane"), ("workbench-phone.png", PHONE, "parts")):
+            with without_earlier_work():
+                picture(DOCS / name, size, step)
+        with without_earlier_work():
             strip(DOCS / "strip")

@@ -1,18 +1,23 @@
 """Walks through the workbench and counts: `python tools/walk_workbench.py MODEL [--pictures FOLDER]`; needs Chromium.
 
 Every task of docs/workbench-tasks.md is done one after the other on a page by elements that are seen and can be pressed at that
-moment. Counted are clicks: one for a button, a row, a field that is typed into, two for an entry of a drop-down list or a file.
-Told are, for each task, its clicks and the seconds from the last of them to the answer. --pictures: one after each task.
+moment. What a person has from earlier is there: work that was kept, and the printer of last time, the simulated one. Counted are
+clicks: one for a button, a row, a field that is typed into, two for an entry of a drop-down list or a file. Told are, for each
+task, its clicks and the seconds from the last of them to the answer. --pictures: one after each task.
 --phone: instead, another device is paired on a page of a phone's size, and pauses a print of the model.
 """
 
 import argparse
 import json
+import os
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from machine.app.requests import SIMULATED, PrintRequest
+from machine.app.workbench.printing.last_printer import keep_printer
 from tests.machine.browser import Browser
 from tests.machine.prints import prints_line
 from tests.machine.test_workbench_page import choose
@@ -22,9 +27,9 @@ IDLE = "document.documentElement.dataset.busy === ''"
 SEARCHED = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
 PHASE = "document.documentElement.dataset.printing"
 ROWS = "document.querySelectorAll('#parts-list tbody tr').length"
-ROW, CHOSEN = "#parts-list tbody tr:last-child", "#parts-list tbody tr:last-child input[type=radio]"
+CHOSEN = "#parts-list tbody tr:last-child input[type=radio]"
 WALLS, SUPPORT = '[data-key="process.walls"] input', '[data-key="process.support"] select'
-SETTLED_S, BAR_PIXELS = 0.8, 42
+SETTLED_S, KEPT_S, BAR_PIXELS = 0.8, 2.0, 42
 PHONE = (390, 780)
 
 
@@ -35,8 +40,8 @@ def undone(step: str) -> str:
 
 @dataclass(frozen=True)
 class Task:
-    """steps: `FIELD=VALUE` types, `FIELD~VALUE` chooses of a list, `menu:ROW` presses the right button, `facet` a place in the
-    picture that it can rest on, `file` chooses the model, all else is pressed; until: a JavaScript condition."""
+    """steps: `FIELD=VALUE` types, `FIELD~VALUE` chooses of a list, `facet` a place in the picture that it can rest on, `file`
+    chooses the model, all else is pressed; until: a JavaScript condition."""
 
     name: str
     steps: tuple[str, ...]
@@ -55,21 +60,18 @@ TASKS = (
     Task("Cut by a plane", ("#add",), f"{ROWS} === 2 && {IDLE}"),
     Task("Move the plane where it cannot be", (CHOSEN, "#plane-offset=-50"), "$('put-near').checkVisibility()"),
     Task("The nearest place that works", ("#put-near",), f"$('problem').hidden && {IDLE}"),
-    Task("Settings of one part", (f"menu:{ROW}", "#part-menu button:last-child", f"{WALLS}=4")),
-    Task("Support off", ("#settings-part~0", "#search-settings=supports", f"{SUPPORT}~none"), undone("set process.support")),
-    Task("Another material", ("#profiles [data-id=material] select~petg",), undone("take petg")),
+    Task("Another material", ("#tab-settings", "#profiles [data-id=material] select~petg"), undone("take petg")),
+    Task("Support off", ("#search-settings=supports", f"{SUPPORT}~none"), undone("set process.support")),
+    Task("Settings of one part", ("#settings-part~2", "#search-settings=walls", f"{WALLS}=4")),
     Task("Pause before a layer", ("#tab-slices", "#stop-at=1:2", "#add-stop button"), "$('stops').querySelector('button')"),
     Task("Slice; time, plastic, price", ("#slice",), "!document.body.classList.contains('no-slices')"),
-    Task("Look at the print", ("#look",), "$('print-page').contentDocument?.documentElement?.dataset.state === 'ready'"),
+    Task("See the sliced parts", (), "document.documentElement.dataset.walls === '1 2'"),
+    Task("Look at it move by move", ("#look",), "$('print-page').contentDocument?.documentElement?.dataset.state === 'ready'"),
     Task("Save the G-code", ("#save", "#save-gcode"), "true"),
-    Task("Print it", ("#leave-print", "#tab-printing", "#check", "#begin"), f"{PHASE} === 'printing'"),
+    Task("Print it", ("#bar-print", "#begin"), f"{PHASE} === 'printing'"),
     Task("Stop at once", ("#emergency",), f"{PHASE} === 'over'"),
     Task("Preheat without a print", ("#hand", "[data-hand=heat]"), "/nozzle[0-9. ]+of/.test($('run-told').textContent)"),
-    Task(
-        "Earlier work",
-        ("[data-hand=let_go]", "#tab-model", "#kept-works button"),
-        "$('undo').ariaLabel.startsWith('undo: open the work of')",
-    ),
+    Task("Earlier work", ("#tab-model", "#kept-works button"), "$('undo').ariaLabel.startsWith('undo: open the work of')"),
 )
 
 
@@ -90,9 +92,6 @@ class Hand:
             choose(self._browser, self._model.name, self._model.read_bytes())
         elif kind == "facet":
             self._press_a_facet()
-        elif kind == "menu":
-            place = "{ bubbles: true, clientX: 900, clientY: 400 }"
-            self._browser.value(f"{found}.dispatchEvent(new MouseEvent('contextmenu', {place}))")
         elif kind:
             given = f"{found}.min" if value == "first" else json.dumps(value)
             events = "for (const kind of ['input', 'change']) field.dispatchEvent(new Event(kind, { bubbles: true }));"
@@ -110,11 +109,9 @@ class Hand:
 
 
 def parsed(step: str) -> tuple[str, str, str]:
-    """What is done (file, facet, =, ~, menu; "": pressed), to which element, and the value."""
+    """What is done (file, facet, =, ~; "": pressed), to which element, and the value."""
     if step in ("file", "facet"):
         return step, "", ""
-    if step.startswith("menu:"):
-        return "menu", step.removeprefix("menu:"), ""
     for kind in "~=":
         element, sign, value = step.rpartition(kind)
         if sign and "]" not in value:
@@ -128,6 +125,7 @@ def walk(browser: Browser, address: str, model: Path, at: Callable[[str, int, fl
     browser.wait("document.documentElement.dataset.line === 'open'")
     for task in TASKS:
         hand = Hand(browser, model)
+        began = time.monotonic()
         for step in task.steps:
             began = time.monotonic()
             hand.do(step)
@@ -157,6 +155,16 @@ def walk_from_the_phone(browser: Browser, model: Path, at: Callable[[str, int, f
         browser.wait(f"{PHASE} === 'over'")
 
 
+def leave_earlier_work(model: Path) -> None:
+    """What a person has done before: work on the model, which is kept, and the printer that was printed at."""
+    keep_printer(PrintRequest(SIMULATED))
+    with workbench(str(model)) as running, running.line() as bench:
+        bench.until(lambda state: state["model"])
+        bench.do("turn", axis="z", deg=90)
+        bench.until(lambda state: state["undo"] and not state["busy"])
+        time.sleep(KEPT_S)
+
+
 def begin_print(running: OpenToNetwork) -> None:
     """Has another page slice what lies on the bench and print it; it is there until the first layer is under way."""
     with running.line() as bench, prints_line(running, "computer") as prints:
@@ -175,7 +183,8 @@ if __name__ == "__main__":
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="one that is there")
     parser.add_argument("--phone", action="store_true", help="pair a device and pause a print")
     given = parser.parse_args()
-    with Browser((1280, 800)) as page:
+    with Browser((1280, 800)) as page, tempfile.TemporaryDirectory() as state:
+        os.environ["XDG_STATE_HOME"] = state  # no printer of the person's own is printed at
 
         def told(name: str, clicks: int, seconds: float) -> None:
             print(f"{name:34}{clicks:3}{seconds:8.1f} s", flush=True)
@@ -186,6 +195,7 @@ if __name__ == "__main__":
         if given.phone:
             walk_from_the_phone(page, given.model, told)
         else:
+            leave_earlier_work(given.model)
             with workbench() as running:
                 walk(page, running.address, given.model, told)
         print(f"complaints: {page.complaints or 'none'}")

@@ -268,6 +268,6 @@ def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench
     browser.click("#tab-settings")
     browser.wait("$('command-line').textContent.includes('--filament-change 1:2.5mm')")
     browser.click("#tab-slices")
-    browser.click("#stops [aria-label='remove the filament change of part 1, at 2.5 mm']")
+    browser.click("#stops [aria-label='Remove the filament change of part 1, at 2.5 mm']")
     browser.wait("!$('stops').querySelector('button')")
     assert browser.complaints == []

@@ -1,10 +1,15 @@
-"""Who sees little or nothing: colours that stand out from their ground, light and dark, and a name for every control."""
+"""Who sees little or nothing, on the workbench and on the page of a print: colours that stand out from their ground, light and
+dark, a name for every control, and none where no name is read out."""
 
 import re
 from pathlib import Path
 
 import pytest
 
+from machine.dryrun.dryrun import dry_run
+from machine.program import Program
+from machine.view.page import print_page
+from tests.machine import hand
 from tests.machine.browser import Browser
 from tests.machine.workbench import Running
 
@@ -12,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2] / "machine"
 STYLES = [ROOT / "view/template/style.css", ROOT / "app/workbench/web/page/style.css"]
 LEAST_OF_TEXT = 4.5  # WCAG 2.2, 1.4.3
 TABS = ("model", "parts", "slices", "printing", "settings")
+TABS_OF_PRINT = ("show", "report", "findings", "code")
 OPERATED = {"button", "checkbox", "combobox", "radio", "searchbox", "slider", "spinbutton", "tab", "textbox", "menuitem", "link"}
 
 
@@ -49,6 +55,17 @@ def test_text_stands_out_from_its_ground(theme: str) -> None:
     assert {pair: ratio for pair in pairs if (ratio := contrast(colour[pair[0]], colour[pair[1]])) < LEAST_OF_TEXT} == {}
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("behind", [0, 255])
+def test_text_over_the_picture_stands_out_whatever_is_drawn_behind_it(theme: str, behind: int) -> None:
+    colour = colours(theme)
+    (card,) = re.findall(r"--card: #([0-9a-f]{8})", STYLES[0].read_text().split(":root")[1 if theme == "light" else 2])
+    *channels, opaque = (int(card[k : k + 2], 16) for k in (0, 2, 4, 6))
+    ground = "".join(f"{round(channel * opaque / 255 + behind * (1 - opaque / 255)):02x}" for channel in channels)
+    faint = {text: contrast(colour[text], ground) for text in ("text", "soft")}
+    assert {text: ratio for text, ratio in faint.items() if ratio < LEAST_OF_TEXT} == {}
+
+
 def test_nothing_but_what_cannot_be_pressed_is_made_faint() -> None:
     """A share of opacity lessens the contrast of the text in it: only disabled controls need none."""
     faint = re.findall(r"^(.*?) \{[^}]*(?<!-)\bopacity: 0\.\d+[^}]*\}", STYLES[1].read_text(), re.MULTILINE)
@@ -65,10 +82,35 @@ def test_every_control_of_every_tab_has_a_name(bench: Running, browser: Browser)
         browser.click(f"#tab-{tab}")
         if tab == "settings":
             browser.wait("document.querySelectorAll('[data-key]').length > 100")
-        controls = [node for node in browser.accessible() if node["role"] in OPERATED]
-        assert len(controls) > 10
-        assert [node for node in controls if not node["name"].strip()] == []
-        assert browser.value(SEEN_NOT_SAID) == []
+        check_names(browser, at_least=11)
+
+
+def test_every_control_of_the_page_of_a_print_has_a_name(browser: Browser, tmp_path: Path) -> None:
+    profile, decomposition, _, _ = hand.printed()
+    lines = hand.text("generic_ac")
+    printed = Program(lines, dry_run(lines, profile), decomposition)  # its arm begins in air, which is found
+    (tmp_path / "print.html").write_bytes(print_page("post and arm", printed, profile))
+    browser.open((tmp_path / "print.html").as_uri())
+    assert browser.value("document.querySelectorAll('#findings button').length") > 0
+    for tab in TABS_OF_PRINT:
+        browser.click(f"#tab-{tab}")
+        check_names(browser, at_least=11)
+
+
+def check_names(browser: Browser, at_least: int) -> None:
+    """All that is operated, at least so many, has a name, and what is no thing of its own has none, for that is not read out."""
+    browser.value(
+        "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )  # what is drawn first has names
+    controls = [node for node in browser.accessible() if node["role"] in OPERATED]
+    assert len(controls) >= at_least
+    assert [node for node in controls if not node["name"].strip()] == []
+    assert browser.value(SEEN_NOT_SAID) == []
+    assert browser.value(NOT_READ_OUT) == []
+
+
+NOT_READ_OUT = """[...document.querySelectorAll(':is(div, p, span)[aria-label]:not([role])')]
+  .map(({ outerHTML }) => outerHTML.slice(0, 80))"""
 
 
 # Of buttons: what is seen on them belongs into their name, or nobody can press them by voice.

@@ -337,6 +337,29 @@ def test_a_printer_is_heated_homed_and_moved_by_hand_from_the_page_and_let_go_of
     assert browser.complaints == []
 
 
+def test_print_under_the_verdict_checks_at_the_printer_of_last_time_and_moves_and_heats_nothing(
+    sliced: Running, browser: Browser
+) -> None:
+    with SimulatedPrinter(load().machine) as printer, prints_line(sliced, "first") as page:
+        page.do("check", port=printer.path)
+        page.until(lambda seen: seen["phase"] == "ready")
+        page.command("cancel")
+        page.until(lambda seen: seen["phase"] == "over")
+        browser.open(sliced.address)
+        browser.wait("document.documentElement.dataset.line === 'open'")
+        browser.click("#tab-slices")
+        browser.wait("$('verdict-print').checkVisibility() && $('port-typed').value")
+        browser.click("#look")
+        browser.click("#bar-print")  # the same as under the verdict
+        browser.wait(f"{PRINTING} === 'ready' && $('begin').checkVisibility()")
+        assert browser.value("$('port-typed').value") == printer.path
+        assert (printer.record.events, printer.record.moves) == ((), 0)
+        assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
+        browser.click("#leave")
+        browser.wait(f"{PRINTING} === 'over'")
+    assert browser.complaints == []
+
+
 def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced: Running) -> None:
     """The last one: it ends the workbench of the others."""
     with SimulatedPrinter(load().machine, speed=20.0) as printer, prints_line(sliced, "first") as page:

@@ -54,7 +54,17 @@ export function cameraOf() {
 }
 
 export const CORNERS = [-55, 55, -125, 125];
-export const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
+const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
+
+/** The buttons that look from a side, or a corner, degrees; from that at first. */
+export function viewButtons(camera, corner, changed) {
+  const look = (name) => {
+    [camera.yaw, camera.pitch] = (VIEWS[name] || [corner, 24]).map((angle) => angle * RAD);
+    changed();
+  };
+  for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => look(button.dataset.view));
+  look("corner");
+}
 
 /** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. */
 export function handle(canvas, camera, { changed, pressed }) {

@@ -1,7 +1,7 @@
 // Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
 
 import { hex, RAMP, typeColour } from "./colours.js";
-import { $, made, partsInWords } from "./page.js";
+import { $, made, partsInWords, swatch } from "./page.js";
 import { KIND } from "./rows.js";
 import { tabsOf } from "./tabs.js";
 
@@ -49,12 +49,6 @@ function typeBoxes({ rows }, scene, bells) {
   });
 }
 
-function swatch(colour) {
-  const mark = made("span", { className: "swatch" });
-  mark.style.backgroundColor = colour;
-  return mark;
-}
-
 const TITLES = { kind: "kind of line", layer: "layer time" }; // where the title is not the word itself
 
 export function showLegend({ rows, header }, { mode, tried }, legend) {
@@ -79,20 +73,4 @@ function kindEntries(rows) {
   const used = new Set();
   for (let i = 0; i < rows.count; i++) if (rows.kind[i] === KIND.extrude) used.add(rows.type[i]);
   return [...used].sort((a, b) => a - b).map((place) => [typeColour(rows.types[place]), rows.types[place] || "not told"]);
-}
-
-/** Dark or light: what the system prefers until the person says otherwise. */
-export function themeOf(scene, bells) {
-  const system = matchMedia("(prefers-color-scheme: dark)");
-  const choose = (dark) => {
-    scene.dark = dark;
-    document.documentElement.dataset.theme = dark ? "dark" : "light";
-    bells.ring("theme");
-  };
-  let told = false;
-  const tell = (dark) => { told = true; choose(dark); };
-  system.addEventListener("change", () => { if (!told) choose(system.matches); });
-  $("theme").addEventListener("click", () => tell(!scene.dark));
-  choose(system.matches);
-  return tell;
 }

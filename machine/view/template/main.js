@@ -1,7 +1,7 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
-import { cameraOf, CORNERS, handle, VIEWS } from "./camera.js";
-import { controlsOf, themeOf } from "./controls.js";
+import { cameraOf, CORNERS, handle, viewButtons } from "./camera.js";
+import { controlsOf } from "./controls.js";
 import { courseOf } from "./course.js";
 import { findingsOf } from "./findings.js";
 import { frontOf } from "./front.js";
@@ -11,7 +11,7 @@ import { layerSliders } from "./layers.js";
 import { follow } from "./live.js";
 import { add, carried, multiply, RAD, scaled, sub, turned, undone } from "./math.js";
 import { outsideOf } from "./outside.js";
-import { $, bells, duration, notice } from "./page.js";
+import { $, bells, duration, notice, themeSwitch } from "./page.js";
 import { cardOf, pictureOf } from "./picture.js";
 import { printOf } from "./print.js";
 import { readoutsOf } from "./readouts.js";
@@ -33,7 +33,7 @@ async function main() {
   readoutsOf(print, scene, ring);
   layerSliders(print, scene, ring);
   layerTimes(scene, ring);
-  const chooseTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);
+  const chooseTheme = themeSwitch((dark) => { scene.dark = dark; ring.ring("theme"); }), player = courseOf(print, scene, ring);
   const findings = findingsOf(print, scene, ring, camera, player.stop), code = textOf(print, scene, ring, player.stop);
   scene.go(rows.count - 1);
   outsideOf({ scene, findings, code, chooseTheme, camera, bells: ring });
@@ -81,14 +81,8 @@ function fitting(print, scene, camera, picture, ring) {
     camera.target = add(camera.target, sub(carried(now, middle), carried(before, middle)));
     before = now;
   });
-  const views = { ...VIEWS, corner: [bestCorner(print), 24] };
-  const look = (name) => {
-    [camera.yaw, camera.pitch] = views[name].map((angle) => angle * RAD);
-    picture.ask();
-  };
-  document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => look(button.dataset.view)));
   $("fit").addEventListener("click", fit);
-  look("corner");
+  viewButtons(camera, bestCorner(print), picture.ask);
   fit();
   return fit;
 }

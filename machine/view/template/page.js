@@ -12,6 +12,13 @@ export function made(tag, { text, className, ...properties } = {}, ...children) 
   return element;
 }
 
+/** A patch of a colour. */
+export function swatch(colour) {
+  const mark = made("span", { className: "swatch" });
+  mark.style.backgroundColor = colour;
+  return mark;
+}
+
 /** Seconds as 1h 6m 15s, as everywhere in the program. */
 export function duration(seconds) {
   const whole = Math.round(seconds), [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
@@ -22,6 +29,18 @@ export function duration(seconds) {
 export const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
 
 export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
+
+/** Dark or light, as changed(dark) is told: what the system prefers until a person says otherwise, by the button or what this gives. */
+export function themeSwitch(changed) {
+  const system = matchMedia("(prefers-color-scheme: dark)"), dark = () => told ?? system.matches;
+  let told = null;
+  const show = () => { document.documentElement.dataset.theme = dark() ? "dark" : "light"; changed(dark()); };
+  const tell = (value) => { told = value; show(); };
+  system.addEventListener("change", show);
+  $("theme").addEventListener("click", () => tell(!dark()));
+  show();
+  return tell;
+}
 
 const NOTICES = new Map(); // what is said now, by what it is about
 

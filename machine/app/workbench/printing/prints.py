@@ -15,6 +15,7 @@ from typing import Any
 
 from machine.app.printer.journal_folder import ResumableJournal, resumable_journals
 from machine.app.printer.port_reports import answer_words, ask_ports, known_ports, port_json
+from machine.app.workbench.printing.last_printer import keep_printer, last_printer
 from machine.app.workbench.printing.order import Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.observable import Observable
@@ -33,6 +34,7 @@ class Prints(Observable):
         super().__init__()
         self.prints: list[RunningPrint] = []
         self._last = 0  # number that was given
+        self._last_printer = last_printer()
         self._pages: Counter[str] = Counter()
         self._ports: list[dict[str, Any]] | None = None
         self._journals: list[ResumableJournal] | None = None
@@ -47,8 +49,9 @@ class Prints(Observable):
 
     @property
     def ports_known(self) -> set[str]:
-        """Ports that were found here, and those of the prints that are listed."""
-        return {report["port"] for report in self._ports or ()} | {job.state["port"] for job in self.prints}
+        """Ports that were found here, those of the prints that are listed, and the one that was printed at last."""
+        last = {self._last_printer.port} if self._last_printer else set()
+        return {report["port"] for report in self._ports or ()} | {job.state["port"] for job in self.prints} | last
 
     @property
     def journals_known(self) -> set[str]:
@@ -61,6 +64,7 @@ class Prints(Observable):
             "version": self.version,
             "ports": self._ports,
             "asking": self._over is not None,
+            "last_printer": asdict(self._last_printer) if self._last_printer else None,
             "journals": self._journals_state(),
             "prints": [
                 {**job.state, "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
@@ -102,6 +106,8 @@ class Prints(Observable):
         if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
             raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
         self._forget_old(port)
+        self._last_printer = order.printing
+        keep_printer(order.printing)
         self._last += 1
         begun = RunningPrint(self._last, order, page, self.notify)
         self.prints.append(begun)

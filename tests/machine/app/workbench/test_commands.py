@@ -47,9 +47,13 @@ def test_what_is_no_command_is_told_to_be_none(name: Any) -> None:
 
 
 def test_the_page_knows_the_very_same_names() -> None:
-    scripts = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith(".js"))
-    said = {*re.findall(r'\bdo: "(\w+)"', scripts), *re.findall(r'command\("(\w+)"', scripts)}
-    never_said_so = {"undo", "redo", "resume", "pause", "feed", "flow"}  # by variables
+    page = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith((".js", ".html")))
+    said = {
+        word
+        for pattern in (r'\bdo: "(\w+)"', r'command\("(\w+)"', r'data-(?:do|print)="(\w+)"')
+        for word in re.findall(pattern, page)
+    }
+    never_said_so = {"resume", "feed", "flow"}  # by variables
     assert {*COMMANDS, *OF_PRINTS, *OF_DEVICES} - said <= never_said_so
     assert said <= {*COMMANDS, *OF_PRINTS, *OF_DEVICES}
 

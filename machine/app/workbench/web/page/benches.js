@@ -2,9 +2,9 @@
 // those of a workbench that was killed is offered again.
 
 import { $, made, notice, partsInWords } from "../../../../view/template/page.js";
-import { alike, putRows } from "./elements.js";
+import { button, clock, cross, listen, putRows } from "./elements.js";
 import { sendFile } from "./line.js";
-import { onState } from "./store.js";
+import { onNew } from "./store.js";
 
 const TOLD_MS = 8000;
 const HERE = Number(location.pathname.split("/").at(-2));
@@ -50,34 +50,31 @@ function showBenches(benches) {
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
   const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
-  const close = made("button", { type: "button", text: "×", title: "Close this bench and end its work", ariaLabel: `Close the bench of ${text}`, onclick: () => closeBench(number) });
-  return made("li", {}, label, close);
+  return made("li", {}, label, cross(`Close the bench of ${text} and end its work`, () => closeBench(number)));
 }
 
 export function benchesPanel() {
-  $("another").addEventListener("click", () => openBench());
-  keptWorks();
-  onState(({ benches }, before) => { if (!alike(benches, before?.benches)) showBenches(benches); });
+  listen("click", { another: () => openBench() });
+  offer("kept");
+  onNew(({ benches }) => benches, showBenches);
 }
 
-/** Work that was kept of earlier benches, as one with nothing on it is offered it. */
-export async function keptWorks() {
-  const answer = await fetch("kept").catch(() => null), works = answer?.ok ? await answer.json() : [];
-  $("kept-field").hidden = !works.length;
-  $("kept-works").replaceChildren(...works.map(({ kept, name, parts, written_s: written }) => {
-    const at = new Date(1000 * written), today = at.toDateString() === new Date().toDateString();
-    const when = today ? at.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
-    const open = () => fetch(`kept/${encodeURIComponent(kept)}`, { method: "POST" }).then(keptWorks, () => {}); // a refusal comes by the line
-    return made("button", { type: "button", onclick: open }, made("span", { text: `Work of ${when}` }), made("small", { text: name ? `${name}${parts ? `, ${parts} part${parts === 1 ? "" : "s"}` : ""}` : "cannot be read here" }));
-  }));
+const OFFERS = {
+  kept: ["kept-works", ({ kept, name, parts, written_s: written }) => [kept, `Work of ${moment(written)}`, name ? `${name}${parts ? `, ${partsInWords(parts)}` : ""}` : "cannot be read here"]],
+  left: ["left-files", ({ number, name, bytes, written_s: written }) => [number, name, `${Math.ceil(bytes / 1000).toLocaleString("en")} kB, ${moment(written)}`]],
+};
+
+function moment(seconds) {
+  const at = new Date(1000 * seconds);
+  return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 }
 
-export async function leftFiles() {
-  const answer = await fetch("left").catch(() => null), files = answer?.ok ? await answer.json() : [];
-  $("left-field").hidden = !files.length;
-  $("left-files").replaceChildren(...files.map(({ number, name, bytes, written_s: written }) => {
-    const told = `${Math.ceil(bytes / 1000).toLocaleString("en")} kB, ${new Date(1000 * written).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })}`;
-    const open = () => fetch(`left/${number}`, { method: "POST" }).catch(() => {}); // a refusal comes by the line
-    return made("button", { type: "button", onclick: open }, made("span", { text: name }), made("small", { text: told }));
+/** What is there from earlier: work that was kept, or files that a workbench has left which was killed. */
+export async function offer(what) {
+  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, tell] = OFFERS[what];
+  $(`${what}-field`).hidden = !found.length;
+  $(list).replaceChildren(...found.map((one) => {
+    const [name, title, words] = tell(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
+    return button("", open, {}, made("span", { text: title }), made("small", { text: words }));
   }));
 }

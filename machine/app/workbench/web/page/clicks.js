@@ -1,6 +1,7 @@
 // Clicks: what the next click on the model is for, and what it does.
 
 import { $, notice } from "../../../../view/template/page.js";
+import { listen, pressed } from "./elements.js";
 import { layFacet } from "./facets.js";
 import { markAt, markWord } from "./marks-panel.js";
 import { openMenu } from "./parts-list.js";
@@ -22,10 +23,10 @@ export function clicksOf(picture) {
     if (clicks !== "lay" && clicks !== "snap") $(id).disabled = !picture;
   }
   if (picture) menuOf($("canvas"), picture);
-  $("mark-kind").addEventListener("change", () => update({ corner: null }));
+  listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
     if (now.clicks && now.tab !== before.tab) update({ clicks: "", corner: null });
-    for (const [clicks, id] of Object.entries(BUTTONS)) $(id).setAttribute("aria-pressed", now.clicks === clicks);
+    for (const [clicks, id] of Object.entries(BUTTONS)) pressed(id, now.clicks === clicks);
     notice(WANTED[now.clicks]?.() || "", "hand");
   });
 }

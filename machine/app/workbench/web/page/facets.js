@@ -3,7 +3,7 @@
 import { add, dot, scaled } from "../../../../view/template/math.js";
 import { $ } from "../../../../view/template/page.js";
 import { trianglesOf } from "../../../../view/template/solids.js";
-import { send } from "./line.js";
+import { newest, send } from "./line.js";
 import { store, subscribe, update } from "./store.js";
 import { cornersAt, faceMet } from "./triangles.js";
 
@@ -27,14 +27,7 @@ export function layFacet(picture, event) {
 }
 
 export function facetsOf(picture) {
-  let asked = "";
-  const fetchFacets = async (key) => {
-    asked = key;
-    const answer = await fetch(`facets/${key}`).catch(() => null), facets = answer?.status === 200 ? await answer.json() : null;
-    if (asked !== key) return;
-    if (!facets) asked = ""; // another model lies there by now, or the line is lost: the next state asks again
-    update({ facets: facets && { key, facets, lit: -1 } });
-  };
+  const fetchFacets = newest({ read: (answer) => answer.json(), insists: true, take: (facets, key) => update({ facets: facets && { key, facets, lit: -1 } }) });
   $("canvas").addEventListener("pointermove", (event) => {
     const { clicks, facets } = store;
     if (clicks !== "lay" || !facets || event.buttons) return;
@@ -43,7 +36,7 @@ export function facetsOf(picture) {
   });
   subscribe(({ state: { model, rotation }, clicks, facets, triangles }) => {
     const laying = clicks === "lay" && model && triangles;
-    if (laying && model.key !== asked) return void fetchFacets(model.key);
+    if (laying) fetchFacets(model.key, `facets/${model.key}`);
     const seen = laying && facets?.key === model.key ? facets : null;
     $("canvas").style.cursor = seen && seen.lit >= 0 ? "pointer" : "";
     picture.extra("facets", JSON.stringify([seen?.key, seen?.lit, seen && rotation]), () => (seen ? seen.facets.map((facet, k) => facetDrawn(facet, k === seen.lit, picture)) : []));

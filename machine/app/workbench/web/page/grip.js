@@ -6,8 +6,8 @@ import { $ } from "../../../../view/template/page.js";
 const ARROWS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 };
 
 /** An element that is dragged: take(event) gives what is held, null: not now; move(held, event) follows the hand; put(held) ends
- * it, drop(held) leaves all as it was (Escape, a lost pointer). step(sign, event): an arrow key; stepped(): it is let go. */
-export function gripOf(element, { take, move, put, drop, step, stepped = () => {} }) {
+ * it, and arrow keys that are let go, drop(held) leaves all as it was (Escape, a lost pointer). step(sign, event): an arrow key. */
+export function gripOf(element, { take, move, put, drop, step }) {
   let held = null, stepping = false;
   const end = (act) => (event) => {
     const last = held;
@@ -33,7 +33,7 @@ export function gripOf(element, { take, move, put, drop, step, stepped = () => {
     stepping = true;
     step(ARROWS[event.key], event);
   });
-  const letGo = () => { if (stepping) [stepping] = [false, stepped()]; };
+  const letGo = () => { if (stepping) [stepping] = [false, put()]; };
   element.addEventListener("keyup", (event) => { if (event.key in ARROWS) letGo(); });
   element.addEventListener("blur", letGo);
   element.addEventListener("wheel", (event) => { // the view is zoomed here, too
@@ -44,10 +44,14 @@ export function gripOf(element, { take, move, put, drop, step, stepped = () => {
 
 const LEAST_PIXELS = 0.5; // of a mm along a way: seen head on, what is held would jump
 
+/** later(event): how many times as far as from one place of the canvas to another a hand has gone that way. */
+export function alongSeen(from, to, event, least) {
+  const seen = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...seen), least);
+  return (later) => ((later.clientX - event.clientX) * seen[0] + (later.clientY - event.clientY) * seen[1]) / (pixels * pixels);
+}
+
 /** later(event): how many mm a hand has gone along a way since it took hold of a place; null where that is not seen. */
 export function alongWay(picture, place, way, event) {
   const from = picture.placeOf(place), to = picture.placeOf(add(place, way));
-  if (!from || !to) return null;
-  const seen = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...seen), LEAST_PIXELS);
-  return (later) => ((later.clientX - event.clientX) * seen[0] + (later.clientY - event.clientY) * seen[1]) / (pixels * pixels);
+  return from && to && alongSeen(from, to, event, LEAST_PIXELS);
 }

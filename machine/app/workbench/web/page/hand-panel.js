@@ -1,12 +1,12 @@
 // Hand panel: a printer that is heated and moved from the page, with nothing printed.
 
 import { $ } from "../../../../view/template/page.js";
+import { listen } from "./elements.js";
 
 /** ask({does, ...}): what is to be done at the printer that is looked at. */
 export function handPanel(ask) {
   const sure = (whether) => { $("hand-sure").hidden = !whether; };
-  $("hand-home").addEventListener("click", () => sure(true));
-  $("hand-not").addEventListener("click", () => sure(false));
+  listen("click", { "hand-home": () => sure(true), "hand-not": () => sure(false) });
   for (const button of $("hand-live").querySelectorAll("[data-hand]")) {
     button.addEventListener("click", () => { sure(false); ask({ does: button.dataset.hand, keep_heat: button.dataset.keep === "yes" }); });
   }

@@ -42,17 +42,15 @@ export function handlesOf(picture) {
   };
   const taken = ({ tilts }) => ({ plane: store.hand?.wanted || planeNow(), about: section, tilts });
   const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * section.radius_mm);
-  const put = () => { if (store.hand) putPlane(store.hand.plane); };
   KNOBS.forEach((knob) => gripOf($(knob.id), {
     take: (event) => {
       const along = alongWay(picture, placeOf(knob), planeNow().normal, event);
       return along && { ...taken(knob), along };
     },
     move: (held, event) => holdPlane(moved(held, held.along(event))),
-    put,
+    put: () => { if (store.hand) putPlane(store.hand.plane); },
     drop: leavePlane,
     step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
-    stepped: put,
   }));
   picture.drawn.push(() => {
     $("handles").hidden = !section || !planeNow() || isLocked();

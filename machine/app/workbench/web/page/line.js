@@ -75,6 +75,21 @@ export function ask(command, answered) {
 /** Sends a file of the person's to a bench; what is wrong with it comes back by the line, also where it is not taken to its end. */
 export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name, page })}`, { method: "POST", body: file }).catch(() => {});
 
+/** A function of a key and its address that gives take() what is there, read: only what was asked for last, and once; null: nothing.
+ * insists: what is not there is asked for again, as it always is where the line is lost; begin(): something is asked for. */
+export function newest({ read, take, insists = false, begin = () => {} }) {
+  let asked = "";
+  return async (key, address) => {
+    if (key === asked) return;
+    asked = key;
+    begin();
+    const answer = key ? await fetch(address).catch(() => null) : null, content = answer?.status === 200 ? await read(answer) : null;
+    if (asked !== key) return;
+    if (!answer || (insists && !content)) asked = "";
+    take(content, key);
+  };
+}
+
 /** Has the browser save what the server makes at an address. */
 export async function save(address) {
   const answer = await fetch(address);

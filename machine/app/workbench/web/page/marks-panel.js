@@ -1,11 +1,11 @@
 // Marks: boxes and faces that are left alone: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
 import { add, bounds, scaled } from "../../../../view/template/math.js";
-import { $, made } from "../../../../view/template/page.js";
+import { $, made, swatch } from "../../../../view/template/page.js";
 import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/solids.js";
-import { alike, choiceRow, putAt, putTable, swatch } from "./elements.js";
+import { alike, button, choiceRow, cross, fill, listen, putAt, putTable } from "./elements.js";
 import { alongWay, gripOf } from "./grip.js";
-import { send } from "./line.js";
+import { newest, send } from "./line.js";
 import { sizeOf } from "./model-panel.js";
 import { onState, store, subscribe, update } from "./store.js";
 import { wordOf } from "./triangles.js";
@@ -80,13 +80,12 @@ function chooseMark(zone) {
 }
 
 export function marksPanel(picture) {
-  let asked = ""; // which faces are marked, or come
-  $("mark-angle").addEventListener("change", () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: Number($("mark-angle").value) }); });
-  $("mark-middle").addEventListener("click", () => {
+  listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: Number($("mark-angle").value) }); } });
+  listen("click", { "mark-middle": () => {
     update({ clicks: "" });
     const [x, y, z] = sizeOf(store.state), low = store.state.pedestal_mm;
     addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
-  });
+  } });
   const knobs = BOX_SIDES.map((side) => knobOf(side, picture)), numbers = BOX_SIDES.map(numberOf);
   $("mark-handles").replaceChildren(...knobs);
   $("mark-numbers").replaceChildren(...numbers.map((input, k) => made("label", {}, `${BOX_SIDES[k].name} `, input)));
@@ -98,24 +97,20 @@ export function marksPanel(picture) {
       knob.style.backgroundColor = `rgb(${MARK_KINDS[zone.kind].colour})`;
     });
   });
-  const fetchMarks = async (key) => {
-    asked = key;
-    const answer = key ? await fetch(`marks/${key}`).catch(() => null) : null;
-    if (asked !== key) return;
-    if (!answer) asked = ""; // the line is lost: the next state asks again
-    update({ faceMarks: answer?.status === 200 ? new Uint8Array(await answer.arrayBuffer()) : null });
+  const take = (faceMarks, key) => {
+    update({ faceMarks });
     document.documentElement.dataset.marks = key;
   };
+  const fetchMarks = newest({ read: async (answer) => new Uint8Array(await answer.arrayBuffer()), take });
   onState((state, before) => {
     const changed = !alike(state.zones, before?.zones), gone = before && !state.busy && changed && store.zone && !state.zones.some((zone) => sameMark(zone, store.zone));
     if (changed || (state.problem && state.problem !== before?.problem)) update({ zoneHand: null, ...(gone ? { zone: null } : {}) });
-    document.body.classList.toggle("no-marks", !state.zones.length);
-    if (state.marks !== asked) fetchMarks(state.marks);
+    fetchMarks(state.marks, `marks/${state.marks}`);
   });
   subscribe((now) => {
     const zone = boxNow();
     $("mark-numbers").hidden = !zone;
-    if (zone) BOX_SIDES.forEach(({ axis, end }, k) => { if (document.activeElement !== numbers[k]) numbers[k].value = zone[end][axis].toFixed(2); });
+    if (zone) BOX_SIDES.forEach(({ axis, end }, k) => fill(numbers[k], zone[end][axis].toFixed(2)));
     putTable($("marks"), [now.state.zones, now.zone], [], () => now.state.zones.map((mark) => markRow(mark, sameMark(mark, now.zone))));
     if (picture && now.triangles) showMarks(picture);
   });
@@ -132,19 +127,17 @@ const sideTitle = ({ axis, end }) => `${end} ${axis}`;
 
 /** A knob that moves one side of the chosen box. */
 function knobOf(side, picture) {
-  const knob = made("button", { type: "button", text: "xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), ariaLabel: `${side.name} of the box: drag, or arrow keys` });
+  const knob = button("xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), null, { ariaLabel: `${side.name} of the box: drag, or arrow keys` });
   knob.dataset.side = sideTitle(side);
-  const put = () => { if (store.zoneHand) putBox(store.zoneHand); };
   gripOf(knob, {
     take: (event) => {
       const zone = boxNow(), along = alongWay(picture, sidePlace(zone, side), axesOf(zone)[side.axis], event);
       return along && { zone, along };
     },
     move: ({ zone, along }, event) => holdBox(withSide(zone, side, zone[side.end][side.axis] + along(event))),
-    put,
+    put: () => { if (store.zoneHand) putBox(store.zoneHand); },
     drop: () => holdBox(null),
     step: (sign) => holdBox(withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM)),
-    stepped: put,
   });
   return knob;
 }
@@ -160,15 +153,13 @@ function numberOf(side) {
 /** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */
 function boxDrawn(zone, chosen) {
   const { kind, min_mm: least, max_mm: most } = zone, seen = (corners) => corners.map((place) => fromBox(zone, place));
-  const ink = [...MARK_KINDS[kind].colour, 255];
   const sides = trianglesOf([{ corners: seen(boxCorners(least, most)), colour: [...MARK_KINDS[kind].colour, 200] }]);
-  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: ink }]), over: chosen }];
+  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: [...MARK_KINDS[kind].colour, 255] }]), over: chosen }];
 }
 
 function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
-  const unmark = () => send({ do: "unmark", kind: zone.kind, number: zone.number });
-  const remove = made("button", { type: "button", text: "×", title: `Remove ${name}`, ariaLabel: `remove ${name}`, onclick: unmark });
+  const remove = cross(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
   const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [[where], [remove]], () => chooseMark(zone));

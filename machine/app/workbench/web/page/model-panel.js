@@ -1,18 +1,20 @@
 // Model panel: the file, how it is turned, what overhangs then, the ways it rests, and how large it stands on the platform.
 
 import { $ } from "../../../../view/template/page.js";
-import { leftFiles, takeFiles } from "./benches.js";
-import { alike, listIn, mm2, tellIn } from "./elements.js";
+import { offer, takeFiles } from "./benches.js";
+import { alike, fill, listen, listIn, mm2, tellIn } from "./elements.js";
 import { send } from "./line.js";
 import { unitButtons } from "./problem.js";
-import { onState, store, subscribe, update } from "./store.js";
+import { onNew, onState, store, subscribe, update } from "./store.js";
 import { turnedFurther } from "./triangles.js";
 
 const TURNS = ["x", "y", "z"];
 
 export function modelPanel() {
-  $("file").addEventListener("change", () => { takeFiles([...$("file").files]); $("file").value = ""; });
-  $("demo").addEventListener("change", () => { if ($("demo").value) send({ do: "demo", name: $("demo").value }); });
+  listen("change", {
+    file: () => { takeFiles([...$("file").files]); $("file").value = ""; },
+    demo: () => { if ($("demo").value) send({ do: "demo", name: $("demo").value }); },
+  });
   const by = () => TURNS.map((axis) => Number($(`turn-${axis}-typed`).value));
   const turn = () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); };
   for (const axis of TURNS) {
@@ -22,17 +24,13 @@ export function modelPanel() {
     typed.addEventListener("input", follow(typed, slider));
     for (const input of [slider, typed]) input.addEventListener("change", turn);
   }
-  document.querySelectorAll("[data-turn]").forEach((button) => button.addEventListener("click", () => {
-    send({ do: "turn", axis: button.dataset.turn, deg: Number(button.dataset.deg) });
-  }));
-  $("as-read").addEventListener("click", () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }));
+  document.querySelectorAll("[data-turn]").forEach(({ dataset }, k, all) => all[k].addEventListener("click", () => send({ do: "turn", axis: dataset.turn, deg: Number(dataset.deg) })));
+  listen("click", { "as-read": () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }) });
   dropping();
-  leftFiles();
-  onState((state, before) => {
-    const { model, rotation, overhang_mm2: area } = state;
-    if (JSON.stringify(rotation) !== JSON.stringify(before?.rotation)) {
-      TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; });
-    }
+  offer("left");
+  onNew(({ rotation }) => rotation, () => TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; }));
+  onState((state) => {
+    const { model, overhang_mm2: area } = state;
     if (!model) return;
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
     listIn("model-notes", model.notes);
@@ -49,8 +47,10 @@ function tellTiny({ model }) {
   const most = Math.max(...model.size_mm), words = Object.keys(UNITS).filter((unit) => most * UNITS[unit] <= MOST_MM);
   $("tiny").hidden = most >= TINY_MM || !words.length;
   $("tiny-told").textContent = `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?`;
-  unitButtons($("tiny-units"), words, (unit) => send({ do: "set", key: "process.scale", value: String(Number((store.state.scale * UNITS[unit]).toPrecision(9))) }));
+  unitButtons($("tiny-units"), words, (unit) => send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) }));
 }
+
+const scaleBy = (factor) => String(Number((store.state.scale * factor).toPrecision(9)));
 
 /** A file may be dropped anywhere on the page. */
 function dropping() {
@@ -76,21 +76,21 @@ function tellModel({ state: { model, standing } }) {
 
 export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
-  const scale = (factor) => send({ do: "set", key: "process.scale", value: String(Number(factor.toPrecision(9))) });
-  $("scale").addEventListener("change", () => scale(Number($("scale").value) / 100));
+  const scale = (value) => send({ do: "set", key: "process.scale", value });
+  listen("change", { scale: () => scale(scaleBy(Number($("scale").value) / 100 / store.state.scale)) });
   sides.forEach((side, k) => side.addEventListener("change", () => {
     const { standing } = store.state;
-    if (standing) scale((store.state.scale * Number(side.value)) / standing.size_mm[k]);
+    if (standing) scale(scaleBy(Number(side.value) / standing.size_mm[k]));
   }));
   let shown = null; // the standing that was told last
-  $("scale-as-read").addEventListener("click", () => send({ do: "set", key: "process.scale", value: null }));
+  listen("click", { "scale-as-read": () => scale(null) });
   onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;
     const fresh = problem !== before?.problem || !alike(standing, shown);
     shown = standing;
-    const fill = (input, value) => { if (fresh || document.activeElement !== input) input.value = value; };
-    fill($("scale"), Number((100 * factor).toPrecision(6)));
-    sides.forEach((side, k) => fill(side, standing.size_mm[k].toFixed(2)));
+    const put = (input, value) => { if (fresh) input.value = value; else fill(input, value); };
+    put($("scale"), Number((100 * factor).toPrecision(6)));
+    sides.forEach((side, k) => put(side, standing.size_mm[k].toFixed(2)));
     $("fit-told").textContent = standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
     $("fit-told").classList.toggle("refused", Boolean(standing.problem));
   });

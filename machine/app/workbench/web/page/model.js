@@ -1,9 +1,9 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal.
 
 import { sub } from "../../../../view/template/math.js";
-import { $, made, notice } from "../../../../view/template/page.js";
-import { alike, mm2, swatch } from "./elements.js";
-import { AGAIN_MS } from "./line.js";
+import { $, made, notice, swatch } from "../../../../view/template/page.js";
+import { alike, mm2 } from "./elements.js";
+import { AGAIN_MS, newest } from "./line.js";
 import { fadedColours } from "./pieces.js";
 import { planesNow } from "./planes.js";
 import { onState, store, subscribe, update } from "./store.js";
@@ -75,15 +75,11 @@ function look(picture, red) {
 
 /** What the model stands on, while it stands still: turned, it would have another one. */
 export function pedestalOf(picture) {
-  let asked = "";
-  const fetchPedestal = async (of) => {
-    asked = of;
-    const answer = of ? await fetch(`pedestal/${of}`).catch(() => null) : null, body = answer?.status === 200 ? trianglesFrom(await answer.arrayBuffer()) : null;
-    if (asked !== of) return;
-    if (!body) asked = ""; // another one stands there by now, or the line is lost: the next state asks again
+  const take = (body, of) => {
     update({ pedestal: body && { of, body } });
     document.documentElement.dataset.pedestal = body ? of : "";
   };
-  onState(({ pedestal }) => { if (pedestal !== asked) fetchPedestal(pedestal); });
+  const fetchPedestal = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true });
+  onState(({ pedestal }) => fetchPedestal(pedestal, `pedestal/${pedestal}`));
   subscribe(({ state, turning, pedestal }) => picture.pedestal(!turning && pedestal?.of === state.pedestal ? pedestal.body : null));
 }

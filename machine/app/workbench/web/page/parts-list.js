@@ -1,7 +1,7 @@
 // Parts list: every part with the plane it stands on in a row, chosen there as in the picture; keys and a menu for what is done to it.
 
-import { $, made, needsKey } from "../../../../view/template/page.js";
-import { choiceRow, newtons, putTable, swatch } from "./elements.js";
+import { $, made, needsKey, swatch } from "../../../../view/template/page.js";
+import { button, choiceRow, newtons, putTable } from "./elements.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 import { store, subscribe } from "./store.js";
 
@@ -84,7 +84,7 @@ export function openMenu(part, x, y) {
     if (back?.isConnected) back.focus();
     act?.();
   };
-  menu.replaceChildren(...entriesOf(part).map(([text, can, act]) => made("button", { type: "button", role: "menuitem", text, disabled: !can, onclick: () => close(act) })));
+  menu.replaceChildren(...entriesOf(part).map(([text, can, act]) => button(text, () => close(act), { role: "menuitem", disabled: !can })));
   menu.ariaLabel = `Part ${part}`;
   menu.close = close;
   menu.hidden = false;

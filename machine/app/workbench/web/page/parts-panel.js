@@ -1,18 +1,20 @@
 // Parts panel: the search, and its front as a slider.
 
 import { $, made, partsInWords, roughly } from "../../../../view/template/page.js";
-import { listIn, mm2, tellIn } from "./elements.js";
+import { disable, hide, listen, listIn, mm2, tell, tellIn, toggle } from "./elements.js";
 import { ask, send } from "./line.js";
 import { onState, store, update } from "./store.js";
 
 export function partsPanel() {
-  $("find").addEventListener("click", () => send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }));
-  $("stop").addEventListener("click", () => send({ do: "stop" }));
+  listen("click", {
+    find: () => send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }),
+    recommended: () => send({ do: "take", parts: store.state.recommended }),
+  });
   let shown = ""; // of which front the slider is
-  const told = ({ front, parts, recommended, cuts, priced }) => JSON.stringify([front, parts, recommended, cuts, priced]);
+  const toldOf = ({ front, parts, recommended, cuts, priced }) => JSON.stringify([front, parts, recommended, cuts, priced]);
   const show = (state) => {
     const { front, parts, recommended } = state, place = front.findIndex((row) => row.parts === parts);
-    shown = told(state);
+    shown = toldOf(state);
     update({ row: null });
     $("front").max = front.length - 1;
     $("front").value = Math.max(place, 0);
@@ -35,32 +37,30 @@ export function partsPanel() {
     held = null;
     show(store.state);
   };
-  $("front").addEventListener("pointerdown", hold);
+  listen("pointerdown", { front: hold });
   for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first
-  $("front").addEventListener("blur", letGo);
-  $("front").addEventListener("input", () => {
+  listen("blur", { front: letGo });
+  listen("input", { front: () => {
     hold();
     follow(held[$("front").value]);
-  });
-  $("front").addEventListener("change", () => {
+  } });
+  listen("change", { front: () => {
     const { parts } = (held || store.state.front)[$("front").value];
     held = null;
     update({ row: null });
     ask({ do: "take", parts }, (refusal) => { if (refusal && !held && store.state.front.length) show(store.state); });
-  });
-  $("recommended").addEventListener("click", () => send({ do: "take", parts: store.state.recommended }));
+  } });
   onState((state) => {
     const { front, search, parts } = state;
-    $("find").disabled = Boolean(search);
-    $("stop").hidden = !search;
-    $("search-told").textContent = search ? search.text : "";
-    document.body.classList.toggle("no-cuts", !parts);
-    $("front-field").hidden = !front.length;
+    disable({ find: Boolean(search) });
+    hide({ "stop": !search, "front-field": !front.length });
+    tell({ "search-told": search ? search.text : "" });
+    toggle("no-cuts", !parts);
     if (!front.length) {
       held = null;
       shown = "";
       if (store.row) update({ row: null });
-    } else if (!held) { if (told(state) !== shown) show(state); }
+    } else if (!held) { if (toldOf(state) !== shown) show(state); }
     else if (store.row) follow(store.row);
   });
 }

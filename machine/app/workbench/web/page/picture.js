@@ -57,15 +57,14 @@ export function pictureOf(canvas, camera) {
     stale.clear();
   };
   const bodies = () => Math.floor(MOST_FACES / Math.max(scene.model?.count || 0, 1));
-  const release = (thing) => { if (thing) thing.free(); };
-  const table = () => {
-    if (!scene.machine) return;
-    const { table: body } = bodiesOf(scene.machine, scene.dark);
-    Object.values(card.table || {}).forEach(release);
-    card.table = { solid: solidOf(gl, body.solid), lines: linesOf(gl, body.lines) };
+  /** What the card holds under a name, in place of what it held: solids and lines of shapes, nothing of none. */
+  const hold = (name, { solid, lines } = {}) => {
+    [card[name]?.solid, card[name]?.lines].forEach((drawing) => drawing?.free());
+    card[name] = solid || lines ? { solid: solid && solidOf(gl, solid), lines: lines && linesOf(gl, lines) } : null;
   };
+  const table = () => { if (scene.machine) hold("table", bodiesOf(scene.machine, scene.dark).table); };
   const solid = () => {
-    release(card.solid);
+    card.solid?.free();
     card.solid = null;
     if (!scene.model) return;
     const colours = new Uint8Array(12 * scene.model.count);
@@ -90,13 +89,13 @@ export function pictureOf(canvas, camera) {
       const ghost = card.walls ? FAINT : 0;
       for (const shift of [[0, 0, 0], ...scene.copies.slice(0, bodies())]) {
         card.solid.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost });
-        if (card.pedestal) card.pedestal.draw(seenAs(moved(shift)), { ghost });
+        if (card.pedestal) card.pedestal.solid.draw(seenAs(moved(shift)), { ghost });
       }
     }
     if (card.table && below) paintPlate(plate, { strength: 0.18 });
     if (card.plane) {
-      card.plane.rim.draw(flat.toClip, { lift: 1e-4 });
-      card.plane.disc.draw(flat, { strength: 0.3 });
+      card.plane.lines.draw(flat.toClip, { lift: 1e-4 });
+      card.plane.solid.draw(flat, { strength: 0.3 });
     }
     for (const things of Object.values(card.extras)) for (const thing of things) paintExtra(thing, seenAs(thing.matrix));
     card.frame.show();
@@ -118,24 +117,20 @@ export function pictureOf(canvas, camera) {
     flat.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
   };
   const plane = () => {
-    Object.values(card.plane || {}).forEach(release);
-    card.plane = null;
-    if (!scene.plane) return;
-    const { discs, rims } = planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR);
-    card.plane = { disc: solidOf(gl, discs), rim: linesOf(gl, rims) };
+    const { discs, rims } = scene.plane ? planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR) : {};
+    hold("plane", { solid: discs, lines: rims });
   };
   const pedestal = () => {
-    release(card.pedestal);
-    const colours = scene.pedestal && new Uint8Array(12 * scene.pedestal.count);
-    card.pedestal = colours && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR, colours) });
+    const { count = 0, corners } = scene.pedestal || {}, colours = paintedRed(count, null, PEDESTAL_COLOUR, new Uint8Array(12 * count));
+    hold("pedestal", { solid: corners && { places: corners, colours } });
   };
   const pieces = () => {
-    release(card.pieces);
+    card.pieces?.free();
     card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen);
   };
   const chosenPiece = () => { if (card.pieces) card.pieces.paint(scene.chosen); };
   const extra = (name) => {
-    (card.extras[name] || []).forEach(({ solid, lines }) => [solid, lines].forEach(release));
+    (card.extras[name] || []).forEach(({ solid, lines }) => [solid, lines].forEach((drawing) => drawing?.free()));
     card.extras[name] = scene.extras[name].map(({ solid, lines, matrix = IDENTITY, strength = 1, over = false }) => ({
       solid: solid && solidOf(gl, solid), lines: lines && linesOf(gl, lines), matrix, strength, over,
     }));
@@ -162,6 +157,12 @@ export function pictureOf(canvas, camera) {
     if (!asked) requestAnimationFrame(draw);
     asked = true;
   };
+  /** Another value of the scene, and what the card has of it anew. */
+  const take = (name, remade) => (value) => {
+    if (value === scene[name]) return;
+    scene[name] = value;
+    anew(remade);
+  };
   outlive(gl, () => {}, () => { build(); draw(); });
   new ResizeObserver(ask).observe(canvas);
   build();
@@ -171,17 +172,9 @@ export function pictureOf(canvas, camera) {
     machine: (machine, dark) => { Object.assign(scene, { machine, dark }); anew(table); },
     show: (model) => { scene.model = model; scene.red = scene.marks = null; anew(solid); },
     stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
-    red: (marks) => {
-      if (marks === scene.red) return;
-      scene.red = marks;
-      anew(painted);
-    },
+    red: take("red", painted),
     /** A byte of each face: the kinds of zones it is marked for. */
-    marks: (bits) => {
-      if (bits === scene.marks) return;
-      scene.marks = bits;
-      anew(painted);
-    },
+    marks: take("marks", painted),
     /** More to draw under a name: things(): [{solid, lines, matrix, strength, over: before all else}], made where what it tells is new. */
     extra: (name, told, things) => {
       if ((drawnOf[name] ?? "") === told) return;
@@ -209,13 +202,9 @@ export function pictureOf(canvas, camera) {
       anew(walls);
     },
     /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
-    plane: (held) => { scene.plane = held; anew(plane); },
+    plane: take("plane", plane),
     /** The triangles of what the model stands on, in the platform's frame, or none. */
-    pedestal: (body) => {
-      if (body === scene.pedestal) return;
-      scene.pedestal = body;
-      anew(pedestal);
-    },
+    pedestal: take("pedestal", pedestal),
     /** Where the middle of all that is drawn but the walls stands on the plate, and its copies, from there. */
     place(place, copies) {
       const told = JSON.stringify([place, copies, scene.box]);

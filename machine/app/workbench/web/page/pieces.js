@@ -6,7 +6,8 @@ import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../v
 import { arrowsOf, LEFT, RED, surfacesOf } from "../../../../view/template/model.js";
 import { $ } from "../../../../view/template/page.js";
 import { solidOf } from "../../../../view/template/solids.js";
-import { mm2, newtons } from "./elements.js";
+import { listen, mm2, newtons } from "./elements.js";
+import { newest } from "./line.js";
 import { store, subscribe, update } from "./store.js";
 import { cornersAt, faceMet, wordOf } from "./triangles.js";
 
@@ -98,28 +99,21 @@ export function pieceMet({ places, parts }, shifts, [from, along]) {
 export const apartNow = () => (store.pieces && store.tab === "parts" && !store.hand && !store.state.search ? store.apart : 0);
 
 export function apartPanel(picture) {
-  let asked = ""; // of which state the pieces are, or come
   const keyOf = ({ model, rotation, cuts, given, parts }) => (parts && model.drawn ? JSON.stringify([model.key, rotation, cuts, given]) : "");
-  const fetchPieces = async (key) => {
-    asked = key;
-    update({ pieces: null });
-    const answer = key ? await fetch("pieces").catch(() => null) : null;
-    const pieces = answer?.ok ? await piecesIn(new Uint8Array(await answer.arrayBuffer())) : null;
-    if (asked !== key) return;
-    if (!answer) asked = ""; // the line is lost: the next state asks again
+  const take = (pieces) => {
     $("parts-fit").textContent = pieces ? pieces.header.fit : "";
     update({ pieces });
     document.documentElement.dataset.pieces = pieces ? pieces.parts.length : "";
   };
+  const fetchPieces = newest({ read: async (answer) => piecesIn(new Uint8Array(await answer.arrayBuffer())), take, begin: () => update({ pieces: null }) });
   $("apart").disabled = !picture;
-  $("apart").addEventListener("input", () => {
+  listen("input", { apart: () => {
     update({ apart: Number($("apart").value) });
     picture.fit();
-  });
+  } });
   subscribe(({ state, tab, pieces, part, apart }, before) => {
     $("apart-line").hidden = !state.parts || !state.model.drawn;
-    const key = keyOf(state);
-    if (key !== asked && tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) return void fetchPieces(key);
+    if (tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) fetchPieces(keyOf(state), "pieces");
     picture?.pieces(apartNow() ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
     $("joint-told").textContent = jointInWords(pieces ? pieces.parts.map(({ part: { joint } }) => joint).filter(Boolean) : [], part);
   });

@@ -64,7 +64,6 @@ function handleOf(picture) {
     put: () => { if (store.placing) put(store.placing); },
     drop: () => update({ placing: null }),
     step: (sign, { key, shiftKey }) => update({ placing: WAYS[key].map((way, axis) => placeNow()[axis] + way * (shiftKey ? LARGE_STEP_MM : STEP_MM)) }),
-    stepped: () => { if (store.placing) put(store.placing); },
   });
   picture.drawn.push(() => {
     const shown = store.tab === "model" && store.state?.model && store.triangles && store.clicks !== "lay";

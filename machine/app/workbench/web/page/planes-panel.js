@@ -2,7 +2,7 @@
 
 import { add, dot, RAD, scaled } from "../../../../view/template/math.js";
 import { $ } from "../../../../view/template/page.js";
-import { alike, mm2 } from "./elements.js";
+import { alike, disable, fill, hide, listen, mm2, tell } from "./elements.js";
 import { sectionNow } from "./handles.js";
 import { send } from "./line.js";
 import { sizeOf } from "./model-panel.js";
@@ -18,25 +18,26 @@ const normalOf = (tilt, towards) => {
 
 export function planesPanel(picture) {
   let moved = { text: "", cuts: [] }; // what is told of a plane that was put near, as long as the planes are these
-  const byPlane = (id, event, act) => $(id).addEventListener(event, () => { if (planeNow()) act(store.part); });
+  const byPlane = (event, acts) => Object.entries(acts).forEach(([id, act]) => listen(event, { [id]: () => { if (planeNow()) act(store.part); } }));
   const lean = (tilt, towards) => putPlane(leaned(normalOf(tilt, towards), picture));
   const near = (command) => putNear(command, (wanted, there) => {
     moved = { text: movedInWords(wanted, there), cuts: store.state.cuts };
     tellPlane();
   });
-  const tellPlane = () => tell(alike(moved.cuts, store.state.cuts) ? moved.text : "");
-  byPlane("remove", "click", removePart);
-  byPlane("neck", "click", (part) => send({ do: "neck", part }));
-  byPlane("earlier", "click", (part) => reorderPart(part, part - 1));
-  byPlane("later", "click", (part) => reorderPart(part, part + 1));
-  byPlane("plane-offset", "change", () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }));
-  for (const id of ["plane-tilt", "plane-towards"]) byPlane(id, "change", () => lean(Number($("plane-tilt").value), Number($("plane-towards").value)));
+  const tellPlane = () => tellAll(alike(moved.cuts, store.state.cuts) ? moved.text : "");
+  const leanAsTyped = () => lean(Number($("plane-tilt").value), Number($("plane-towards").value));
+  byPlane("click", {
+    remove: removePart, neck: (part) => send({ do: "neck", part }), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
+  });
+  byPlane("change", {
+    "plane-offset": () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
+  });
   document.querySelectorAll("[data-tilt]").forEach((button) => button.addEventListener("click", () => {
     if (planeNow()) lean(Number(button.dataset.tilt), Number($("plane-towards").value));
   }));
-  $("find-others").addEventListener("click", () => send({ do: "search", ranker: $("ranker").value }));
-  $("add").addEventListener("click", () => near(newPlane(picture)));
-  $("put-near").addEventListener("click", () => near(store.state.refused.near));
+  listen("click", {
+    "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(store.state.refused.near),
+  });
   onState((state, before) => {
     const { hand, part } = store, { trial, cuts, model } = state;
     if (part > Math.max(state.parts, 1) || !model) update({ part: 0 });
@@ -65,21 +66,21 @@ function movedInWords({ normal, offset_mm: wanted }, there) {
   return Math.abs(far) < MOVED_MM ? "" : `It stands ${Math.abs(far).toFixed(2)} mm ${far > 0 ? "farther up" : "farther down"} than asked for: the nearest place where it can be cut.`;
 }
 
-function tell(moved) {
+function tellAll(moved) {
   const { state: { locked, search, cuts }, hand, part } = store, plane = planeNow(), figures = figuresNow(), why = hand?.why;
-  $("find-others").disabled = Boolean(search) || !locked.some(Boolean);
-  $("plane").hidden = !plane;
+  disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
+  hide({ plane: !plane });
   if (plane) {
-    const [tilt, towards] = anglesOf(plane.normal), fill = (id, value) => { if (document.activeElement !== $(id)) $(id).value = value; };
-    fill("plane-offset", plane.offset_mm.toFixed(2));
-    fill("plane-tilt", tilt.toFixed(1));
-    fill("plane-towards", towards.toFixed(1));
+    const [tilt, towards] = anglesOf(plane.normal);
+    fill($("plane-offset"), plane.offset_mm.toFixed(2));
+    fill($("plane-tilt"), tilt.toFixed(1));
+    fill($("plane-towards"), towards.toFixed(1));
     document.querySelectorAll("#plane input, #plane button").forEach((control) => { control.disabled = isLocked(); });
     $("earlier").disabled ||= part === 2;
     $("later").disabled ||= part === cuts.length + 1;
   }
   $("plane-told").classList.toggle("refused", Boolean(why));
-  $("plane-told").textContent = why ? `Part ${why.refused_part} cannot be cut off there: ${why.refused}.` : !figures || !cuts.length ? ""
+  const told = why ? `Part ${why.refused_part} cannot be cut off there: ${why.refused}.` : !figures || !cuts.length ? ""
     : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
-  $("plane-moved").textContent = moved;
+  tell({ "plane-told": told, "plane-moved": moved });
 }

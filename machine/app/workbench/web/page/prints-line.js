@@ -1,6 +1,7 @@
 // Prints line: a page's line to the prints, which comes back by itself, the name by which the page is known then, and what becomes of emergency stops.
 
 import { $, notice } from "../../../../view/template/page.js";
+import { listen, sayIn } from "./elements.js";
 import { lineAt } from "./line.js";
 
 export const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
@@ -48,7 +49,7 @@ export function stopsAsked(prints, send, isOpen) {
   const going = ({ phase }) => phase !== "over";
   const stopped = () => prints().filter(({ number }) => asked.has(number));
   const say = (text) => {
-    if ($("stop-words").textContent !== text) $("stop-words").textContent = text;
+    sayIn("stop-words", text);
     $("stop-told").hidden = !text;
     $("print-bar").hidden = !text && $("emergency").hidden;
   };
@@ -63,7 +64,7 @@ export function stopsAsked(prints, send, isOpen) {
     clearTimeout(late);
     late = setTimeout(doubt, ANSWER_MS);
   };
-  $("stop-noted").addEventListener("click", () => { if (!stopped().some(going)) asked = new Set(); say(""); });
+  listen("click", { "stop-noted": () => { if (!stopped().some(going)) asked = new Set(); say(""); } });
   return {
     /** number: of a print. */
     press: (number) => {

@@ -1,7 +1,7 @@
 // Problem: what could not be done last, for as long as it is so or until it is read.
 
-import { $, made } from "../../../../view/template/page.js";
-import { withWholeOptions } from "./elements.js";
+import { $ } from "../../../../view/template/page.js";
+import { button, withWholeOptions } from "./elements.js";
 import { send } from "./line.js";
 import { onState } from "./store.js";
 
@@ -9,11 +9,10 @@ import { onState } from "./store.js";
 export function unitButtons(row, words, choose) {
   if (row.dataset.shown === `${words}`) return;
   row.dataset.shown = words;
-  row.replaceChildren(...words.map((unit) => made("button", { type: "button", text: `in ${unit}`, onclick: () => choose(unit) })));
+  row.replaceChildren(...words.map((unit) => button(`in ${unit}`, () => choose(unit))));
 }
 
 export function problemLine() {
-  $("dismiss").addEventListener("click", () => send({ do: "dismiss" }));
   onState(({ problem, refused, units }) => {
     if ($("problem").textContent !== problem) $("problem").replaceChildren(...withWholeOptions(problem)); // read aloud once
     $("problem").hidden = !problem;

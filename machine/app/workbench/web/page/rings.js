@@ -1,8 +1,9 @@
 // Rings: three about the model, by which it is turned about the platform's x, y and z; red follows as it does for the sliders.
 
-import { add, bounds, dot, length, RAD, scaled, sub, unit } from "../../../../view/template/math.js";
+import { add, dot, length, RAD, scaled, sub, unit } from "../../../../view/template/math.js";
 import { $ } from "../../../../view/template/page.js";
-import { gripOf } from "./grip.js";
+import { listen, pressed } from "./elements.js";
+import { alongSeen, gripOf } from "./grip.js";
 import { send } from "./line.js";
 import { store, update } from "./store.js";
 import { turnedFurther } from "./triangles.js";
@@ -10,6 +11,7 @@ import { turnedFurther } from "./triangles.js";
 const RING_AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 const RING_STEPS = 96, RING_REACH = 1.05; // of the farthest vertex from the middle
 const RING_KEY_DEG = 1, RING_SNAP_DEG = 15; // the latter with Shift held
+const LEAST_PIXELS = 0.2; // of a degree along it
 const FLATTEST = 0.25; // cosine between look and axis below which a ring is seen from its edge: its tangent is followed, not its plane
 
 export function ringsOf(picture) {
@@ -17,12 +19,11 @@ export function ringsOf(picture) {
   let turning = null; // {axis, ring, deg}: how far it is turned from where it stood
   const ringNow = () => {
     const [least, most] = picture.box();
-    return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * reachOf(store.triangles) };
+    return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * store.triangles.reach_mm };
   };
   const told = (axis, deg) => {
     const group = groups.find(({ dataset }) => dataset.ring === axis);
-    group.setAttribute("aria-valuenow", deg);
-    group.setAttribute("aria-valuetext", `${deg} degrees`);
+    Object.assign(group, { ariaValueNow: deg, ariaValueText: `${deg} degrees` });
   };
   const preview = (axis, ring, deg) => {
     turning = { axis, ring, deg };
@@ -37,21 +38,21 @@ export function ringsOf(picture) {
     if (taken && last.deg) send({ do: "turn", axis: last.axis, deg: last.deg });
     else update({ turning: null });
   };
+  const stepOf = ({ shiftKey }) => (shiftKey ? RING_SNAP_DEG : RING_KEY_DEG);
   groups.forEach((group) => {
     const axis = group.dataset.ring;
     gripOf(group, {
       take: (event) => ({ ring: ringNow(), ...graspOf(picture, RING_AXES[axis], ringNow(), event) }),
       move: (held, event) => {
-        const deg = held.turnedTo(event), step = event.shiftKey ? RING_SNAP_DEG : RING_KEY_DEG;
-        preview(axis, { ...held.ring, from: held.from }, Math.round(deg / step) * step);
+        const step = stepOf(event);
+        preview(axis, { ...held.ring, from: held.from }, Math.round(held.turnedTo(event) / step) * step);
       },
       put: () => done(true),
       drop: () => done(false),
       step: (sign, event) => {
-        const ring = turning ? turning.ring : { ...ringNow(), from: 0 }, step = event.shiftKey ? RING_SNAP_DEG : RING_KEY_DEG;
-        preview(axis, ring, (turning ? turning.deg : 0) + sign * step);
+        const { ring, deg } = turning || { ring: { ...ringNow(), from: 0 }, deg: 0 };
+        preview(axis, ring, deg + sign * stepOf(event));
       },
-      stepped: () => done(true),
     });
   });
   const shown = () => Boolean(on() && store.tab === "model" && store.triangles && store.state.model && store.clicks !== "lay");
@@ -64,31 +65,17 @@ export function ringsOf(picture) {
       const sides = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
       const seen = sides.flatMap((spot, k) => (k && spot.near !== sides[k - 1].near ? [{ ...spot, near: !spot.near }, spot] : [spot]));
       group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
-      group.querySelector(".far").setAttribute("d", pathOf(seen, ({ near }) => !near));
-      group.querySelector(".near").setAttribute("d", pathOf(seen, ({ near }) => near));
-      group.querySelector(".reach").setAttribute("d", pathOf(seen, () => true));
+      const parts = { far: ({ near }) => !near, near: ({ near }) => near, reach: () => true };
+      for (const [name, wanted] of Object.entries(parts)) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, wanted));
       const label = seen.reduce((best, spot) => (spot.at && spot.near && (!best || spot.at[1] < best[1]) ? spot.at : best), null) || [-99, -99];
       group.querySelector("text").setAttribute("x", label[0]);
       group.querySelector("text").setAttribute("y", label[1]);
     });
     showSweep(picture, turning);
   });
-  $("show-rings").addEventListener("click", () => { $("show-rings").setAttribute("aria-pressed", !on()); picture.ask(); });
+  listen("click", { "show-rings": () => { pressed("show-rings", !on()); picture.ask(); } });
   /** Places of the rings, as far as they are shown. */
   return () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
-}
-
-const REACHES = new WeakMap(); // of triangles: they stay as they are
-
-/** How far the farthest vertex is from the middle of all, mm: the same however the model is turned. */
-function reachOf(triangles) {
-  if (!REACHES.has(triangles)) {
-    const { vertices } = triangles, [least, most] = bounds(vertices), middle = scaled(add(least, most), 0.5);
-    let far = 1;
-    for (let i = 0; i < vertices.length; i += 3) far = Math.max(far, Math.hypot(vertices[i] - middle[0], vertices[i + 1] - middle[1], vertices[i + 2] - middle[2]));
-    REACHES.set(triangles, far);
-  }
-  return REACHES.get(triangles);
 }
 
 /** Two unit vectors across an axis, so that turning the first by 90 degrees gives the second. */
@@ -123,20 +110,17 @@ function graspOf(picture, axis, ring, event) {
   };
 }
 
-/** The same for a ring that is seen from its edge: the hand goes along it, so many pixels a degree. */
+/** The same for a ring that is seen from its edge: the hand goes along it from the nearest place that it has before its middle. */
 function graspEdge(picture, axis, ring, event) {
   const canvas = $("canvas").getBoundingClientRect(), at = [event.clientX - canvas.left, event.clientY - canvas.top];
-  const eye = picture.eye(), middle = length(sub(eye, ring.centre));
-  let best = null;
-  for (let k = 0; k < RING_STEPS; k++) {
-    const angle = (2 * Math.PI * k) / RING_STEPS, place = onRing(axis, ring, angle), seen = picture.placeOf(place);
-    if (!seen || length(sub(eye, place)) > middle) continue;
-    const far = Math.hypot(seen[0] - at[0], seen[1] - at[1]);
-    if (!best || far < best.far) best = { far, angle, seen };
-  }
-  const from = best ? best.angle : 0, next = picture.placeOf(onRing(axis, ring, from + RAD)), here = best ? best.seen : at;
-  const way = next ? [next[0] - here[0], next[1] - here[1]] : [1, 0], pixels = Math.max(Math.hypot(...way), 0.2);
-  return { from, turnedTo: (later) => ((later.clientX - event.clientX) * way[0] + (later.clientY - event.clientY) * way[1]) / (pixels * pixels) };
+  const eye = picture.eye(), middle = length(sub(eye, ring.centre)), step = (2 * Math.PI) / RING_STEPS;
+  let best = { far: Infinity, from: 0, seen: at };
+  ringPoints(axis, ring).forEach((place, k) => {
+    const seen = picture.placeOf(place), far = seen && length(sub(eye, place)) <= middle ? Math.hypot(seen[0] - at[0], seen[1] - at[1]) : Infinity;
+    if (far < best.far) best = { far, from: k * step, seen };
+  });
+  const { from, seen } = best, next = picture.placeOf(onRing(axis, ring, from + RAD)) || [seen[0] + 1, seen[1]];
+  return { from, turnedTo: alongSeen(seen, next, event, LEAST_PIXELS) };
 }
 
 /** An SVG path along the places that are seen and wanted. */

@@ -2,13 +2,14 @@
 // changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
 import { $, made } from "../../../../view/template/page.js";
-import { alike, putRows } from "./elements.js";
+import { alike, button, disable, hide, listen, pressed, putRows, tell } from "./elements.js";
 import { keptInTab } from "./kept.js";
 import { ask, send } from "./line.js";
 import { settingRow } from "./setting-row.js";
 import { onState, store } from "./store.js";
 
 const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
+const KINDS = ["machine", "material", "process"];
 const KIND_OF = { machine: "machine", material: "material", process: "process", search: "process" };
 const kept = keptInTab("settings", { level: "simple", folded: [] });
 
@@ -42,11 +43,10 @@ export function settingsPanel() {
   const list = () => {
     const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0;
     if (changedOnly && !changed.length) return showChanged(false);
-    $("settings-count").textContent = rows.length ? `${rows.length} of ${settings.length} settings` : "No setting has these words.";
-    $("only-changed").textContent = `${changed.length} changed`;
-    $("only-changed").disabled = !changed.length;
+    tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : "No setting has these words.", "only-changed": `${changed.length} changed` });
+    disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
     tellTakeBack(changed, part());
-    for (const level of LEVELS) $(`level-${level}`).setAttribute("aria-pressed", kept.now.level === level);
+    for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
     const groups = groupedBy(rows, ({ group }) => group);
     putRows([...groups].flatMap(([group, own]) => {
       const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
@@ -60,7 +60,7 @@ export function settingsPanel() {
   };
   const showChanged = (only) => {
     changedOnly = only;
-    $("only-changed").setAttribute("aria-pressed", only);
+    pressed("only-changed", only);
     list();
   };
   const fetchAll = async () => {
@@ -82,13 +82,14 @@ export function settingsPanel() {
     const chosen = part() < names.length ? part() : 0;
     $("settings-part").replaceChildren(...names.map((text, k) => made("option", { text, value: k, selected: k === chosen })));
   };
-  $("search-settings").addEventListener("input", list);
-  $("only-changed").addEventListener("click", () => showChanged(!changedOnly));
-  for (const level of LEVELS) $(`level-${level}`).addEventListener("click", () => { kept.keep({ level }); list(); });
-  $("settings-part").addEventListener("change", () => { wrongs.clear(); fetchAll(); });
-  $("reset-settings").addEventListener("click", () => send(part() ? { do: "reset_part", part: part() } : { do: "reset" }));
-  for (const kind of new Set(Object.values(KIND_OF))) $(`reset-${kind}`).addEventListener("click", () => send({ do: "reset", kind }));
-  $("copy-command").addEventListener("click", () => copyText($("command-line"), $("copy-command")));
+  listen("input", { "search-settings": list });
+  listen("change", { "settings-part": () => { wrongs.clear(); fetchAll(); } });
+  listen("click", {
+    "only-changed": () => showChanged(!changedOnly), "copy-command": () => copyText($("command-line"), $("copy-command")),
+    "reset-settings": () => send(part() ? { do: "reset_part", part: part() } : { do: "reset" }),
+  });
+  for (const level of LEVELS) listen("click", { [`level-${level}`]: () => { kept.keep({ level }); list(); } });
+  for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
   const ofSettings = ({ given, part_settings: own, parts, model, rotation, stops, copies } = {}) => [given, own, parts, model?.name, rotation, stops, copies];
   onState((state, before) => {
     const fresh = !before || !alike(ofSettings(state), ofSettings(before));
@@ -129,19 +130,19 @@ function groupedBy(rows, nameOf) {
 /** Whose changes there are, with a button for each profile that has some, and one for all. */
 function tellTakeBack(changed, part) {
   const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
-  for (const kind of new Set(Object.values(KIND_OF))) {
+  for (const kind of KINDS) {
     const count = counts.get(kind)?.length || 0;
-    $(`reset-${kind}`).textContent = `Those of the ${kind} (${count})`;
-    $(`reset-${kind}`).hidden = part > 0 || !count || counts.size < 2;
+    tell({ [`reset-${kind}`]: `Those of the ${kind} (${count})` });
+    hide({ [`reset-${kind}`]: part > 0 || !count || counts.size < 2 });
   }
-  $("reset-settings").textContent = part ? `Take back what part ${part} has of its own (${changed.length})` : counts.size === 1 ? `Take the changes of the ${[...counts.keys()][0]} back (${changed.length})` : `Take all changes back (${changed.length})`;
-  $("reset-settings").disabled = !changed.length;
+  const all = part ? `Take back what part ${part} has of its own` : counts.size === 1 ? `Take the changes of the ${[...counts.keys()][0]} back` : "Take all changes back";
+  tell({ "reset-settings": `${all} (${changed.length})` });
 }
 
 function groupTitle(own, folded, turn) {
   const [{ group, title, about }] = own, told = JSON.stringify([title, own.length, folded]);
-  const button = () => made("button", { type: "button", title: `${about}.`, ariaExpanded: String(!folded), onclick: turn }, made("span", { text: title }), made("small", { text: own.length }));
-  return { id: `group ${group}`, told, make: () => made("h2", {}, button()) };
+  const more = { title: `${about}.`, ariaExpanded: String(!folded) }, words = () => [made("span", { text: title }), made("small", { text: own.length })];
+  return { id: `group ${group}`, told, make: () => made("h2", {}, button("", turn, more, ...words())) };
 }
 
 /** A text into the clipboard, or marked for the person to take where the browser allows no more. */

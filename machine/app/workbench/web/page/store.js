@@ -24,5 +24,16 @@ export function update(changes) {
 /** listener(store, as it was before): from the first state on. */
 export const subscribe = (listener) => listeners.push(listener);
 
+/** changed(what is picked of the state): from the first one on, and whenever that is other than it was. */
+export function onNew(pick, changed) {
+  let told = "";
+  onState((state) => {
+    const now = pick(state), fresh = JSON.stringify(now);
+    if (fresh === told) return;
+    told = fresh;
+    changed(now);
+  });
+}
+
 /** listener(state, the one before): for every new state. */
 export const onState = (listener) => subscribe((now, before) => { if (now.state !== before.state) listener(now.state, before.state); });

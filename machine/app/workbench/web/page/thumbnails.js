@@ -2,7 +2,7 @@
 
 import { $, made } from "../../../../view/template/page.js";
 import { send } from "./line.js";
-import { mm2 } from "./elements.js";
+import { button, mm2 } from "./elements.js";
 import { store, subscribe, update } from "./store.js";
 
 const SIZE = { width: 112, height: 84 };
@@ -11,16 +11,13 @@ const small = () => made("canvas", { ...SIZE, className: "thumbnail" });
 
 /** The ways in which the model rests, and how a search has laid it down; without a picture in words alone. */
 export function thumbnailsOf(picture) {
-  let resting = [], laid = null, model = null; // of what there are small pictures
-  subscribe(({ state, triangles }, before) => {
-    const fresh = triangles !== model;
-    model = triangles;
-    if (fresh || state.resting !== before.state?.resting) {
-      if (fresh || JSON.stringify(state.resting) !== JSON.stringify(resting)) showResting(state.resting, triangles && picture);
-      resting = state.resting;
-    }
-    if (fresh || JSON.stringify(state.laid) !== JSON.stringify(laid)) showLaid(state.laid, triangles && picture);
-    laid = state.laid;
+  let told = "", model = null; // of what there are small pictures
+  subscribe(({ state: { resting, laid }, triangles }) => {
+    const now = JSON.stringify([resting, laid]);
+    if (now === told && triangles === model) return;
+    [told, model] = [now, triangles];
+    showResting(resting, triangles && picture);
+    showLaid(laid, triangles && picture);
   });
 }
 
@@ -34,7 +31,7 @@ function showResting(resting, picture) {
   $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
     const into = picture ? small() : "";
     if (into) drawn.push([rotation, into]);
-    return made("button", { type: "button", onclick: () => { update({ clicks: "" }); send({ do: "stand", rotation }); } }, into, made("span", { text: words }), made("small", { text: mm2(area) }));
+    return button("", () => { update({ clicks: "" }); send({ do: "stand", rotation }); }, {}, into, made("span", { text: words }), made("small", { text: mm2(area) }));
   }));
   if (picture) drawLater(picture, drawn);
 }

@@ -3,7 +3,7 @@
 import { add, bounds, carried, cross, dot, length, mix, multiply, RAD, rotated, scaled, sub, turned, undone } from "../../../../view/template/math.js";
 import { RED } from "../../../../view/template/model.js";
 
-/** {vertices, faces, corners: places of the triangles' corners, normals, areas} of the server's bytes. */
+/** {vertices, faces, corners: places of the triangles' corners, normals, areas, reach_mm: of the farthest vertex from the middle} of the server's bytes. */
 export function trianglesFrom(buffer) {
   const [points, count] = new Uint32Array(buffer, 0, 2);
   const vertices = new Float32Array(new Float64Array(buffer, 8, 3 * points)), faces = new Uint32Array(buffer, 8 + 24 * points, 3 * count);
@@ -14,7 +14,10 @@ export function trianglesFrom(buffer) {
     areas[face] = size / 2;
     normals.set(scaled(across, 1 / (size || 1)), 3 * face);
   }
-  return { vertices, faces, corners, normals, areas, count };
+  const middle = points ? scaled(add(...bounds(vertices)), 0.5) : [0, 0, 0];
+  let reach = 1;
+  for (let i = 0; i < vertices.length; i += 3) reach = Math.max(reach, Math.hypot(vertices[i] - middle[0], vertices[i + 1] - middle[1], vertices[i + 2] - middle[2]));
+  return { vertices, faces, corners, normals, areas, count, reach_mm: reach };
 }
 
 export const cornersAt = (corners, face) => [0, 3, 6].map((k) => [corners[9 * face + k], corners[9 * face + k + 1], corners[9 * face + k + 2]]);
