@@ -27,7 +27,7 @@ from machine.detect.found import (
 from machine.detect.sections import Sections, number, read_sections
 from profiles.errors import ProfileError
 
-SIGNS = re.compile(r"^\[(?:EMC|EMCMOT|TRAJ|KINS)\]", re.MULTILINE)
+SIGNS = re.compile(r"^(?:\[(?:EMC|EMCMOT|TRAJ|KINS)\]|#INCLUDE\s+\S)", re.MULTILINE)
 INCLUDE = re.compile(r"#INCLUDE\s+(\S+)")
 LINEAR_MM = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
 ANGULAR_DEG = {**dict.fromkeys(("deg", "degree"), 1.0), **dict.fromkeys(("rad", "radian"), 180.0 / pi), "grad": 0.9, "gon": 0.9}

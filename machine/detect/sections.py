@@ -12,6 +12,7 @@ from profiles.errors import ProfileError
 Sections = dict[str, dict[str, str]]
 MOST_INCLUDED = 100  # files; more is one that names itself
 NOTHING = re.compile(r"(?!)")
+CONTINUED = re.compile(r"\\[ \t]*\r?\n")  # a line goes on in the next one (LinuxCNC, docs/src/config/ini-config.adoc, 5c41560)
 
 
 @dataclass
@@ -48,7 +49,7 @@ def _pieces(config: ConfigText, include: re.Pattern[str], included: Included) ->
     if included.count > MOST_INCLUDED:
         raise ProfileError(f"{config.name}: more than {MOST_INCLUDED} files are included: does one name itself?")
     lines: list[str] = []
-    for line in config.text.splitlines():
+    for line in CONTINUED.sub(" ", config.text).splitlines():
         if (named := include.match(line)) is None:
             lines.append(line.partition("#")[0])
             continue

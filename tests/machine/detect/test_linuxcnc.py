@@ -99,3 +99,12 @@ def test_a_file_of_before_2_8_numbers_its_axes() -> None:
 def test_what_is_cut_off_or_absurd_is_one_sentence(text: str, axes: str, sentence: str) -> None:
     with pytest.raises(ProfileError, match=sentence):
         found(text, axes)
+
+
+def test_a_line_that_a_backslash_carries_on_is_one() -> None:
+    whole = found(INI + "[APPLICATIONS]\nAPP = sim_pin \\\n  joint.0.jog-counts \\\n  joint.1.jog-counts\n")
+    assert values(whole, "X") == values(found(), "X")
+
+
+def test_a_file_of_includes_alone_is_recognised() -> None:
+    assert recognise("[EXAMPLE]\nparm = 1\n#INCLUDE traj.inc\n#INCLUDE kins.inc\n")
