@@ -130,8 +130,10 @@ def _circle(points: Floats, density: Floats, i: int, j: int, tolerance: float) -
         px, py, qx, qy = points[k, 0] - x, points[k, 1] - y, points[k + 1, 0] - x, points[k + 1, 1] - y
         across, along = px * qy - py * qx, px * qx + py * qy
         step = np.arctan2(across, along)
-        middle = np.hypot(0.5 * (px + qx), 0.5 * (py + qy))
-        close = abs(np.hypot(qx, qy) - radius) <= tolerance and abs(middle - radius) <= tolerance
+        dx, dy = qx - px, qy - py
+        foot = min(max(-(px * dx + py * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)  # nearest to the centre
+        inner = np.hypot(px + foot * dx, py + foot * dy)
+        close = abs(np.hypot(qx, qy) - radius) <= tolerance and abs(inner - radius) <= tolerance
         even = abs(density[k] - density[i]) <= UNEVEN * density[i]
         if not close or not even or along <= 0.0 or step == 0.0 or (turned != 0.0 and (step > 0.0) != (turned > 0.0)):
             return False, x, y, 0.0

@@ -20,11 +20,11 @@ LIVE = "$('live').textContent"
 
 @contextmanager
 def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
-    """`print --watch` of ten minutes on the simulated printer, and the address that it tells."""
+    """`print --watch` of minutes on the simulated printer, and the address that it tells."""
     file = folder / "long.gcode"
-    moves = "".join(f"G1 X{10 + 30 * (k % 2)} E{k + 1} F600\n" for k in range(200))
+    moves = "".join(f"G1 X{10 + 30 * (k % 2)} E{k + 1} F600\n" for k in range(2000))
     file.write_text(BEGIN + moves + END)
-    options = ["--port", "sim", "--sim-speed", "1", "--watch", "--no-browser", "--force"]
+    options = ["--port", "sim", "--sim-speed", "20", "--watch", "--no-browser", "--force"]
     command = [sys.executable, "-m", "machine.app.cli", "print", str(file), *options]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     try:

@@ -5,7 +5,7 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
@@ -47,6 +47,7 @@ def _program(flat: Floats, profile: Profile) -> tuple[list[str], Stroke]:
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 10**6), st.sampled_from([0.003, 0.01, 0.025, 0.1]))
+@example(40000, 0.1)  # a chord from outside to inside is nearest to the centre beside its middle
 def test_fitted_arcs_read_back_keep_to_the_path_and_push_its_filament(seed: int, tolerance: float) -> None:
     profile = load(settings=[*ARCS, f"machine.arc_tolerance_mm={tolerance}"])
     flat = _turning(seed)
