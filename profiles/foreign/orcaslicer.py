@@ -107,6 +107,7 @@ PLATES = {  # the bed that Bambu Studio and OrcaSlicer heat is that of the plate
 def read_preset(file: Path, document: Mapping[str, Any]) -> Config:
     """A JSON preset with what it inherits from files beside it. Raises ProfileError."""
     values, missing = _inherited(file, document, ())
+    values.setdefault("nozzle_diameter", _nozzle(file, document))
     name, kind = str(document.get("name", file.stem)), TYPES.get(str(document.get("type", "")), "")
     config = of_values(values, name if kind == "process" else "", name if kind == "material" else "")
     return config if not missing else Config(config.program, config.entries, (*config.unknown, missing), name, name)
@@ -152,12 +153,23 @@ def _inherited(file: Path, document: Mapping[str, Any], below: tuple[Path, ...])
     return values | own, missing
 
 
+def _nozzle(file: Path, document: Mapping[str, Any]) -> str:
+    """The nozzle of the printers that a preset is for, by their files beside it; "" where there are none, or they differ."""
+    printers, beside = document.get("compatible_printers"), {path.stem: path for path in reversed(_beside(file))}
+    found = [beside[name] for name in printers if name in beside] if isinstance(printers, list) else []
+    nozzles = {_inherited(printer, read_json(printer), ())[0].get("nozzle_diameter", "") for printer in found}
+    return nozzles.pop() if len(nozzles) == 1 else ""
+
+
 def _beside(file: Path) -> list[Path]:
-    """The files that a parent may be in: of the same folder, and of those beside and above it that hold profiles."""
+    """The files that a parent or a printer may be in: of the same folder, of those beside and above it that hold profiles, and of
+    a person's own preset in user/NAME/process those of the vendors in system/NAME/process."""
+    above = file.parent.parent
     return [
         *sorted(file.parent.glob("*.json")),
-        *sorted(file.parent.parent.glob("*/*.json")),
-        *sorted(file.parent.parent.glob("*.json")),
+        *sorted(above.glob("*/*.json")),
+        *sorted(above.glob("*.json")),
+        *(sorted((above.parent.parent / "system").glob("*/*/*.json")) if above.parent.name == "user" else ()),
     ]
 
 

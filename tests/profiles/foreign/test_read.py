@@ -95,6 +95,26 @@ def test_a_preset_of_orcaslicer_has_what_the_files_beside_it_say(tmp_path: Path)
     assert config.process == "0.16 mine"
 
 
+def test_a_person_s_own_preset_has_what_the_vendor_s_says_and_its_printer_s_nozzle(tmp_path: Path) -> None:
+    vendor, own = tmp_path / "system" / "Acme", tmp_path / "user" / "default" / "process"
+    for folder in (vendor / "process", vendor / "machine", own):
+        folder.mkdir(parents=True)
+    written(
+        vendor / "process", "base.json", json.dumps({"type": "process", "name": "base", "line_width": "110%", "wall_loops": "3"})
+    )
+    written(vendor / "machine", "Acme 0.8.json", json.dumps({"type": "machine", "name": "Acme 0.8", "nozzle_diameter": ["0.8"]}))
+    mine = {"type": "process", "name": "mine", "inherits": "base", "compatible_printers": ["Acme 0.8"]}
+    config = read_config(written(own, "mine.json", json.dumps(mine)))
+    assert (config.number("perimeters"), config.number("extrusion_width"), config.unknown) == (3, 0.88, ())
+
+
+def test_presets_for_printers_with_several_nozzles_say_none(tmp_path: Path) -> None:
+    for nozzle in ("0.4", "0.6"):
+        written(tmp_path, f"Acme {nozzle}.json", json.dumps({"type": "machine", "name": nozzle, "nozzle_diameter": [nozzle]}))
+    mine = {"type": "process", "name": "mine", "line_width": "110%", "compatible_printers": ["Acme 0.4", "Acme 0.6"]}
+    assert read_config(written(tmp_path, "mine.json", json.dumps(mine))).text("extrusion_width") == "0"
+
+
 def test_a_parent_that_is_nowhere_beside_it_is_told(tmp_path: Path) -> None:
     child = {"type": "filament", "name": "PLA", "inherits": "Generic PLA @System", "nozzle_temperature": ["215"]}
     config = read_config(written(tmp_path, "PLA.json", json.dumps(child)))
