@@ -175,7 +175,7 @@ def test_the_page_tells_the_same_corrections_and_the_command_that_saves_them(pro
     assert browser.complaints == []
     for value in _numbers(piece):
         assert value in shown
-    assert command == f'tiltprint calibrate --machine generic_ac --printed piece.gcode --readings "{READINGS}"'
+    assert command == f'tiltprint calibrate --machine generic_ac --printed piece.gcode --readings "{READINGS}" --replace'
 
 
 def _numbers(piece: Piece) -> list[str]:
