@@ -1,4 +1,4 @@
-"""GLB (binary glTF 2.0): the triangles of the scene, coordinates taken as mm with z up.
+"""GLB (binary glTF 2.0): the triangles of the scene and the colours of their materials, coordinates taken as mm with z up.
 
 The specification says metres with y up, but programs that print write their mm and their z unchanged, so nothing is turned
 or scaled here; a model in metres is caught by the check of its size, one that lies on its side can be turned when it is read.
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mdp.formats.surface import Surface, check_meshes, check_placed, check_surface
-from mdp.mesh import Floats
+from mdp.mesh import NO_COLOUR, Floats
 from profiles.errors import MeshError
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # "glTF", "JSON" and "BIN" read as little-endian numbers
@@ -38,7 +38,7 @@ def read_scene(path: Path, content: bytes) -> list[Surface]:
         raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {str(error)[:200]})") from None
     if not surfaces:
         raise MeshError(f"{path}: its scene places no mesh")
-    return surfaces
+    return _marks(surfaces)
 
 
 def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
@@ -117,7 +117,29 @@ def _primitive_surface(path: Path, document: Any, binary: bytes, primitive: Any,
     vertices = check_surface(path, vertices, faces).vertices
     if not np.array_equal(matrix, np.eye(4)):
         vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    return check_surface(path, vertices, faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces)
+    colour = _colour(document, primitive)
+    painted = None if colour == NO_COLOUR else np.full(len(faces), colour, dtype=np.int64)
+    return check_surface(path, vertices, faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces, painted)
+
+
+def _colour(document: Any, primitive: Any) -> int:
+    """The colour of a primitive's material, which glTF counts linearly (2.0, 3.9.2), as sRGB; NO_COLOUR where it says none."""
+    if "material" not in primitive:
+        return NO_COLOUR
+    factor = document["materials"][primitive["material"]].get("pbrMetallicRoughness", {}).get("baseColorFactor")
+    if factor is None:
+        return NO_COLOUR
+    linear = np.clip(np.array(factor[:3], dtype=np.float64), 0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    red, green, blue = np.rint(255.0 * encoded).astype(int).tolist()
+    return int(65536 * red + 256 * green + blue)
+
+
+def _marks(surfaces: list[Surface]) -> list[Surface]:
+    """The surfaces, without colours where all have the same: it marks nothing."""
+    if len({NO_COLOUR if surface.colours is None else int(surface.colours[0]) for surface in surfaces}) > 1:
+        return surfaces
+    return [Surface(surface.vertices, surface.faces) for surface in surfaces]
 
 
 def _accessor_rows(path: Path, document: Any, binary: bytes, number: int, width: int) -> Any:

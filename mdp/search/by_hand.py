@@ -60,7 +60,7 @@ def check_zones(plan: PlanFile, mesh: Mesh, name: str) -> None:
 def _check_colour(zone: Painted, mesh: Mesh, name: str, label: str) -> None:
     label = f"{label} colour is {colour_text(zone.colour)}"
     if mesh.colours is None:
-        raise PlanError(f"{label}, but {name} paints no face: a 3MF or a PLY file with colours is expected")
+        raise PlanError(f"{label}, but {name} paints no face: a 3MF, PLY, GLB or STEP file with colours is expected")
     used = [colour for colour in np.unique(mesh.colours).tolist() if colour != NO_COLOUR]
     if zone.colour not in used:
         shown = ", ".join(map(colour_text, used[:MOST_SHOWN])) + (", ..." if len(used) > MOST_SHOWN else "")

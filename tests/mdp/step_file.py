@@ -1,6 +1,7 @@
 """Prisms and cylinders as STEP files (ISO 10303-21, AP214): boundary representations, written by hand."""
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -33,6 +34,22 @@ def step_box(sides: tuple[float, float, float], prefix: str = ".MILLI.") -> str:
     """The file of a box with a corner at the origin; prefix: of the metre, `$` for none."""
     x, y, z = sides
     return step_prism([(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)], z, prefix=prefix)
+
+
+def painted(file: str, colours: Mapping[int, tuple[float, float, float]]) -> str:
+    """The file with a colour (red, green, blue, 0 to 1) for faces by their place in it, -1: for the solid."""
+    ids = [re.findall(rf"#(\d+)={name}", file) for name in ("ADVANCED_FACE", "MANIFOLD_SOLID_BREP", r"\(?GEOMETRIC_REP")]
+    entities = Entities([""] * max(map(int, re.findall(r"#(\d+)=", file))))
+    first, items = len(entities), []
+    for place, colour in colours.items():
+        fill = entities.add("FILL_AREA_STYLE_COLOUR", "''", entities.add("COLOUR_RGB", "''", *map(float, colour)))
+        area = entities.add("SURFACE_STYLE_FILL_AREA", entities.add("FILL_AREA_STYLE", "''", _list([fill])))
+        usage = entities.add("SURFACE_STYLE_USAGE", ".BOTH.", entities.add("SURFACE_SIDE_STYLE", "''", _list([area])))
+        style = entities.add("PRESENTATION_STYLE_ASSIGNMENT", _list([usage]))
+        item = ids[1][0] if place < 0 else ids[0][place]
+        items.append(entities.add("STYLED_ITEM", "''", _list([style]), f"#{item}"))
+    entities.add("MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION", "''", _list(items), f"#{ids[2][0]}")
+    return file.replace("ENDSEC;\nEND-ISO", "\n".join([*entities[first:], "ENDSEC;\nEND-ISO"]))
 
 
 def step_prism(base: Sequence[Corner], height: float, top: float = 1.0, prefix: str = ".MILLI.") -> str:

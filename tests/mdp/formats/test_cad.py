@@ -8,7 +8,7 @@ import pytest
 
 from mdp.read import read_mesh
 from tests.mdp.files import refusal, save
-from tests.mdp.step_file import Corner, step_box, step_cylinder, step_prism
+from tests.mdp.step_file import Corner, painted, step_box, step_cylinder, step_prism
 
 
 @pytest.mark.parametrize(("prefix", "scale"), [(".MILLI.", 1.0), (".CENTI.", 10.0), ("$", 1000.0)])
@@ -50,6 +50,25 @@ def test_a_frustum_has_its_volume(tmp_path: Path, base: list[Corner]) -> None:
     pytest.importorskip("cascadio")
     mesh, _ = read_mesh(save(tmp_path / "frustum.stp", step_prism(base, 12.0, top=0.5).encode()))
     assert mesh.volume_mm3 == pytest.approx(12.0 / 3.0 * area(base) * (1.0 + 0.5 + 0.25), rel=1e-6)
+
+
+def test_colours_of_faces_and_of_the_solid_are_kept(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    file = painted(step_box((20, 30, 40)), {1: (1.0, 0.0, 0.0), -1: (0.5, 0.5, 0.5)})
+    mesh, notes = read_mesh(save(tmp_path / "box.step", file.encode()))
+    assert notes == ()
+    assert mesh.volume_mm3 == pytest.approx(24_000, rel=1e-6)
+    assert mesh.colours is not None
+    top = mesh.normals[:, 2] > 0.99
+    assert set(mesh.colours[top].tolist()) == {0xFF0000}
+    assert set(mesh.colours[~top].tolist()) == {0x808080}
+
+
+def test_the_colour_of_a_whole_solid_marks_nothing(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    assert (
+        read_mesh(save(tmp_path / "box.step", painted(step_box((20, 30, 40)), {-1: (1.0, 0.0, 0.0)}).encode()))[0].colours is None
+    )
 
 
 @pytest.mark.parametrize("radius", [1.0, 10.0, 60.0])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mdp.mesh import NO_COLOUR
 from mdp.read import read_mesh
 from tests.mdp import files
 from tests.mdp.files import refusal, save
@@ -16,6 +17,12 @@ def test_glb_nodes_are_placed_and_coordinates_are_taken_as_mm_with_z_up(tmp_path
     node = {"translation": [1, 2, 3], "rotation": [0, 0, 0.5**0.5, 0.5**0.5], "scale": [1, 2, 3]}
     mesh, _ = read_mesh(save(tmp_path / "a.glb", files.glb(files.placed(10, 10, 10), node)))
     assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx([20, 10, 30])
+
+
+def _document() -> bytes:
+    """That of a box of 10 mm."""
+    content = files.glb(files.placed(10, 10, 10))
+    return content[20 : 20 + int.from_bytes(content[12:16], "little")]
 
 
 def _edited(**changes: object) -> bytes:
@@ -40,6 +47,17 @@ def _edited(**changes: object) -> bytes:
 def test_every_mesh_that_a_node_of_the_scene_reaches_is_placed(tmp_path: Path, nodes: list[object], boxes: int) -> None:
     mesh, _ = read_mesh(save(tmp_path / "a.glb", _edited(nodes=nodes)))
     assert mesh.volume_mm3 == pytest.approx(1000 * boxes)
+
+
+def test_the_colours_of_materials_are_kept_as_srgb(tmp_path: Path) -> None:
+    materials = [{"pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.2158605, 0.0, 1.0]}}, {"name": "plain"}]
+    box = json.loads(_document())["meshes"][0]["primitives"][0]
+    meshes = [{"primitives": [{**box, "material": number}]} for number in (0, 1)]
+    nodes = [{"mesh": 0}, {"mesh": 1, "translation": [50, 0, 0]}]
+    content = _edited(materials=materials, meshes=meshes, nodes=nodes, scenes=[{"nodes": [0, 1]}])
+    mesh, _ = read_mesh(save(tmp_path / "a.glb", content))
+    assert mesh.colours is not None
+    assert set(mesh.colours.tolist()) == {0xFF8000, NO_COLOUR}
 
 
 def test_without_a_scene_the_nodes_that_no_other_holds_are_placed(tmp_path: Path) -> None:

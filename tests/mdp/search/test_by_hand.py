@@ -300,7 +300,7 @@ def test_seams_weigh_a_hundred_times_on_faces_of_a_colour_alone_whatever_earlier
 def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
     zones = Zones(no_seam=(Painted(GREEN), Painted(0xABCDEF)))
     with pytest.raises(
-        PlanError, match=r"^plan mine.toml: no_seam 1: colour is #00ff00, but shape paints no face: a 3MF or a PLY"
+        PlanError, match=r"^plan mine.toml: no_seam 1: colour is #00ff00, but shape paints no face: a 3MF, PLY, GLB or STEP"
     ):
         decompose(shapes.tee(), "shape", _profile(), by_hand=_by_hand(zones=zones))
     unknown = "no_seam 2: colour is #abcdef, but no face of shape is painted so; its colours are #0000ff, #00ff00, #ff0000$"
