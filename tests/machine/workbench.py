@@ -17,6 +17,9 @@ from urllib.parse import urlsplit
 
 from websockets.sync.client import ClientConnection, connect
 
+from machine.app.workbench.printing.last_printer import FILE
+from profiles.folders import state_folder
+
 PATIENCE_S = 60.0
 COARSE = ("layer_height_mm=0.4", "first_layer_height_mm=0.4", "line_width_mm=0.8")
 QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2", *(f"--set=process.{setting}" for setting in COARSE))
@@ -118,6 +121,7 @@ def workbench(*arguments: str) -> Iterator[Running]:
 
 @contextmanager
 def _running(arguments: Iterable[str], errors: int | IO[str]) -> Iterator["subprocess.Popen[str]"]:
+    (state_folder() / FILE).unlink(missing_ok=True)  # which printer another test has used is not this one's
     command = [sys.executable, "-m", "machine.app.cli", "edit", "--no-browser", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
     try:

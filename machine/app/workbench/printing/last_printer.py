@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from machine.app.output import write_bytes
 from machine.app.requests import PrintRequest
 from profiles.errors import OutputError
 from profiles.folders import state_folder
@@ -24,7 +25,9 @@ def last_printer() -> PrintRequest | None:
 def keep_printer(printing: PrintRequest) -> None:
     """Where it cannot be written it is forgotten: a print does not fail for that."""
     with suppress(OSError, OutputError):
-        _path().write_text(json.dumps({key: asdict(printing)[key] for key in ("port", "baud", "sim_speed")}))
+        write_bytes(
+            _path(), json.dumps({key: asdict(printing)[key] for key in ("port", "baud", "sim_speed")}).encode(), private=True
+        )
 
 
 def _path() -> Path:
