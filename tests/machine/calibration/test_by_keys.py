@@ -28,6 +28,12 @@ MARK = (38.0, 2.0, 20.0)
 MOST_KEYS = 3000
 
 
+@pytest.fixture(autouse=True)
+def _folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
 class Mover:
     """Goes wherever it is sent, and keeps what it was told."""
 
@@ -121,10 +127,8 @@ def test_where_a_sign_is_unknown_the_mark_may_be_as_deep_as_it_is_either_way() -
 
 
 def test_the_command_saves_what_a_hand_has_touched_and_leaves_the_machine_level_and_cold(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     real, mover = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)}), Mover()
 
     class Followed(calibrate_by_keys.PrinterMover):
