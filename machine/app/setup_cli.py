@@ -64,17 +64,9 @@ def calibrate(
 
     request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force, directions)
     if printed:
-        from machine.app.commands.measuring.calibrate_piece import ask_for_readings, correct_axes, write_page
-
-        if out is not None or measured is not None or probing.probe:
-            raise typer.BadParameter("--printed is a way of its own: -o, --measured and --probe are for touches")
-        if html is not None and not readings:
-            return write_page(request, printed, html)
-        if readings:
-            return correct_axes(request, printed, readings)
-        if len(printed) == 1 and sys.stdin.isatty() and sys.stdout.isatty():
-            return ask_for_readings(request, printed[0])
-        raise typer.BadParameter("--printed goes with --readings TEXT or --html FILE; in a terminal with neither, to be asked")
+        if out is not None or measured is not None or probing.probe or probing.at is not None or directions:
+            raise typer.BadParameter("--printed is a way of its own: -o, --measured, --port and --directions are for touches")
+        return _read_off(request, printed, readings or [], html)
     if readings or html is not None:
         raise typer.BadParameter("--readings and --html go with --printed FILE.gcode")
     if probing.probe:
@@ -100,6 +92,19 @@ def calibrate(
     if out is None and sys.stdin.isatty() and sys.stdout.isatty():
         return ask_for_touches(request)
     raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+
+
+def _read_off(request: CalibrationRequest, printed: list[Path], readings: list[str], html: Path | None) -> int:
+    """From pieces that were printed: by a page, by readings, or by what a terminal asks for."""
+    from machine.app.commands.measuring.calibrate_piece import ask_for_readings, correct_axes, write_page
+
+    if html is not None and not readings:
+        return write_page(request, printed, html)
+    if readings and html is None:
+        return correct_axes(request, printed, readings)
+    if html is None and len(printed) == 1 and sys.stdin.isatty() and sys.stdout.isatty():
+        return ask_for_readings(request, printed[0])
+    raise typer.BadParameter("--printed goes with one of --readings TEXT and --html FILE; in a terminal with neither")
 
 
 def coupon(

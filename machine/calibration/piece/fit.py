@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machine.calibration.piece.pads import WAYS, Piece
+from machine.calibration.piece.pads import PADS, WAYS, Piece
 from mdp.directions.frame import frame_across
 from mdp.mesh import Floats
 from mdp.pose import unit
@@ -50,7 +50,7 @@ class Correction:
         worst = np.unravel_index(int(off.argmax()), off.shape)
         if off[worst] <= DOUBTFUL_MM:
             return None
-        piece, pad = divmod(int(worst[0]), 4)
+        piece, pad = divmod(int(worst[0]), PADS)
         return piece + 1, pad + 1, WAYS[int(worst[1])]
 
 

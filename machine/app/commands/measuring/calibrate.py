@@ -1,6 +1,8 @@
 """The calibrate command: writes the program and the sheet, works out the numbers, saves them in the user's own profile."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from machine.app.commands.measuring.calibrate_dialogue import ask_touches
 from machine.app.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
@@ -55,7 +57,7 @@ def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
 def ask_for_touches(request: CalibrationRequest) -> int:
     """Ask a person for the touches one by one, tell what follows from them, save it."""
     machine, name = tilting_machine(request), request.machine
-    refuse_to_overwrite(own_profile("machine", request.save or Path(name).stem, name, {})[0], request.replace)
+    refuse_if_saved(request)
     accepted: list[Calibration] = []
 
     def judge(sheet: Sheet) -> str | int | None:
@@ -101,7 +103,17 @@ def judged(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple
 
 def save_calibration(request: CalibrationRequest, machine: Machine, calibration: Calibration, zero_of_turn: bool = False) -> None:
     """The found numbers in the user's own profile, and the file before beside it."""
-    tables = fitted_tables(machine, calibration, zero_of_turn)
+    save_tables(request, fitted_tables(machine, calibration, zero_of_turn))
+
+
+def refuse_if_saved(request: CalibrationRequest) -> None:
+    """Raise OutputError at once where the result could not be saved at the end."""
+    name = Path(request.machine).stem
+    refuse_to_overwrite(own_profile("machine", request.save or name, request.machine, {})[0], request.replace)
+
+
+def save_tables(request: CalibrationRequest, tables: Mapping[str, Any]) -> None:
+    """What was found in the user's own profile, and the file before beside it."""
     file, text = own_profile("machine", request.save or Path(request.machine).stem, request.machine, tables)
     write_own(file, text, request.replace)
     show(f"saved: {file}; use it as --machine {file.stem}\n")

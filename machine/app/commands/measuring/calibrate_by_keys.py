@@ -3,13 +3,11 @@
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from machine.app.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
-from machine.app.commands.measuring.calibrate import judged, mark_height_mm, save_calibration, tilting_machine
+from machine.app.commands.measuring.calibrate import judged, mark_height_mm, refuse_if_saved, save_calibration, tilting_machine
 from machine.app.commands.measuring.mover import PrinterMover
-from machine.app.output import refuse_to_overwrite
 from machine.app.printer.command_session import CommandSession
 from machine.app.printer.server_checks import check_no_server
 from machine.app.requests import CalibrationRequest, PortRequest
@@ -18,7 +16,6 @@ from machine.app.terminal.progress import say
 from machine.calibration.fit import Calibration, Touch
 from machine.calibration.jog import begin_jog, pressed
 from machine.calibration.program import TouchPlan, calibration_pen, hover_z_mm, plan_touches
-from machine.calibration.saved import own_profile
 from machine.calibration.sheet import Sheet
 from mdp.pose import level
 from profiles.errors import MoveError, PrinterError, ProfileError
@@ -34,9 +31,9 @@ PLACE = "fix a pointed mark, {height:g} mm high and {radius:g} mm from the middl
 
 def touch_by_keys(request: CalibrationRequest, port: PortRequest, profile: Profile) -> int:
     """Go from touch to touch, tell what follows, save it. Raises UserError, the tip raised and nothing saved."""
-    machine, name = tilting_machine(request), Path(request.machine).stem
+    machine = tilting_machine(request)
     check_no_server(port.port)
-    refuse_to_overwrite(own_profile("machine", request.save or name, request.machine, {})[0], request.replace)
+    refuse_if_saved(request)
     if not can_type():
         raise PrinterError("--port without --probe takes keys from a terminal, and there is none: --probe measures by itself")
     height = mark_height_mm(request)

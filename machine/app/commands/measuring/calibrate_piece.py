@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.app.commands.measuring.calibrate import through, tilting_machine
+from machine.app.commands.measuring.calibrate import refuse_if_saved, save_tables, through, tilting_machine
 from machine.app.commands.measuring.calibrate_dialogue import read_reply
 from machine.app.embedded_profile import read_embedded_profile
-from machine.app.output import check_writable, refuse_to_overwrite, write_bytes, write_own
+from machine.app.output import check_writable, refuse_to_overwrite, write_bytes
 from machine.app.requests import CalibrationRequest
 from machine.app.terminal.plain import show
 from machine.calibration.piece.fit import Correction, correct
 from machine.calibration.piece.pads import Piece, read_piece
 from machine.calibration.piece.page import piece_page
 from machine.calibration.piece.readings import EXPECTED, parse_pad, parse_readings
-from machine.calibration.saved import found_tables, own_profile
+from machine.calibration.saved import found_tables
 from machine.reader.gcode_file import GcodeFile
 from machine.reader.parse import parse_gcode
 from profiles.errors import ProfileError
@@ -55,6 +55,7 @@ def correct_axes(request: CalibrationRequest, printed: Sequence[Path], readings:
 def ask_for_readings(request: CalibrationRequest, printed: Path) -> int:
     """Ask a person in a terminal for the readings of a piece, pad by pad, then as `correct_axes`."""
     machine = tilting_machine(request)
+    refuse_if_saved(request)
     piece = _read(printed, machine)
     sys.stdout.write(INTRO)
     told: list[list[float]] = []
@@ -96,10 +97,7 @@ def _settle(request: CalibrationRequest, machine: Machine, correction: Correctio
         show("no number changes by more than the readings can be off: the profile stays as it is\n")
         return 0
     source = f"tiltprint calibrate, {pieces} printed piece{'s' * (pieces > 1)}"
-    tables = found_tables(machine, correction.machine, FOUND, source)
-    file, text = own_profile("machine", request.save or Path(request.machine).stem, request.machine, tables)
-    write_own(file, text, request.replace)
-    show(f"saved: {file}; use it as --machine {file.stem}\n")
+    save_tables(request, found_tables(machine, correction.machine, FOUND, source))
     return 0
 
 

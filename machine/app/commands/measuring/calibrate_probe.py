@@ -1,13 +1,12 @@
 """Calibrate by probe: the machine at a port measures a ball on its own plate, and its axes follow from that."""
 
 import sys
-from pathlib import Path
 
 from machine.app.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
-from machine.app.commands.measuring.calibrate import MOST_OFF_MM, comparison, save_calibration, tilting_machine
+from machine.app.commands.measuring.calibrate import MOST_OFF_MM, comparison, refuse_if_saved, save_calibration, tilting_machine
 from machine.app.commands.measuring.calibrate_dialogue import read_reply
 from machine.app.commands.measuring.prober import PrinterProber, ProbingSession
-from machine.app.output import check_writable, refuse_to_overwrite
+from machine.app.output import check_writable
 from machine.app.printer.server_checks import check_no_server
 from machine.app.requests import CalibrationRequest, ProbeRequest
 from machine.app.terminal.plain import show
@@ -16,7 +15,6 @@ from machine.calibration.fit import Calibration, calibrate
 from machine.calibration.probing.ball import Ball
 from machine.calibration.probing.measure import Measuring, Probe
 from machine.calibration.program import calibration_pen, usual_radius_mm
-from machine.calibration.saved import own_profile
 from machine.firmware import dialect_of, firmware_of
 from machine.firmware.probing import ProbingRules
 from machine.simulator.contact.probe import ProbedTable
@@ -34,9 +32,9 @@ PLACE = (
 
 def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Profile) -> int:
     """Measure, tell what follows, save it as calibrate saves. Raises UserError, the tip raised and nothing saved."""
-    machine, name = tilting_machine(request), Path(request.machine).stem
+    machine = tilting_machine(request)
     check_no_server(probing.at.port)
-    refuse_to_overwrite(own_profile("machine", request.save or name, request.machine, {})[0], request.replace)
+    refuse_if_saved(request)
     if probing.png is not None:
         check_writable(probing.png)
     ball, probe = _ball(request, probing, machine), _probe(probing, machine)

@@ -17,7 +17,7 @@ from machine.calibration.piece.readings import parse_readings, readings_text
 from machine.kinematics.table import workpiece_path
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
-from profiles.errors import ProfileError
+from profiles.errors import OutputError, ProfileError
 from profiles.places import own_folder
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
@@ -117,7 +117,9 @@ def test_the_command_saves_what_the_readings_say(gcode: Path, mine: Path, capsys
         ),
         (["--readings", READINGS, "--readings", READINGS], "--printed is given 1 times, --readings 2 times"),
         (["--readings", READINGS, "-o", "x.gcode"], "--printed is a way of its own"),
-        ([], "--printed goes with --readings TEXT or --html FILE"),
+        ([], "--printed goes with one of --readings TEXT and --html FILE"),
+        (["--readings", READINGS, "--html", "page.html"], "--printed goes with one of --readings TEXT and --html FILE"),
+        (["--readings", READINGS, "--directions"], "--printed is a way of its own"),
     ],
 )
 def test_what_cannot_be_evaluated_is_one_sentence_and_saves_nothing(
@@ -150,6 +152,16 @@ def test_in_a_terminal_the_pads_are_asked_for_one_by_one(
 def _without_sources(file: Path) -> dict[str, object]:
     machine = tomllib.loads(file.read_text())["machine"]
     return {"tilt": machine["tilt"], "turn": machine["turn"]}
+
+
+def test_nobody_types_readings_that_could_not_be_saved(gcode: Path, mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mine.parent.mkdir(parents=True)
+    mine.write_text('inherits = "generic_ac"\n')
+    person = Person()
+    monkeypatch.setattr("builtins.input", person)
+    with pytest.raises(OutputError, match=r"mine\.toml exists: --replace writes over it"):
+        ask_for_readings(CalibrationRequest("generic_ac", save="mine"), gcode)
+    assert person.asked == []
 
 
 def test_one_part_that_is_asked_for_is_printed_without_the_demos_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
