@@ -1,11 +1,9 @@
-"""Klipper: printer.cfg with what it includes, or the object configfile as Moonraker tells it (docs/Status_Reference.md).
+"""Klipper: printer.cfg with the files it includes, or the object configfile as Moonraker gives it (docs/Status_Reference.md).
 
 docs/Config_Reference.md, klippy/configfile.py, toolhead.py, stepper.py, kinematics/extruder.py and extras/manual_stepper.py
-(f68e511e2): lengths in mm, speeds mm/s; what the file does not say is what the program takes. Comments begin with # anywhere, or
-with ; behind a blank; a line that begins with a blank goes on with the value before; later sections go over earlier ones; what
-SAVE_CONFIG has written stands behind #*#. A [manual_stepper] counts in what its rotation_distance counts in, degrees for an axis
-that turns; it has position_min and position_max only where they are written, and velocity and accel are what it moves with unless
-told otherwise.
+(f68e511e2): lengths in mm, speeds in mm/s. What SAVE_CONFIG has written stands behind #*# and counts where the rest is silent. A
+[manual_stepper] counts in the unit of its rotation_distance, degrees for an axis that turns; it has position_min and
+position_max only where they are written; velocity and accel are its defaults.
 """
 
 import json
@@ -16,6 +14,7 @@ from math import pi
 from typing import Any
 
 from machine.detect.found import (
+    ABC,
     ACCELERATION,
     LIMITS,
     PRINTING,
@@ -24,23 +23,33 @@ from machine.detect.found import (
     ConfigText,
     Found,
     Reading,
-    check_whole,
+    has_box,
     limits,
-    rounded,
 )
-from machine.detect.sections import Included, Sections, number, read_sections
+from machine.detect.sections import Sections, read_sections
 from profiles.errors import ProfileError
 
 SIGNS = re.compile(r"^\[(?:printer|include [^\]]+|stepper_x|mcu)\]", re.MULTILINE)
 SAVED = "#*# "
 INCLUDE = re.compile(r"\[include ([^\]]+)\]")
 MANUAL = "manual_stepper "
-RECTANGULAR = ("cartesian", "corexy", "corexz", "hybrid_corexy", "hybrid_corexz", "generic_cartesian", "limited_cartesian")
-LETTER = re.compile(r"(?:^|_)([abcuvwijk])$", re.IGNORECASE)
-REGISTERED = re.compile(r"MANUAL_STEPPER\b([^\n]*\bGCODE_AXIS=\s*([A-Z])\b[^\n]*)", re.IGNORECASE)
+LETTER = re.compile(r"(?:^|_)([abcuvwijk])(?:_axis)?$", re.IGNORECASE)
+OF_Z = re.compile(r"(?:^|_)z(?:$|_|\d)", re.IGNORECASE)
+REGISTERED = re.compile(r"MANUAL_STEPPER\b([^\n]*\bGCODE_AXIS=[ \t]*([A-Z])\b[^\n]*)", re.IGNORECASE)
 STEPPER = re.compile(r"\bSTEPPER=\s*\"?([A-Za-z0-9_]+)", re.IGNORECASE)
-CORNER_MM_S = 5.0  # toolhead.py: square_corner_velocity
+SCREW_MM = 10.0  # greatest lead of the usual screws; as degrees it would be a gear of 36 to 1
+TURN_DEG = 360.0
+CORNER_MM_S = 5.0  # toolhead.py: square_corner_velocity where it is not set
 PROBES = ("bltouch", "probe", "smart_effector", "probe_eddy_current", "load_cell_probe", "cartographer", "beacon")
+SETTINGS = {  # key below machine -> section and key
+    "junction_speed_mm_s": ("printer", "square_corner_velocity"),
+    "head.nozzle_mm": ("extruder", "nozzle_diameter"),
+    "nozzle_limit_c": ("extruder", "max_temp"),
+    "bed_limit_c": ("heater_bed", "max_temp"),
+    "extruder_speed_mm_s": ("extruder", "max_extrude_only_velocity"),
+    "extruder_acceleration_mm_s2": ("extruder", "max_extrude_only_accel"),
+}
+WORKED_OUT = {"extruder_speed_mm_s": "max_velocity", "extruder_acceleration_mm_s2": "max_accel"}  # kinematics/extruder.py
 
 
 def recognise(text: str) -> bool:
@@ -49,172 +58,166 @@ def recognise(text: str) -> bool:
 
 
 def read(config: ConfigText) -> Found:
-    """What a configuration tells. Raises ProfileError."""
-    version, included = "", Included()
-    if config.text.lstrip().startswith("{"):
-        sections, version = _told_sections(config)
-    else:
-        sections = _sections(config, included)
-    if "printer" not in sections:
+    """What a configuration says. Raises ProfileError."""
+    told = config.text.lstrip().startswith("{")
+    sections, version = _told_sections(config) if told else (_sections(config), "")
+    if "printer" not in sections.of:
         raise ProfileError(f"{config.name}: it has no [printer]: is it whole, and are the files it includes beside it?")
-    axes, remarks = _linear(config, sections)
-    if included.missing:
-        remarks.append(f"{', '.join(included.missing)} is not beside it: what stands there is not known")
-    letters, rotary = _rotary(config, sections)
-    if rotary and not any(letter in letters for letter in rotary):
+    remarks: list[str] = []
+    axes = _linear(sections, remarks)
+    if sections.missing:
+        remarks.append(f"{', '.join(sections.missing)} is not beside it: what stands there is not known")
+    registered = _registered(sections)
+    steppers, doubtful = _steppers(sections, registered, remarks)
+    as_axes = any(stepper in registered for stepper in steppers.values())
+    if steppers and not as_axes:
         remarks.append(
-            "no macro makes its steppers letters of G1: MANUAL_STEPPER turns them; Klipper of May 2025 on can do both, and "
-            "machine.dialect klipper has it register them"
+            "no macro registers its steppers as axes of G1, so MANUAL_STEPPER moves them; with Klipper of May 2025 or later, "
+            "machine.dialect klipper registers them"
         )
-    firmware = f"Klipper {version}".strip()
-    found = Found(
-        firmware,
-        "klipper" if letters or not rotary else "klipper_steppers",
-        axes | {letter: readings for letter, (_, readings) in rotary.items()},
-        "".join(rotary),
-        _settings(config, sections, whole=not included.missing),
-        {letter: name for letter, (name, _) in rotary.items()},
-        probe=_probe(sections),
-        remarks=tuple(remarks),
+    axes |= {letter: _turning(sections, MANUAL + name, registered.get(name, ("", ""))[1]) for letter, name in steppers.items()}
+    return Found(
+        f"Klipper {version}".strip(),
+        "klipper_steppers" if steppers and not as_axes else "klipper",
+        axes,
+        "".join(letter for letter in steppers if letter not in doubtful),
+        doubtful,
+        _settings(sections),
+        steppers,
+        probe=next((f"the probe [{title}]" for title in sections.of if title.split(" ")[0] in PROBES), ""),
+        remarks=remarks,
     )
-    return check_whole(found, config.name)
 
 
 def _told_sections(config: ConfigText) -> tuple[Sections, str]:
-    """Of a query's answer: `config` has the file's words, `settings` what the program works with, sections in small letters."""
+    """Of a query's answer, and the version. `config` has the file's words, `settings` the values in use, titles in lower case."""
     try:
         document = json.loads(config.text)
     except (ValueError, RecursionError):
         raise ProfileError(f"{config.name}: its JSON is cut off or damaged") from None
     while isinstance(document, dict) and "configfile" not in document:
         document = next((document[key] for key in ("result", "status") if key in document), None)
-    told = document.get("configfile") if isinstance(document, dict) else None
-    sections = _texts(told.get("config") if isinstance(told, dict) else None)
-    written = {name.lower(): name for name in sections}
-    for name, values in _texts(told.get("settings") if isinstance(told, dict) else None).items():
-        own = written.get(name, name)
-        sections[own] = sections.get(own, {}) | values
-    return sections, str(document.get("software_version") or "") if isinstance(document, dict) else ""
+    answer = document if isinstance(document, dict) else {}
+    told = answer.get("configfile")
+    own, in_use = (_texts(told.get(key) if isinstance(told, dict) else None) for key in ("config", "settings"))
+    written = {title.lower(): title for title in own}
+    for title, values in in_use.items():
+        whole = written.get(title, title)
+        own[whole] = own.get(whole, {}) | values
+    return Sections(config.name, own), str(answer.get("software_version") or "")
 
 
-def _texts(sections: Any) -> Sections:
-    if not isinstance(sections, Mapping):
-        return {}
-    whole = {str(name): values for name, values in sections.items() if isinstance(values, Mapping)}
+def _texts(sections: Any) -> dict[str, dict[str, str]]:
+    whole = {str(name): values for name, values in sections.items()} if isinstance(sections, Mapping) else {}
     return {  # null stands for what is not set and has no default
-        name: {str(key): str(value) for key, value in values.items() if value is not None} for name, values in whole.items()
+        name: {str(key): str(value) for key, value in values.items() if value is not None}
+        for name, values in whole.items()
+        if isinstance(values, Mapping)
     }
 
 
-def _sections(config: ConfigText, included: Included) -> Sections:
+def _sections(config: ConfigText) -> Sections:
     """Of a file; what SAVE_CONFIG has written counts where the file says nothing."""
     own, _, saved = config.text.partition(f"\n{SAVED}[")
-    sections = read_sections(replace(config, text=own), INCLUDE, included)
+    sections = read_sections(replace(config, text=own), INCLUDE)
     lines = f"[{saved}".splitlines() if saved else []
-    for name, values in read_sections(replace(config, text="\n".join(line.removeprefix(SAVED) for line in lines))).items():
-        sections[name] = values | sections.get(name, {})
+    for title, values in read_sections(replace(config, text="\n".join(line.removeprefix(SAVED) for line in lines))).of.items():
+        sections.of[title] = {**values, **sections[title]}
     return sections
 
 
-def _linear(config: ConfigText, sections: Sections) -> tuple[dict[str, AxisReadings], list[str]]:
-    """X Y Z: one speed and acceleration for all, Z may have less; and sentences."""
-    printer, name = sections["printer"], f"{config.name}, [printer]"
-    kinematics = printer.get("kinematics", "")
+def _linear(sections: Sections, remarks: list[str]) -> dict[str, AxisReadings]:
+    """X, Y and Z: one speed and one acceleration for all, where an axis may have less. Raises ProfileError."""
+    named = [sections["printer"][key] for key in ("kinematics", "kinematics_abc") if key in sections["printer"]]
+    box = has_box(", ".join(named), f"{sections.name}: [printer] kinematics")
+    if not box:
+        remarks.append(f"its kinematics are {named[0]}: how far X, Y and Z reach stands in no axis of them")
     axes: dict[str, AxisReadings] = {letter: {} for letter in PRINTING}
-    for key, most in ((SPEED, "max_velocity"), (ACCELERATION, "max_accel")):
-        value, of_z = number(printer, most, name), number(printer, most.replace("max_", "max_z_"), name)
-        if value is None:
+    for letter, readings in axes.items():
+        for key, word in ((SPEED, "velocity"), (ACCELERATION, "accel")):
+            told = (sections.reading("printer", f"max_{part}{word}") for part in ("", f"{letter.lower()}_"))
+            if values := [reading for reading in told if reading is not None]:
+                readings[key] = min(values)
+        title = next((title for title in (f"stepper_{letter.lower()}", f"carriage {letter.lower()}") if title in sections.of), "")
+        low, high = (sections.number(title, f"position_{end}") for end in ("min", "max"))
+        if box and high is not None:
+            source = f"[{title}] position_min, position_max"
+            readings[LIMITS] = limits(f"{sections.name}: axis {letter}", low or 0.0, high, source)
+    return axes
+
+
+def _registered(sections: Sections) -> dict[str, tuple[str, str]]:
+    """Stepper -> the letter that a macro gives it for G1, and the rest of that command."""
+    commands = (command for values in sections.of.values() for command in REGISTERED.findall(values.get("gcode", "")))
+    return {named[1]: (letter.upper(), rest) for rest, letter in commands if (named := STEPPER.search(rest))}
+
+
+def _steppers(
+    sections: Sections, registered: Mapping[str, tuple[str, str]], remarks: list[str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Letter -> [manual_stepper], and letter -> why it may not turn."""
+    steppers, doubtful, others = dict[str, str](), dict[str, str](), list[str]()
+    for title in sections.of:
+        if not title.startswith(MANUAL):
             continue
-        for letter in PRINTING:
-            slower = letter == "Z" and of_z is not None
-            source = f"[printer] {most.replace('max_', 'max_z_') if slower else most}"
-            axes[letter][key] = Reading(rounded(min(value, of_z or value) if slower else value), source)
-    if kinematics and kinematics not in RECTANGULAR:
-        return axes, [f"its kinematics are {kinematics}: how far X, Y and Z reach stands in no axis of them"]
-    for letter in PRINTING:
-        stepper = f"stepper_{letter.lower()}"
-        section = sections.get(stepper, sections.get(f"carriage {letter.lower()}", {}))
-        low, high = (number(section, key, f"{config.name}, [{stepper}]") for key in ("position_min", "position_max"))
-        if high is not None:
-            axes[letter][LIMITS] = limits(
-                f"{config.name}: axis {letter}", low or 0.0, high, f"[{stepper}] position_min, position_max"
-            )
-    return axes, []
-
-
-def _rotary(config: ConfigText, sections: Sections) -> tuple[set[str], dict[str, tuple[str, AxisReadings]]]:
-    """Letters that macros give to G1, and every letter with its stepper and its numbers."""
-    registered: dict[str, tuple[str, str]] = {}  # stepper -> letter, rest of the command
-    for values in sections.values():
-        for rest, letter in REGISTERED.findall(values.get("gcode", "")):
-            if of_stepper := STEPPER.search(rest):
-                registered[of_stepper[1]] = letter.upper(), rest
-    rotary: dict[str, tuple[str, AxisReadings]] = {}
-    for title, section in sections.items():
         stepper = title.removeprefix(MANUAL)
         named = LETTER.search(stepper)
-        letter, rest = registered.get(stepper, (named[1].upper() if named else "", ""))
-        if title.startswith(MANUAL) and letter and letter not in rotary:
-            rotary[letter] = stepper, _turning(config, title, section, rest)
-    return {letter for letter, _ in registered.values()}, dict(sorted(rotary.items()))
+        letter = registered[stepper][0] if stepper in registered else named[1].upper() if named else ""
+        if not letter:
+            others.append(f"[{title}]")
+        elif why := f"is the axis {letter} like {steppers[letter]}" if letter in steppers else _doubt(sections, title, letter):
+            doubtful[letter] = f"{sections.name}: [{title}] {why}"
+        if letter:
+            steppers[letter] = stepper
+    if others:
+        remarks.append(
+            f"not taken for axes of the table, which machine.tilt.stepper and machine.turn.stepper name: {', '.join(others)}"
+        )
+    return dict(sorted(steppers.items())), doubtful
 
 
-def _turning(config: ConfigText, title: str, section: Mapping[str, str], registration: str) -> AxisReadings:
+def _doubt(sections: Sections, title: str, letter: str) -> str:
+    """Why a stepper may not turn; "" where it does."""
+    distance = sections.number(title, "rotation_distance")
+    if OF_Z.search(title.removeprefix(MANUAL)):
+        return "is named like a Z axis"
+    if distance == TURN_DEG:
+        return ""
+    if "endstop_pin" in sections[title] and distance is not None and distance <= SCREW_MM:
+        return f"has an endstop_pin and a rotation_distance of {distance:g}, as a screw has"
+    return "" if letter in ABC else f"is the axis {letter}, which need not turn"
+
+
+def _turning(sections: Sections, title: str, registration: str) -> AxisReadings:
     """The numbers of a stepper; those with which it is registered as an axis go before its own."""
     readings: AxisReadings = {}
     for key, own, told in ((SPEED, "velocity", "LIMIT_VELOCITY"), (ACCELERATION, "accel", "LIMIT_ACCEL")):
         as_axis = re.search(rf"\b{told}=\s*([0-9]+(?:\.[0-9]+)?)", registration, re.IGNORECASE)
-        value = float(as_axis[1]) if as_axis else number(section, own, f"{config.name}, [{title}]")
-        if value:  # without an accel it starts and stops at once
-            readings[key] = Reading(rounded(value), told if as_axis else f"[{title}] {own}")
-    low, high = (number(section, key, f"{config.name}, [{title}]") for key in ("position_min", "position_max"))
+        reading = Reading(float(as_axis[1]), told) if as_axis else sections.reading(title, own)
+        if reading is not None and reading.value:  # without an accel it starts and stops at once
+            readings[key] = reading
+    low, high = (sections.number(title, f"position_{end}") for end in ("min", "max"))
     if low is not None and high is not None:
-        readings[LIMITS] = limits(f"{config.name}: [{title}]", low, high, "position_min, position_max")
+        readings[LIMITS] = limits(f"{sections.name}: [{title}]", low, high, "position_min, position_max")
     return readings
 
 
-def _settings(config: ConfigText, sections: Sections, whole: bool) -> dict[str, Reading]:
-    """Settings by key; whole: what is not there is not there."""
-    settings: dict[str, Reading] = {}
-    extruder, bed, printer = sections.get("extruder", {}), sections.get("heater_bed"), sections["printer"]
-    corner = number(printer, "square_corner_velocity", f"{config.name}, [printer]")
-    source = (
-        "[printer] square_corner_velocity" if corner is not None else "square_corner_velocity, which is 5 where it is not set"
-    )
-    settings["junction_speed_mm_s"] = Reading(rounded(CORNER_MM_S if corner is None else corner), source)
-    name = f"{config.name}, [extruder]"
-    for key, theirs in (("head.nozzle_mm", "nozzle_diameter"), ("nozzle_limit_c", "max_temp")):
-        if (value := number(extruder, theirs, name)) is not None:
-            settings[key] = Reading(rounded(value), f"[extruder] {theirs}")
-    settings |= _filament(extruder, printer, config)
-    if bed is None and whole:
-        settings["bed_limit_c"] = Reading(0.0, "it has no [heater_bed]")
-    elif bed is not None and (heat_c := number(bed, "max_temp", f"{config.name}, [heater_bed]")) is not None:
-        settings["bed_limit_c"] = Reading(rounded(heat_c), "[heater_bed] max_temp")
-    arcs = "gcode_arcs" in sections
-    if arcs or whole:
-        settings["arcs"] = Reading(arcs, "[gcode_arcs]" if arcs else "it has no [gcode_arcs]")
-    return settings
-
-
-def _filament(extruder: Mapping[str, str], printer: Mapping[str, str], config: ConfigText) -> dict[str, Reading]:
-    """Of moves of the filament alone; where they are not set Klipper works them out of 4 nozzle^2 over the filament's area."""
-    name = f"{config.name}, [extruder]"
-    settings: dict[str, Reading] = {}
-    nozzle, filament = (number(extruder, f"{which}_diameter", name) for which in ("nozzle", "filament"))
-    for key, theirs, most in (
-        ("extruder_speed_mm_s", "max_extrude_only_velocity", "max_velocity"),
-        ("extruder_acceleration_mm_s2", "max_extrude_only_accel", "max_accel"),
-    ):
-        value, of_printer = number(extruder, theirs, name), number(printer, most, f"{config.name}, [printer]")
-        if value is not None:
-            settings[key] = Reading(rounded(value), f"[extruder] {theirs}")
-        elif nozzle and filament and of_printer:
+def _settings(sections: Sections) -> dict[str, Reading]:
+    """Settings by key below machine."""
+    told = {key: sections.reading(*place) for key, place in SETTINGS.items()}
+    settings = {key: reading for key, reading in told.items() if reading is not None}
+    corner = Reading(CORNER_MM_S, "square_corner_velocity, which is 5 where it is not set")
+    settings.setdefault("junction_speed_mm_s", corner)
+    nozzle, filament = (sections.number("extruder", f"{which}_diameter") for which in ("nozzle", "filament"))
+    for key, most in WORKED_OUT.items():
+        of_printer = sections.number("printer", most)
+        if key not in settings and nozzle and filament and of_printer:
             ratio = 4.0 * nozzle**2 / (pi * (filament / 2.0) ** 2)
-            settings[key] = Reading(rounded(of_printer * ratio), f"{theirs}, which Klipper makes of {most} where it is not set")
+            source = f"{SETTINGS[key][1]}, which Klipper makes of {most} where it is not set"
+            settings[key] = Reading(of_printer * ratio, source)
+    arcs = "gcode_arcs" in sections.of
+    if arcs or not sections.missing:
+        settings["arcs"] = Reading(arcs, "[gcode_arcs]" if arcs else "it has no [gcode_arcs]")
+    if "heater_bed" not in sections.of and not sections.missing:
+        settings["bed_limit_c"] = Reading(0.0, "it has no [heater_bed]")
     return settings
-
-
-def _probe(sections: Sections) -> str:
-    kind = next((title for title in sections if title.split(" ")[0] in PROBES), "")
-    return f"the probe [{kind}]" if kind else ""

@@ -1,14 +1,15 @@
 """Marlin: the answers to M115, M503 and M211, as a saved log has them or as they came.
 
-gcode/config/M200-M205.cpp, gcode/control/M211.cpp and module/settings.cpp of Marlin 2.1: M203 tells units/s, M201 and M204
-units/s2, under the letters of AXIS4_NAME and so on; all of them in inches after G20. M205 tells either jerk by axis, or J, the
-junction deviation. M211 tells the software end stops in mm. M115 has capabilities, and the axes' reach where it is built with
-M115_GEOMETRY_REPORT, the fourth axis on under i, j, k (gcode/host/M115.cpp).
+gcode/config/M200-M205.cpp, gcode/control/M211.cpp and module/settings.cpp of Marlin 2.1: M203 gives units/s, M201 and M204
+units/s2, under the letters of AXIS4_NAME and so on; in inches after G20. M205 gives jerk by axis, or J, the junction deviation.
+M211 gives the software end stops in mm. M115 has capabilities, and the reach of the axes in a build with M115_GEOMETRY_REPORT,
+the fourth axis and those after it as i, j, k (gcode/host/M115.cpp).
 """
 
 import re
 
 from machine.detect.found import (
+    ABC,
     ACCELERATION,
     LIMITS,
     PRINTING,
@@ -17,44 +18,50 @@ from machine.detect.found import (
     ConfigText,
     Found,
     Reading,
-    check_whole,
     corner_speed,
     limits,
-    rounded,
 )
 from machine.gcode.words import NUMBER
 from machine.link.identification import KEY, VERSION
 from machine.link.protocol.events import AREA, NAME, REACH
 from profiles.errors import ProfileError
 
-REPORT = re.compile(r"(?:^|[\s:>])(M92|M20[0-5]|M211|M851|G20)\b([^;\n]*)")  # behind echo:, and behind what a host's log adds
-WORD = re.compile(rf"\b([A-Z])({NUMBER})")
+REPORT = re.compile(  # behind echo: and what a host's log adds; a command and nothing but its words, so no sentence about it
+    rf"(?:^|[:>])[ \t]*(M92|M20[0-5]|M211|M851|G20)((?:[ \t]+[A-Z]{NUMBER})*)[ \t]*(?:[;(].*)?$", re.MULTILINE
+)
+WORD = re.compile(rf"([A-Z])({NUMBER})")
 SOFT_LIMITS = re.compile(r"Min:(.*?)Max:(.*)")
 PLACE = re.compile(rf"([A-Z])[: ]*({NUMBER})")
 CAPABILITY = re.compile(r"Cap:(\w+):1")
 KEYS = {"M203": SPEED, "M201": ACCELERATION}
+OF_FILAMENT = {"extruder_speed_mm_s": SPEED, "extruder_acceleration_mm_s2": ACCELERATION}
 
 
 def recognise(text: str) -> bool:
     """Whether a text is such a log."""
-    reports = {command for command, _ in REPORT.findall(text)}
+    reports = {command for command, words in REPORT.findall(text) if words}
     return {"M92", "M203"} <= reports and ("echo:" in text or "M205" in reports)
 
 
 def read(config: ConfigText) -> Found:
-    """What a log tells. Raises ProfileError."""
+    """What a log says. Raises ProfileError."""
     words = _words(config)
     axes = _axes(config, words)
     capabilities = set(CAPABILITY.findall(config.text))
-    settings, remarks = _settings(words, axes)
+    settings, remarks = _corner(words), []
+    if words.get("M200", {}).get("S", 0.0) > 0.0:
+        remarks.append("the printer counts filament in mm3 (M200 S1): its speed is left as it is")
+    else:
+        filament = axes.get("E", {})
+        settings |= {key: filament[word] for key, word in OF_FILAMENT.items() if word in filament}
     if "ARCS" in capabilities:
         settings["arcs"] = Reading(True, "Cap:ARCS of M115")
-    rotary = "".join(letter for letter in axes if letter not in (*PRINTING, "E"))
-    probed = "M851" in words or "Z_PROBE" in capabilities
+    others = [letter for letter in axes if letter not in (*PRINTING, "E")]
+    doubtful = {letter: f"{config.name}: M203 does not say whether {letter} turns" for letter in others if letter not in ABC}
+    rotary = "".join(letter for letter in others if letter in ABC)
     firmware, name = _identity(config.text)
-    probe = "a Z probe" if probed else ""
-    found = Found(firmware, "marlin", axes, rotary, settings, name=name, probe=probe, remarks=tuple(remarks))
-    return check_whole(found, config.name)
+    probe = "a Z probe" if "M851" in words or "Z_PROBE" in capabilities else ""
+    return Found(firmware, "marlin", axes, rotary, doubtful, settings, name=name, probe=probe, remarks=remarks)
 
 
 def _words(config: ConfigText) -> dict[str, dict[str, float]]:
@@ -74,7 +81,7 @@ def _axes(config: ConfigText, words: dict[str, dict[str, float]]) -> dict[str, A
     for command, key in KEYS.items():
         for letter, value in words.get(command, {}).items():
             if letter in axes:
-                axes[letter][key] = Reading(rounded(value), command)
+                axes[letter][key] = Reading(value, command)
     for letter, (low, high, source) in (_area(config.text, axes) | _soft_limits(config.text)).items():
         if letter in axes:
             axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, source)
@@ -91,7 +98,7 @@ def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
 
 
 def _area(text: str, letters: dict[str, AxisReadings]) -> dict[str, tuple[float, float, str]]:
-    """Of M115, its axes in the order of M203."""
+    """Of M115, whose axes are in the order of M203."""
     area = AREA.search(text)
     if area is None:
         return {}
@@ -100,34 +107,21 @@ def _area(text: str, letters: dict[str, AxisReadings]) -> dict[str, tuple[float,
     return {letter: (low, high, "M115, area") for letter, low, high in zip(named, least, most, strict=False)}
 
 
-def _settings(words: dict[str, dict[str, float]], axes: dict[str, AxisReadings]) -> tuple[dict[str, Reading], list[str]]:
-    """Settings by key, and sentences."""
-    settings: dict[str, Reading] = {}
-    filament = axes.get("E", {})
-    if words.get("M200", {}).get("S", 0.0) > 0.0:  # then E counts mm3
-        return settings | _corner(words), ["the printer counts filament in mm3 (M200 S1): its speed is left as it is"]
-    if SPEED in filament:
-        settings["extruder_speed_mm_s"] = filament[SPEED]
-    if ACCELERATION in filament:
-        settings["extruder_acceleration_mm_s2"] = filament[ACCELERATION]
-    return settings | _corner(words), []
-
-
 def _corner(words: dict[str, dict[str, float]]) -> dict[str, Reading]:
-    """Jerk of X and Y, the lesser, or what a junction deviation amounts to at the acceleration of printing moves."""
+    """The lesser jerk of X and Y, or the speed that a junction deviation gives at the acceleration of printing moves."""
     told = words.get("M205", {})
     jerks = [told[letter] for letter in "XY" if letter in told]
     if jerks:
-        return {"junction_speed_mm_s": Reading(rounded(min(jerks)), "M205")}
+        return {"junction_speed_mm_s": Reading(min(jerks), "M205")}
     printing = words.get("M204", {}).get("P", 0.0)
     if told.get("J", 0.0) <= 0.0 or printing <= 0.0:
         return {}
     source = f"M205 J{told['J']:g}, at the {printing:g} mm/s2 of M204 P"
-    return {"junction_speed_mm_s": Reading(rounded(corner_speed(told["J"], printing)), source)}
+    return {"junction_speed_mm_s": Reading(corner_speed(told["J"], printing), source)}
 
 
 def _identity(text: str) -> tuple[str, str]:
-    """Firmware with its version, and the machine's name."""
+    """The firmware with its version, and the name of the machine."""
     line = next((line for line in text.splitlines() if NAME in line), "")
     words = line[line.index(NAME) + len(NAME) :].strip() if line else ""
     version, machine = VERSION.search(line), re.search(r"MACHINE_TYPE:(.*?)\s+[A-Z_]+:", line)

@@ -1,4 +1,4 @@
-"""Proposal: a profile of the nearest shipped machine with what a firmware tells over it, and what only a measurement tells."""
+"""Proposal: the nearest shipped machine with what a firmware says on top, and what is left to measure."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,15 +17,16 @@ SETTINGS = ("junction_speed_mm_s", "extruder_speed_mm_s", "extruder_acceleration
             "head.nozzle_mm", "arcs", "receive_bytes")  # fmt: skip
 CHOICES = ("machine.arcs", "machine.receive_bytes")  # with which a print differs, but does not fail
 CALIBRATED = tuple(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("point_mm", "sign", "zero_deg"))
-DRAWN = ("machine.tilt.axis", "machine.table", "machine.head.silhouette_mm", "machine.head.boxes", "machine.cradle")
+DRAWN = ("machine.tilt.axis", "machine.turn.budget_deg", "machine.table", "machine.head.silhouette_mm", "machine.head.boxes",
+         "machine.cradle")  # fmt: skip
 OF_A_FIXED_BED = ("machine.table", "machine.tool_mm")
 ABOUT = {"A": [1.0, 0.0, 0.0], "B": [0.0, 1.0, 0.0]}  # ISO 841: A turns about X, B about Y, C about Z
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """base: the profile that is inherited; values: key -> reading, of a machine; absent: keys that the firmware does not tell, so
-    that they are the base's; measured: keys that no firmware knows; remarks: sentences."""
+    """base: the profile to inherit; values: key -> reading; absent: keys that this firmware does not give: the base's stay;
+    measured: keys that no firmware knows; remarks: notes for the person."""
 
     base: str
     values: Mapping[str, Reading]
@@ -35,16 +36,22 @@ class Proposal:
 
 
 def propose(found: Found, base: str | None = None) -> Proposal:
-    """What a profile says otherwise than the base; None: the nearest shipped machine. Raises ProfileError."""
+    """What a profile says differently from the base; base: the profile that the person names, None: the nearest shipped machine.
+
+    Raises ProfileError where it is not known which axes tilt and turn the table.
+    """
     remarks = list(found.remarks)
-    tilts = len(found.rotary) >= 2 if base is None else _machine(base).tilts
-    name = base or _nearest(found, tilts)
-    machine = _machine(name)
+    named = None if base is None else _machine(base)
+    tilts = len(found.rotary) + len(found.doubtful) > 1 if named is None else named.tilts
+    pair = _pair(found, named, remarks) if tilts else ""
+    name = base or _nearest(found, pair)
     values: dict[str, Reading] = {"machine.dialect": Reading(found.dialect, "its dialect")}
     for letter in PRINTING:
         values |= {f"machine.{letter.lower()}.{LINEAR[key]}": reading for key, reading in found.axes[letter].items()}
     if tilts:
-        values |= _turning(found, machine, remarks)
+        values |= _turning(found, pair, _machine(name))
+        if named is None:  # not the base's, which may be of another firmware
+            values["machine.coordinates"] = Reading("table", "its axes are plain unless a command makes it follow the table")
     else:
         values |= _bed(values)
         remarks.append(_why_fixed(found, name))
@@ -55,7 +62,7 @@ def propose(found: Found, base: str | None = None) -> Proposal:
 
 
 def settings_of(proposal: Proposal, name: str, firmware: str) -> list[str]:
-    """KEY=VALUE settings over the base: the values, where each comes from, and what is left to measure."""
+    """KEY=VALUE settings over the base: the values, their sources, and what is left to measure."""
     base = _machine(proposal.base)
     uncertain = [*proposal.measured, *(key for key in proposal.absent if key not in CHOICES)]
     left = [key for key in base.uncalibrated if key not in proposal.values]
@@ -77,22 +84,21 @@ def _machine(name: str) -> Machine:
     return machine
 
 
-def _nearest(found: Found, tilts: bool) -> str:
-    """The shipped machine of the same firmware, then letters, then dialect, whose axes differ least; the first by name among
-    equals."""
+def _nearest(found: Found, pair: str) -> str:
+    """The shipped machine of the same firmware, then letters, then dialect, whose axes differ least; among equals the first by
+    name. pair: the letters of tilt and turn, empty for a fixed table."""
 
     def differences(name: str) -> tuple[bool, bool, bool, int, str]:
         machine = _machine(name)
-        letters = {machine.tilt.letter, machine.turn.letter}
         other_firmware = _firmware(machine.dialect) != _firmware(found.dialect)
-        other_letters = tilts and not letters <= set(found.rotary)
+        other_letters = pair not in ("", machine.tilt.letter + machine.turn.letter)
         return other_firmware, other_letters, machine.dialect != found.dialect, _differing(found, machine), name
 
-    return min((name for name in shipped("machine") if _machine(name).tilts == tilts), key=differences)
+    return min((name for name in shipped("machine") if _machine(name).tilts == bool(pair)), key=differences)
 
 
 def _differing(found: Found, machine: Machine) -> int:
-    """How many numbers of the axes are others than a machine's."""
+    """How many numbers of the axes differ from a machine's."""
     linear = {"X": machine.x, "Y": machine.y, "Z": machine.z}
     values = [
         (getattr(linear[letter], LINEAR[key]), told.value) for letter in PRINTING for key, told in found.axes[letter].items()
@@ -106,39 +112,39 @@ def _firmware(dialect: str) -> str:
     return next(firmware.name for firmware in FIRMWARES if dialect in firmware.dialects)
 
 
-def _turning(found: Found, machine: Machine, remarks: list[str]) -> dict[str, Reading]:
-    """Letters and numbers of the two axes that turn the table."""
+def _turning(found: Found, pair: str, machine: Machine) -> dict[str, Reading]:
+    """Letters and numbers of the tilt and the turn axis. machine: the base."""
     values: dict[str, Reading] = {}
-    pair = _pair(found, machine, remarks)
-    for axis, letter in zip(("tilt", "turn"), pair, strict=False):
+    for axis, letter in zip(("tilt", "turn"), pair, strict=True):
         values[f"machine.{axis}.letter"] = Reading(letter, "its axes")
         values |= {f"machine.{axis}.{ROTARY[key]}": reading for key, reading in found.axes[letter].items()}
         if letter in found.steppers:
             values[f"machine.{axis}.stepper"] = Reading(found.steppers[letter], f"[manual_stepper {found.steppers[letter]}]")
-    tilt = pair[:1]
+    tilt = pair[0]
     if tilt in ABOUT and tilt != machine.tilt.letter:
         source = f"{tilt} turns about {'Y' if tilt == 'B' else 'X'} by ISO 841: look whether it does"
         values["machine.tilt.axis"] = Reading(ABOUT[tilt], source)
     return values
 
 
-def _pair(found: Found, machine: Machine, remarks: list[str]) -> str:
-    """The letters of tilt and turn: the base's where they are there, else C turns, or what comes last in the alphabet."""
-    usual = machine.tilt.letter + machine.turn.letter
-    if set(usual) <= set(found.rotary):
-        return usual
-    letters = sorted(letter for letter in found.rotary if letter in "ABC") or sorted(found.rotary)
-    if len(letters) == 1 or not letters:
-        remarks.append(f"it tells of {len(letters) or 'no'} rotary axis where two turn a table: those of the base are kept")
-        return ""
-    if len(letters) > 2:
-        raise ProfileError(
-            f"{found.firmware} has the rotary axes {' '.join(letters)}, of which two tilt and turn the table: --base names a "
-            "machine that has those two letters"
-        )
-    tilt, turn = letters
-    remarks.append(f"{tilt} is taken for the tilt and {turn} for the turn: move both once and look")
-    return tilt + turn
+def _pair(found: Found, named: Machine | None, remarks: list[str]) -> str:
+    """The letters of tilt and turn: those of the machine that the person names, else C turns and the one other tilts (ISO 841).
+
+    Raises ProfileError where that leaves a choice: a wrong axis would tilt the table instead of turning it, or move Z.
+    """
+    if named is not None and {named.tilt.letter, named.turn.letter} <= {*found.rotary, *found.doubtful}:
+        return named.tilt.letter + named.turn.letter
+    way = "--base NAME names a machine, or a file of yours, whose machine.tilt.letter and machine.turn.letter say it"
+    for why in found.doubtful.values():
+        raise ProfileError(f"{why}, so it is not known which two axes tilt and turn the table: {way}")
+    others = found.rotary.replace("C", "")
+    if len(found.rotary) == 2 and len(others) == 1:
+        remarks.append(f"{others} is taken for the tilt and C for the turn: move both once and look")
+        return others + "C"
+    if len(found.rotary) < 2:
+        raise ProfileError(f"{found.firmware} tells of {found.rotary or 'no axis'} that turns, the base of two: leave out --base")
+    letters = " ".join(found.rotary)
+    raise ProfileError(f"{found.firmware} has the rotary axes {letters}, and nothing says which tilts and which turns: {way}")
 
 
 def _bed(values: Mapping[str, Reading]) -> dict[str, Reading]:
@@ -148,21 +154,19 @@ def _bed(values: Mapping[str, Reading]) -> dict[str, Reading]:
     if len(spans) < 2:
         return {}
     source = "worked out: the bed is taken to be as large as X and Y reach"
-    size = [rounded(high - low) for low, high in spans]
-    middle = [rounded((low + high) / 2.0) for low, high in spans]
-    return {"machine.table.size_mm": Reading(size, source), "machine.tool_mm": Reading([*middle, 0.0], source)}
+    size, middle = [high - low for low, high in spans], [(low + high) / 2.0 for low, high in spans]
+    return {"machine.table.size_mm": Reading(rounded(size), source), "machine.tool_mm": Reading(rounded([*middle, 0.0]), source)}
 
 
 def _why_fixed(found: Found, base: str) -> str:
-    if len(found.rotary) == 1:
-        return f"only {found.rotary} turns, and a table that tilts and turns has two such axes: shape is fixed, as in {base}"
-    if found.rotary:
-        return f"shape is fixed, as in {base}, although {' and '.join(found.rotary)} turn"
-    return f"it tells of no axis that turns: shape is fixed, as in {base}, and all is printed in one part"
+    others = " ".join((*found.rotary, *found.doubtful))
+    if not others:
+        return f"it tells of no axis that turns: shape is fixed, as in {base}, and all is printed in one part"
+    return f"shape is fixed, as in {base}, where two axes would tilt and turn the table; of its own it has {others}"
 
 
 def _sought(tilts: bool) -> list[str]:
-    """Every key that some firmware tells."""
+    """Every key that at least one firmware tells."""
     linear = [f"machine.{axis}.{key}" for axis in "xyz" for key in LINEAR.values()]
     rotary = [f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("letter", *ROTARY.values())]
     return [*linear, *(rotary if tilts else ()), *(f"machine.{key}" for key in SETTINGS)]

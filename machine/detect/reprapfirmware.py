@@ -1,7 +1,7 @@
 """RepRapFirmware 3: config.g, or its object model as M409 and rr_model answer it, a line of JSON for each key.
 
-Platform/Platform.cpp, Heating/Heat.cpp and Heater.cpp (fc1cd16c): speed and jerk of an axis are a minute, acceleration a second
-squared; heat.bedHeaters and a tool's heaters name entries of heat.heaters, whose max is the greatest temperature.
+Platform/Platform.cpp, Heating/Heat.cpp and Heater.cpp (fc1cd16c): speed and jerk of an axis are per minute, acceleration per
+second squared; heat.bedHeaters and a tool's heaters are indices into heat.heaters, whose max is the greatest temperature.
 """
 
 import json
@@ -11,18 +11,7 @@ from typing import Any
 
 from machine.detect.config_g import read_commands
 from machine.detect.duet_board import MINUTE_S, DuetBoard
-from machine.detect.found import (
-    ACCELERATION,
-    LIMITS,
-    SPEED,
-    AxisReadings,
-    ConfigText,
-    Found,
-    Reading,
-    check_whole,
-    limits,
-    rounded,
-)
+from machine.detect.found import ACCELERATION, LIMITS, SPEED, AxisReadings, ConfigText, Found, Reading, limits
 from machine.network.answers import number, table
 from profiles.errors import ProfileError
 
@@ -38,8 +27,8 @@ def recognise(text: str) -> bool:
 
 
 def read(config: ConfigText) -> Found:
-    """What either tells. Raises ProfileError."""
-    return check_whole(_read_model(config) if MODEL.search(config.text) else read_commands(config), config.name)
+    """What either says. Raises ProfileError."""
+    return _read_model(config) if MODEL.search(config.text) else read_commands(config)
 
 
 def _read_model(config: ConfigText) -> Found:
@@ -47,10 +36,11 @@ def _read_model(config: ConfigText) -> Found:
     board = DuetBoard()
     for axis in _tables(model.get("move.axes")):
         letter = str(axis.get("letter") or "")
-        board.axes[letter] = _drive(axis, f"move.axes, {letter}")
+        source = f"move.axes, {letter}"
+        board.axes[letter] = _drive(axis, source)
         low, high, jerk = (number(axis.get(key)) for key in ("min", "max", "jerk"))
         if low is not None and high is not None:
-            board.axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, f"move.axes, {letter}")
+            board.axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, source)
         if jerk is not None:
             board.jerks_mm_s[letter] = jerk / MINUTE_S
     for extruder in _tables(model.get("move.extruders"))[:1]:
@@ -60,8 +50,10 @@ def _read_model(config: ConfigText) -> Found:
     board.probe = int(number(probes[0].get("type")) or 0) if probes else 0
     main, network = table(model.get("boards[0]")), table(model.get("network"))
     board.name = str(network.get("name") or "")
+    kinematics = table(model.get("move.kinematics")).get("name") or board.kinematics
+    board.kinematics = str(kinematics).lower().replace(" ", "")
     board.firmware = f"{main.get('firmwareName') or board.firmware} {main.get('firmwareVersion') or ''}".strip()
-    return board.found("move.axes, jerk", "heat.heaters, max")
+    return board.found(config.name, "move.kinematics", "move.axes, jerk", "heat.heaters, max")
 
 
 def _take_heat(board: DuetBoard, heat: Table, tools: list[Table]) -> None:
@@ -73,7 +65,7 @@ def _take_heat(board: DuetBoard, heat: Table, tools: list[Table]) -> None:
 
 
 def _model(config: ConfigText) -> dict[str, Any]:
-    """Key -> what it holds; the pages of an array are put together."""
+    """Key -> its value; the pages of an array are joined."""
     model: dict[str, Any] = {}
     for line in config.text.splitlines():
         if not MODEL.match(line):
@@ -89,13 +81,8 @@ def _model(config: ConfigText) -> dict[str, Any]:
 
 
 def _drive(drive: Table, source: str) -> AxisReadings:
-    speed, acceleration = number(drive.get("speed")), number(drive.get("acceleration"))
-    readings: AxisReadings = {}
-    if speed is not None:
-        readings[SPEED] = Reading(rounded(speed / MINUTE_S), source)
-    if acceleration is not None:
-        readings[ACCELERATION] = Reading(rounded(acceleration), source)
-    return readings
+    told = ((key, number(drive.get(key)), unit_s) for key, unit_s in ((SPEED, MINUTE_S), (ACCELERATION, 1.0)))
+    return {key: Reading(value / unit_s, source) for key, value, unit_s in told if value is not None}
 
 
 def _tables(value: Any) -> list[Table]:

@@ -6,33 +6,53 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 
-from machine.detect.found import ConfigText
+from machine.detect.found import ConfigText, Reading
 from profiles.errors import ProfileError
 
-Sections = dict[str, dict[str, str]]
-MOST_INCLUDED = 100  # files; more is one that names itself
+MOST_INCLUDED = 100  # files; more is one that includes itself
 NOTHING = re.compile(r"(?!)")
-CONTINUED = re.compile(r"\\[ \t]*\r?\n")  # a line goes on in the next one (LinuxCNC, docs/src/config/ini-config.adoc, 5c41560)
+CONTINUED = re.compile(r"\\[ \t]*\n")  # a line goes on in the next one (LinuxCNC, docs/src/config/ini-config.adoc, 5c41560)
 
 
-@dataclass
-class Included:
-    """Files that a configuration has brought in. missing: names of those that are not there."""
+@dataclass(frozen=True)
+class Sections:
+    """A configuration by section and key. name: its file, for messages; missing: included files that are not there."""
 
-    count: int = 0
+    name: str
+    of: dict[str, dict[str, str]]
     missing: list[str] = field(default_factory=list)
 
+    def __getitem__(self, title: str) -> Mapping[str, str]:
+        """The settings of a section; empty for one that is not there."""
+        return self.of.get(title, {})
 
-def read_sections(
-    config: ConfigText, include: re.Pattern[str] = NOTHING, included: Included | None = None, indents: bool = True
-) -> Sections:
-    """The sections of a text, later ones over earlier ones; keys in small letters, comments from # on or from a ; behind a blank.
+    def number(self, title: str, key: str) -> float | None:
+        """A number; None where it is not there. Raises ProfileError."""
+        text = self[title].get(key)
+        if text is None:
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            raise ProfileError(f"{self.name}, [{title}]: {key} is {text[:40]!r}, which is no number") from None
+        if not isfinite(value):
+            raise ProfileError(f"{self.name}, [{title}]: {key} is {text[:40]!r}: a finite number is expected")
+        return value
 
-    include: a line that names other files by its first group: they are read in its place. indents: a line that begins with a
-    blank goes on with the value before. Raises ProfileError.
+    def reading(self, title: str, key: str) -> Reading | None:
+        """A number with its source; None where it is not there. Raises ProfileError."""
+        value = self.number(title, key)
+        return None if value is None else Reading(value, f"[{title}] {key}")
+
+
+def read_sections(config: ConfigText, include: re.Pattern[str] = NOTHING, indents: bool = True) -> Sections:
+    """The sections of a text, later ones over earlier ones; keys in lower case; comments begin with #, or with ; after a blank.
+
+    include: matches a line that names other files by its first group: they are read in its place. indents: a line that begins
+    with a blank continues the value before it. Raises ProfileError.
     """
-    parser = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#"))
-    for name, lines in _pieces(config, include, included or Included()):
+    parser, missing = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#")), list[str]()
+    for name, lines in _pieces(config, include, missing, [0]):
         try:
             parser.read_string("\n".join(lines if indents else map(str.strip, lines)), name)
         except configparser.MissingSectionHeaderError as error:
@@ -40,14 +60,16 @@ def read_sections(
         except configparser.ParsingError as error:
             _, line = error.errors[0]
             raise ProfileError(f"{name}: {line[:60]} is neither a section nor a setting: is the file cut off?") from None
-    return {title: dict(parser.items(title)) for title in parser.sections()}
+    return Sections(config.name, {title: dict(parser.items(title)) for title in parser.sections()}, missing)
 
 
-def _pieces(config: ConfigText, include: re.Pattern[str], included: Included) -> Iterator[tuple[str, list[str]]]:
-    """Names and lines in the order in which they count."""
-    included.count += 1
-    if included.count > MOST_INCLUDED:
-        raise ProfileError(f"{config.name}: more than {MOST_INCLUDED} files are included: does one name itself?")
+def _pieces(
+    config: ConfigText, include: re.Pattern[str], missing: list[str], count: list[int]
+) -> Iterator[tuple[str, list[str]]]:
+    """File names and lines in the order in which they are read. count: of files so far."""
+    count[0] += 1
+    if count[0] > MOST_INCLUDED:
+        raise ProfileError(f"{config.name}: more than {MOST_INCLUDED} files are included: does one include itself?")
     lines: list[str] = []
     for line in CONTINUED.sub(" ", config.text).splitlines():
         if (named := include.match(line)) is None:
@@ -58,21 +80,7 @@ def _pieces(config: ConfigText, include: re.Pattern[str], included: Included) ->
         pattern = named[1].strip()
         others = config.beside(pattern)
         if not others and "*" not in pattern:
-            included.missing.append(pattern)
+            missing.append(pattern)
         for other in others:
-            yield from _pieces(other, include, included)
+            yield from _pieces(other, include, missing, count)
     yield config.name, lines
-
-
-def number(section: Mapping[str, str], key: str, name: str) -> float | None:
-    """The number of a key, None where it is not there. name: of section and file, for the message. Raises ProfileError."""
-    text = section.get(key)
-    if text is None:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        raise ProfileError(f"{name}: {key} is {text[:40]!r}, which is no number") from None
-    if not isfinite(value):
-        raise ProfileError(f"{name}: {key} is {text[:40]!r}: a finite number is expected")
-    return value

@@ -24,7 +24,7 @@ WRITTEN_S = 120.0
 START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
 MOST_PAGES = 16
 SETTINGS_ARRAYS = ("move.axes", "move.extruders", "tools", "sensors.probes")
-SETTINGS_KEYS = ("boards[0]", "heat", "network")
+SETTINGS_KEYS = ("boards[0]", "heat", "move.kinematics", "network")
 STOPPED = frozenset({Phase.PAUSING, Phase.PAUSED, Phase.CANCELLING})
 STATES = {
     "idle": Phase.READY,

@@ -3,7 +3,9 @@
 import pytest
 
 from machine.detect.found import ConfigText, Found
-from machine.detect.grblhal import read, recognise
+from machine.detect.grblhal import recognise
+from machine.detect.proposal import propose
+from machine.detect.read import read
 from profiles.errors import ProfileError
 
 DUMP = """[VER:1.1f.20240801:]
@@ -31,6 +33,7 @@ $131=180.000
 $132=120.000
 $133=90.000
 $134=0.000
+$376=5
 ok
 """
 
@@ -68,10 +71,21 @@ def test_letters_buffer_and_corner_are_told() -> None:
     assert told.settings["junction_speed_mm_s"].value == 4.3947  # sqrt(400 x 0.02 x (1 + sqrt 2))
 
 
-def test_without_its_letters_the_axes_are_a_b_c_and_that_is_said() -> None:
-    told = found(DUMP.replace("[AXS:5:XYZAC]\n", ""))
-    assert told.rotary == "AB"
-    assert "taken for A B" in told.remarks[1]
+def test_letters_that_the_dump_does_not_name_are_not_guessed() -> None:
+    with pytest.raises(
+        ProfileError, match=r"^grbl.txt: it has more than three axes, whose letters only \$I names: add its answer"
+    ):
+        found(DUMP.replace("[AXS:5:XYZAC]\n", ""))
+    three = "".join(line for line in DUMP.splitlines(True) if line[:5] not in ("[AXS:", "$113=", "$114=", "$123=", "$124="))
+    assert found(three).rotary == ""
+
+
+def test_without_376_nothing_says_that_an_axis_turns() -> None:
+    told = found(DUMP.replace("$376=5\n", ""))
+    assert (told.rotary, list(told.doubtful)) == ("", ["A", "C"])
+    with pytest.raises(ProfileError, match=r"it has no \$376, which says whether A turns.*: --base NAME"):
+        propose(told)
+    assert propose(told, "generic_ac").values["machine.tilt.letter"].value == "A"
 
 
 def test_an_axis_that_376_calls_linear_does_not_turn() -> None:

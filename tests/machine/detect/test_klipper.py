@@ -5,7 +5,9 @@ import json
 import pytest
 
 from machine.detect.found import ConfigText, Found
-from machine.detect.klipper import read, recognise
+from machine.detect.klipper import recognise
+from machine.detect.proposal import propose
+from machine.detect.read import read
 from profiles.errors import ProfileError
 
 GIMBAL = """
@@ -138,14 +140,60 @@ def test_what_may_stand_in_a_file_that_is_missing_is_not_taken_for_absent() -> N
 def test_moonrakers_names_in_small_letters_are_those_of_the_file_and_null_is_nothing() -> None:
     axis = {"position_min": 0.0, "position_max": 9.0}
     settings = {
-        "printer": {"max_velocity": 90.0, "max_accel": 900.0},
+        "printer": {"kinematics": "cartesian", "max_velocity": 90.0, "max_accel": 900.0},
         **{f"stepper_{letter}": axis for letter in "xyz"},
         **{f"manual_stepper table_{letter}": {"velocity": 5.0, "accel": 0.0, "position_min": None} for letter in "ac"},
     }
     config = {f"manual_stepper TABLE_{letter}": {"velocity": "5"} for letter in "AC"}
     told = found(json.dumps({"result": {"status": {"configfile": {"settings": settings, "config": config}}}}))
-    assert dict(told.steppers) == {"A": "TABLE_A", "C": "TABLE_C"}
+    assert told.steppers == {"A": "TABLE_A", "C": "TABLE_C"}
     assert values(told, "A") == {"speed": 5.0}
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "sentence"),
+    [
+        ("z_axis", "rotation_distance: 8\nendstop_pin: PG10", "is named like a Z axis"),
+        ("lift_u", "rotation_distance: 40", "is the axis U, which need not turn"),
+        ("table_b", "rotation_distance: 8\nendstop_pin: PG10", "has an endstop_pin and a rotation_distance of 8, as a screw has"),
+        ("right_c", "rotation_distance: 40", "is the axis C like table_c"),
+    ],
+)
+def test_a_stepper_that_may_move_a_screw_or_a_belt_is_not_taken_for_the_tilt(name: str, numbers: str, sentence: str) -> None:
+    steppers = STEPPERS.partition("[manual")[0] + "[manual_stepper table_a]\n[manual_stepper table_c]\n"
+    registered = "[gcode_macro AXES]\ngcode:\n  MANUAL_STEPPER STEPPER=z_axis GCODE_AXIS=U\n"
+    told = found(GIMBAL, f"{steppers}[manual_stepper {name}]\n{numbers}\n{registered}")
+    with pytest.raises(ProfileError, match=rf"^printer.cfg: \[manual_stepper {name}\] {sentence}, .*: --base NAME"):
+        propose(told)
+
+
+def test_a_full_turn_for_each_turn_is_an_axis_that_turns_whatever_its_letter() -> None:
+    told = found(GIMBAL, STEPPERS + "[manual_stepper table_u]\nrotation_distance: 360\ngear_ratio: 40:1\nendstop_pin: PG10\n")
+    assert (told.rotary, told.doubtful) == ("ABU", {})
+
+
+@pytest.mark.parametrize("kinematics", ["xby", "none", "cartesian\nkinematics_abc: cartesian_abc", "robot"])
+def test_kinematics_that_are_not_known_are_refused(kinematics: str) -> None:
+    name = ", ".join(line.rpartition(": ")[2] for line in kinematics.splitlines())
+    with pytest.raises(ProfileError, match=rf"^printer.cfg: \[printer\] kinematics is '{name}': how that moves X, Y, Z"):
+        found(GIMBAL.replace("corexy", kinematics))
+
+
+def test_of_a_and_b_nothing_says_which_tilts_until_a_base_is_named() -> None:
+    with pytest.raises(ProfileError, match="has the rotary axes A B, and nothing says which tilts and which turns: --base NAME"):
+        propose(found())
+    values = propose(found(), "fractal5pro").values
+    assert (values["machine.tilt.letter"].value, values["machine.tilt.stepper"].value) == ("B", "stepper_b")
+
+
+def test_other_steppers_are_named_and_left_out() -> None:
+    told = found(GIMBAL, STEPPERS + "[manual_stepper gear_stepper]\nrotation_distance: 22.7\n")
+    assert told.rotary == "AB"
+    assert any("[manual_stepper gear_stepper]" in remark for remark in told.remarks)
+
+
+def test_an_axis_may_have_a_limit_of_its_own() -> None:
+    assert values(found(GIMBAL.replace("corexy", "limited_corexy\nmax_x_accel: 1500")), "X")["acceleration"] == 1500.0
 
 
 def test_a_delta_tells_no_reach() -> None:

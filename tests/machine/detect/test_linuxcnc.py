@@ -3,7 +3,9 @@
 import pytest
 
 from machine.detect.found import ConfigText, Found
-from machine.detect.linuxcnc import read, recognise
+from machine.detect.linuxcnc import recognise
+from machine.detect.proposal import propose
+from machine.detect.read import read
 from profiles.errors import ProfileError
 
 INI = """
@@ -71,6 +73,30 @@ def test_axes_that_turn_are_told_by_their_joints_and_1e99_bounds_nothing() -> No
 def test_kinematics_that_follow_the_table_take_places_on_it() -> None:
     assert found().settings["coordinates"].value == "workpiece"
     assert found(INI.replace("xyzac-trt-kins", "trivkins")).settings["coordinates"].value == "table"
+
+
+def test_without_identityfirst_m428_would_end_the_following() -> None:
+    with pytest.raises(ProfileError, match=r"^mill.ini: \[KINS\] KINEMATICS is 'xyzac-trt-kins' without sparm=identityfirst"):
+        found(INI.replace(" sparm=identityfirst", ""))
+
+
+@pytest.mark.parametrize(("module", "named"), [("5axiskins", "5axiskins"), ("xyzab_tdr_kins", "xyzab_tdr_kins"), ("", "")])
+def test_kinematics_that_are_not_known_say_of_no_axis_that_it_turns_the_table(module: str, named: str) -> None:
+    told = found(INI.replace("xyzac-trt-kins sparm=identityfirst", module))
+    with pytest.raises(ProfileError, match=rf"^mill.ini: \[KINS\] KINEMATICS is '{named}', with which A need not turn the table"):
+        propose(told)
+    assert "coordinates" not in told.settings
+
+
+def test_a_joint_that_is_linear_is_no_axis_that_turns() -> None:
+    with pytest.raises(ProfileError, match=r"^mill.ini: the joint of axis A has TYPE = LINEAR"):
+        propose(found(INI, AXES.replace("[JOINT_3]", "[JOINT_3]\nTYPE = LINEAR")))
+
+
+def test_of_three_rotary_axes_nothing_says_which_two_turn_the_table() -> None:
+    nine = INI.replace("X Y Z A C", "X Y Z A B C").replace("xyzac-trt-kins", "trivkins")
+    with pytest.raises(ProfileError, match="LinuxCNC has the rotary axes A B C, and nothing says which tilts"):
+        propose(found(nine))
 
 
 def test_inches_and_radians_become_mm_and_degrees() -> None:

@@ -1,9 +1,13 @@
 """What Marlin tells of its machine: M115, M503, M211, as a log or at a port."""
 
+import re
+
 import pytest
 
 from machine.detect.found import ConfigText, Found
-from machine.detect.marlin import read, recognise
+from machine.detect.marlin import recognise
+from machine.detect.proposal import propose
+from machine.detect.read import read
 from machine.firmware.marlin_settings import settings_report
 from machine.simulator.motion import Motion
 from profiles.errors import ProfileError
@@ -72,6 +76,53 @@ def test_what_a_host_puts_before_a_line_does_not_matter() -> None:
 def test_of_several_extruders_the_first_counts() -> None:
     log = LOG.replace(" C90.00 E40.00", " C90.00\necho:  M203 T0 E31.00\necho:  M203 T1 E62.00")
     assert found(log).settings["extruder_speed_mm_s"].value == 31.0
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        " * M203 X Y Z E: set with M92, M205, G20 ; echo: in inches",
+        "#define INCH_MODE_SUPPORT // G20 and G21",
+        "echo: send G20 for inches",
+    ],
+)
+def test_a_sentence_about_a_command_is_none(line: str) -> None:
+    assert found(f"{line}\n{LOG}{line}\n").axes == found(LOG).axes
+
+
+SOURCES = {
+    "Configuration.h": "#define DEFAULT_MAX_FEEDRATE { 300, 25 } // M203, M92\n//#define INCH_MODE_SUPPORT // G20\n",
+    "Configuration_adv.h": " * Config\n  //#define ARC_SUPPORT\n#if 0\n // M205 echo: G20\n",
+    "platformio.ini": "[platformio]\nsrc_dir = Marlin\n[env:mega2560]\n",
+    "config.ini": "[config:base]\nini_use_config = none\n",
+}
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_the_source_that_marlin_is_built_from_is_told_from_what_the_printer_answers(name: str) -> None:
+    expected = rf"^{name}: it is source that a firmware is built from .*: the answers to M115, M503 and M211 are expected"
+    with pytest.raises(ProfileError, match=expected):
+        read(ConfigText(name, SOURCES[name]))
+
+
+def test_nothing_says_that_an_axis_u_turns() -> None:
+    told = found(LOG.replace(" A", " U"))
+    assert (told.rotary, list(told.doubtful)) == ("C", ["U"])
+    with pytest.raises(ProfileError, match=r"^m503.log: M203 does not say whether U turns, .*: --base NAME"):
+        propose(told)
+
+
+def test_a_base_that_follows_the_table_does_not_make_plain_axes_follow_it() -> None:
+    assert propose(found(LOG)).values["machine.coordinates"].value == "table"
+
+
+def test_how_far_cables_let_the_table_wind_is_measured() -> None:
+    assert "machine.turn.budget_deg" in propose(found(LOG)).measured
+
+
+def test_a_base_with_two_rotary_axes_is_not_put_over_a_machine_without() -> None:
+    with pytest.raises(ProfileError, match="tells of no axis that turns, the base of two: leave out --base"):
+        propose(found(re.sub(r" [AC]-?\d\S*", "", LOG)), "generic_ac")
 
 
 def test_filament_in_mm3_is_left_and_said() -> None:

@@ -6,7 +6,9 @@ import pytest
 
 from machine.detect.found import ConfigText, Found
 from machine.detect.marlin import recognise as is_marlin
-from machine.detect.reprapfirmware import read, recognise
+from machine.detect.proposal import propose
+from machine.detect.read import read
+from machine.detect.reprapfirmware import recognise
 from profiles.errors import ProfileError
 
 CRADLE = """
@@ -67,18 +69,45 @@ def test_name_letters_and_probe_are_told() -> None:
     assert (told.name, told.rotary, told.probe) == ("Cradle", "BC", "a BLTouch as its probe")
 
 
-def test_u_and_v_are_taken_for_the_table_where_nothing_else_can_be() -> None:
-    told = found(
-        CRADLE.replace(" B", " U").replace(" C0", " V0").replace(" C-", " V-"), SPEEDS.replace("B", "U").replace("C", "V")
-    )
-    assert told.rotary == "UV"
-    assert told.remarks == ("U and V taken for axes that turn, which nothing says of them",)
+def test_nothing_says_that_u_and_v_turn_until_r1_or_a_base_does() -> None:
+    config = CRADLE.replace(" B0", " U0").replace(" C0", " V0").replace(" B-", " U-").replace(" C-", " V-")
+    speeds = SPEEDS.replace("B", "U").replace("C", "V")
+    with pytest.raises(ProfileError, match=r"^config.g: nothing says whether U turns, as R1 of M584 does, .*: --base NAME"):
+        propose(found(config, speeds))
+    assert propose(found(config, speeds), "gen5x").values["machine.turn.letter"].value == "V"
+    assert found(config.replace("E0.5", "R1 E0.5"), speeds).rotary == "UV"
+
+
+@pytest.mark.parametrize(("command", "named"), [("M669 K13", "K13"), ("M669 K1\nM669 K9 S100", "K9")])
+def test_kinematics_that_are_not_known_are_refused(command: str, named: str) -> None:
+    with pytest.raises(ProfileError, match=f"^config.g: M669 is '{named}': how that moves X, Y, Z"):
+        found(CRADLE.replace("M669 K1", command))
+
+
+def test_a_delta_tells_no_reach() -> None:
+    told = found(CRADLE + "M665 L200 R100 B80\n")
+    assert "limits" not in told.axes["X"]
+    assert "delta" in told.remarks[0]
+
+
+def test_axes_that_m584_does_not_make_are_no_axes_although_it_makes_no_other() -> None:
+    assert found(CRADLE.replace("B0.3 C0.4 ", "")).rotary == ""
+
+
+def test_an_axis_of_a_small_letter_is_not_that_of_the_large_one() -> None:
+    assert values(found(CRADLE + "M208 'b-5:5\n"), "B")["limits"] == [-100.0, 100.0]
+
+
+def test_a_macro_that_is_not_beside_the_file_is_named() -> None:
+    assert found(CRADLE + 'M98 P"drives.g"\n').remarks == []
+    told = read(ConfigText("config.g", SPEEDS + CRADLE.replace("speeds.g", "drives.g")))
+    assert told.remarks == ["drives.g is not beside it: what stands there is not known"]
 
 
 def test_an_axis_of_which_no_speed_is_told_is_kept_and_said() -> None:
     told = found(CRADLE, SPEEDS.replace(" B1800", ""))
     assert (told.rotary, "speed" in told.axes["B"]) == ("BC", False)
-    assert told.remarks == ("M584 makes B, of which no M203 tells the speed",)
+    assert told.remarks == ["M584 makes B, of which no M203 tells the speed"]
 
 
 def test_letters_that_m584_does_not_make_are_passed_over() -> None:
@@ -88,7 +117,7 @@ def test_letters_that_m584_does_not_make_are_passed_over() -> None:
 def test_what_only_the_board_works_out_is_said() -> None:
     told = found(CRADLE.replace("S290", "S{global.hot}"))
     assert "nozzle_limit_c" not in told.settings
-    assert told.remarks == ("what it has in braces (1) only the board works out: --port duet:HOST asks it",)
+    assert told.remarks == ["what it has in braces (1) only the board works out: --port duet:HOST asks it"]
 
 
 def model(**axis: object) -> str:
@@ -113,6 +142,13 @@ def test_the_object_model_counts_in_minutes_too() -> None:
     assert values(told, "A") == {"speed": 100.0, "acceleration": 900.0, "limits": [-90.0, 90.0]}
     assert told.settings["extruder_speed_mm_s"].value == 50.0
     assert told.settings["junction_speed_mm_s"].value == 8.0
+
+
+def test_the_object_model_names_its_kinematics() -> None:
+    told = found(model() + '\n{"key": "move.kinematics", "result": {"name": "coreXY"}}')
+    assert told.axes["X"]["limits"].value == [-90.0, 90.0]
+    with pytest.raises(ProfileError, match=r"^config.g: move.kinematics is 'fivebarscara'"):
+        found(model() + '\n{"key": "move.kinematics", "result": {"name": "FiveBarScara"}}')
 
 
 def test_the_object_models_heaters_are_found_by_their_numbers() -> None:

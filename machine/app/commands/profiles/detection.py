@@ -2,6 +2,7 @@
 
 import json
 import sys
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Sequence
 from glob import glob, has_magic
 from pathlib import Path
@@ -71,7 +72,8 @@ def read_file(file: Path) -> ConfigText:
             content = stream.read(MOST_BYTES + 1)
     except OSError as error:
         raise ProfileError(f"{file}: cannot be read ({reason(error)})") from None
-    if len(content) > MOST_BYTES or b"\0" in content:
+    wide = content.startswith((BOM_UTF16_LE, BOM_UTF16_BE))  # as PowerShell's > writes
+    if len(content) > MOST_BYTES or (b"\0" in content and not wide):
         raise ProfileError(f"{file}: it is no configuration: a text of less than {MOST_BYTES >> 20} MiB is expected")
 
     def beside(pattern: str) -> Sequence[ConfigText]:
@@ -79,7 +81,8 @@ def read_file(file: Path) -> ConfigText:
         paths = [file.parent / other for other in files]
         return [read_file(path) for path in paths if has_magic(pattern) or path.is_file()]
 
-    return ConfigText(str(file), content.decode("utf-8-sig", "replace").replace("\r\n", "\n"), beside)
+    text = content.decode("utf-16" if wide else "utf-8-sig", "replace")
+    return ConfigText(str(file), text.replace("\r\n", "\n").replace("\r", "\n"), beside)
 
 
 def _lines(found: Found, proposal: Proposal, use: str) -> Iterator[str]:

@@ -48,7 +48,8 @@ def refusal(capsys: pytest.CaptureFixture[str], out: Path, *words: object) -> st
 def test_what_a_simulated_machine_tells_is_what_it_is(name: str, tmp_path: Path) -> None:
     real = load(name).machine
     with SimulatedPrinter(real) as printer:
-        machine = detected(tmp_path / "my.toml", "--port", printer.path)
+        letters = ["--base", name] if real.turn.letter == "V" else []
+        machine = detected(tmp_path / "my.toml", "--port", printer.path, *letters)
     assert (machine.x, machine.y, machine.z) == (real.x, real.y, real.z)
     assert all(getattr(machine.tilt, key) == getattr(real.tilt, key) for key in OF_THE_FIRMWARE)
     assert all(getattr(machine.turn, key) == getattr(real.turn, key) for key in OF_THE_FIRMWARE)
@@ -86,11 +87,12 @@ def test_a_profile_without_out_is_the_users_own(tmp_path: Path) -> None:
     (own_folder("machine") / "Gimbal.toml").unlink()
 
 
-def test_klippers_files_make_a_profile_over_the_nearest(tmp_path: Path) -> None:
+def test_klippers_files_make_a_profile_over_the_base(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "steppers").mkdir()
     (tmp_path / "steppers" / "all.cfg").write_text(STEPPERS)
     (tmp_path / "printer.cfg").write_text(GIMBAL)
-    machine = detected(tmp_path / "my.toml", tmp_path / "printer.cfg")
+    assert "--base NAME names a machine" in refusal(capsys, tmp_path / "my.toml", tmp_path / "printer.cfg")
+    machine = detected(tmp_path / "my.toml", tmp_path / "printer.cfg", "--base", "fractal5pro")
     assert (machine.tilt.letter, machine.turn.letter, machine.tilt.stepper) == ("B", "A", "stepper_b")
     assert (machine.head.nozzle_mm, machine.x.limits_mm) == (0.6, (-140.0, 145.5))
 
@@ -102,6 +104,24 @@ def test_a_machine_that_turns_nothing_has_the_shape_fixed(tmp_path: Path, capsys
     assert (machine.shape, machine.dialect, machine.tool_mm) == ("fixed", "klipper", (2.75, 75.0, 0.0))
     assert machine.table.size_mm == (285.5, 150.0)
     assert "it tells of no axis that turns: shape is fixed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xef\xbb\xbf" + LOG.encode(),
+        LOG.replace("\n", "\r\n").encode(),
+        LOG.replace("\n", "\r").encode(),
+        LOG.encode("utf-16"),
+        LOG.replace("MACHINE_TYPE:Gimbal", "MACHINE_TYPE:Gimbal K\xfcche").encode("latin-1"),
+    ],
+    ids=["byte order mark", "CR LF", "CR", "UTF-16 of PowerShell", "Latin-1"],
+)
+def test_a_log_is_read_however_it_was_saved(content: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "m503.log"
+    file.write_bytes(content)
+    machine = detected(tmp_path / "my.toml", file)
+    assert (machine.x.limits_mm, machine.tilt.letter) == ((-110.0, 110.0), "A")
 
 
 def test_linuxcncs_ini_and_grblhals_dump_find_their_bases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
