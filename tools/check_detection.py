@@ -1,8 +1,9 @@
-"""Hold what is read of published configurations against the shipped machines that were written by hand from them.
+"""Compare what is read from published configurations with the shipped machines that were written by hand from them.
 
     python tools/check_detection.py config.g=open5x_voron0 printer.cfg=fractal5pro ...
 
-For each FILE=MACHINE: whether that machine is found as the nearest, how many values are told, and each that is not the machine's.
+For each FILE=MACHINE: whether that machine is found as the nearest, or has to be named because the file does not say which axis
+tilts; how many values are read, and each that differs from the machine's.
 """
 
 import sys
@@ -20,17 +21,21 @@ from profiles.profile import load
 def differing(file: Path, name: str) -> str:
     """The line of one file."""
     try:
-        proposal = propose(read(read_file(file)))
+        found = read(read_file(file))
     except ProfileError as error:
         return f"refused: {error}"
+    try:
+        proposal = propose(found)
+        nearest = "is nearest" if proposal.base == name else f"nearest is {proposal.base}"
+    except ProfileError:
+        proposal, nearest = propose(found, name), "has to be named"
     machine = load(name).machine
     others = [
         f"{key} {_value(machine, key)} {reading.value}"
         for key, reading in proposal.values.items()
         if _value(machine, key) != reading.value
     ]
-    nearest = "nearest" if proposal.base == name else f"nearest is {proposal.base}"
-    return f"{name} {nearest}, {len(proposal.values)} told, {len(others)} others: {'; '.join(others) or 'none'}"
+    return f"{name} {nearest}, {len(proposal.values)} read, {len(others)} differ: {'; '.join(others) or 'none'}"
 
 
 def _value(machine: Machine, key: str) -> object:

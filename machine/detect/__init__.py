@@ -1,5 +1,5 @@
-"""Detection: what a firmware tells of its machine, and the profile that follows from it.
+"""Detection: what a firmware says of its machine, and the profile that follows from it.
 
-One file a firmware reads the texts that it tells itself by, into values with their sources (found); propose() makes of them what
-a profile of the nearest shipped machine says otherwise. All of it without I/O: who calls has the text.
+A file for each firmware reads its texts into values with their sources (found); propose() puts them over the nearest shipped
+machine. No I/O: the caller has the text. What a text leaves open, as which axis tilts, is refused and not guessed.
 """

@@ -27,7 +27,7 @@ from machine.link.protocol.events import AREA, NAME, REACH
 from profiles.errors import ProfileError
 
 REPORT = re.compile(  # behind echo: and what a host's log adds; a command and nothing but its words, so no sentence about it
-    rf"(?:^|[:>])[ \t]*(M92|M20[0-5]|M211|M851|G20)((?:[ \t]+[A-Z]{NUMBER})*)[ \t]*(?:[;(].*)?$", re.MULTILINE
+    rf"(?:^|[:>])[ \t]*(M92|M20[0-5]|M211|M851|G20)((?:[ \t]+[A-Z]{NUMBER})*)[ \t]*(?:[;(#].*)?$", re.MULTILINE
 )
 WORD = re.compile(rf"([A-Z])({NUMBER})")
 SOFT_LIMITS = re.compile(r"Min:(.*?)Max:(.*)")

@@ -135,12 +135,13 @@ def _pair(found: Found, named: Machine | None, remarks: list[str]) -> str:
     if named is not None and {named.tilt.letter, named.turn.letter} <= {*found.rotary, *found.doubtful}:
         return named.tilt.letter + named.turn.letter
     way = "--base NAME names a machine, or a file of yours, whose machine.tilt.letter and machine.turn.letter say it"
-    for why in found.doubtful.values():
-        raise ProfileError(f"{why}, so it is not known which two axes tilt and turn the table: {way}")
     others = found.rotary.replace("C", "")
     if len(found.rotary) == 2 and len(others) == 1:
         remarks.append(f"{others} is taken for the tilt and C for the turn: move both once and look")
+        remarks.extend(f"{letter} is left alone: {why}" for letter, why in found.doubtful.items())
         return others + "C"
+    for why in found.doubtful.values():
+        raise ProfileError(f"{why}, so it is not known which two axes tilt and turn the table: {way}")
     if len(found.rotary) < 2:
         raise ProfileError(f"{found.firmware} tells of {found.rotary or 'no axis'} that turns, the base of two: leave out --base")
     letters = " ".join(found.rotary)

@@ -156,11 +156,11 @@ def test_moonrakers_names_in_small_letters_are_those_of_the_file_and_null_is_not
         ("z_axis", "rotation_distance: 8\nendstop_pin: PG10", "is named like a Z axis"),
         ("lift_u", "rotation_distance: 40", "is the axis U, which need not turn"),
         ("table_b", "rotation_distance: 8\nendstop_pin: PG10", "has an endstop_pin and a rotation_distance of 8, as a screw has"),
-        ("right_c", "rotation_distance: 40", "is the axis C like table_c"),
+        ("right_c", "rotation_distance: 40\n[manual_stepper table_a]", "is the axis C like table_c"),
     ],
 )
 def test_a_stepper_that_may_move_a_screw_or_a_belt_is_not_taken_for_the_tilt(name: str, numbers: str, sentence: str) -> None:
-    steppers = STEPPERS.partition("[manual")[0] + "[manual_stepper table_a]\n[manual_stepper table_c]\n"
+    steppers = STEPPERS.partition("[manual")[0] + "[manual_stepper table_c]\n"
     registered = "[gcode_macro AXES]\ngcode:\n  MANUAL_STEPPER STEPPER=z_axis GCODE_AXIS=U\n"
     told = found(GIMBAL, f"{steppers}[manual_stepper {name}]\n{numbers}\n{registered}")
     with pytest.raises(ProfileError, match=rf"^printer.cfg: \[manual_stepper {name}\] {sentence}, .*: --base NAME"):

@@ -73,6 +73,13 @@ def test_what_a_host_puts_before_a_line_does_not_matter() -> None:
     assert found(hosted).axes == found(LOG).axes
 
 
+def test_what_a_person_has_written_behind_a_line_does_not_matter() -> None:
+    noted = "\n".join(
+        f"{line}   #{line.split()[0]} - M203 set" if line.startswith("echo:  M") else line for line in LOG.splitlines()
+    )
+    assert found(noted).axes == found(LOG).axes
+
+
 def test_of_several_extruders_the_first_counts() -> None:
     log = LOG.replace(" C90.00 E40.00", " C90.00\necho:  M203 T0 E31.00\necho:  M203 T1 E62.00")
     assert found(log).settings["extruder_speed_mm_s"].value == 31.0

@@ -78,6 +78,12 @@ def test_nothing_says_that_u_and_v_turn_until_r1_or_a_base_does() -> None:
     assert found(config.replace("E0.5", "R1 E0.5"), speeds).rotary == "UV"
 
 
+def test_the_lock_of_a_tool_changer_is_left_alone_where_b_and_c_turn() -> None:
+    proposal = propose(found(CRADLE.replace("E0.5", "U0.6 E0.5")))
+    assert [proposal.values[f"machine.{axis}.letter"].value for axis in ("tilt", "turn")] == ["B", "C"]
+    assert any(remark.startswith("U is left alone") for remark in proposal.remarks)
+
+
 @pytest.mark.parametrize(("command", "named"), [("M669 K13", "K13"), ("M669 K1\nM669 K9 S100", "K9")])
 def test_kinematics_that_are_not_known_are_refused(command: str, named: str) -> None:
     with pytest.raises(ProfileError, match=f"^config.g: M669 is '{named}': how that moves X, Y, Z"):
