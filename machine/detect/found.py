@@ -100,6 +100,6 @@ def has_box(kinematics: str, source: str) -> bool:
     if kinematics not in KINEMATICS:
         raise ProfileError(
             f"{source} is {kinematics!r}: how that moves X, Y, Z, tilt and turn is not known here; copy the nearest profile and "
-            "write the letters and numbers of its axes yourself (docs/profiles.md, Adding a machine)"
+            "write machine.tilt and machine.turn yourself (docs/profiles.md, Adding a machine)"
         )
     return KINEMATICS[kinematics]
