@@ -42,6 +42,15 @@ def state_folder() -> Path:
     return folder
 
 
+def state_folders() -> tuple[Path, ...]:
+    """The folders that state_folder() chooses among, the best first, whether or not they exist or can be written now."""
+    folders = []
+    with suppress(OutputError):
+        for folder in _candidates("state"):
+            folders.append(folder)
+    return tuple(folders)
+
+
 def lost_at_end() -> Path | None:
     """The folder that goes with this run, when it has one."""
     return _of_this_run() if _of_this_run.cache_info().currsize else None

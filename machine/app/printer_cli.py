@@ -86,7 +86,7 @@ def resume(
     *,
     port: Annotated[str | None, typer.Option("--port", metavar="PORT", help="serial port")] = None,
     baud: options.Baud = BAUD,
-    yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="go on without asking, where nothing is in doubt")] = False,
     watch: options.Watch = False,
     watch_port: options.WatchPort = None,
     no_browser: options.NoBrowser = False,

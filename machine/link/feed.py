@@ -62,6 +62,7 @@ class Feed:
         self._barriers, self._reconnected = Barriers(self.modal.axes.letters, start_s), False
         self._pause: Pause | None = None  # the one under way
         self._start_s = self._shown_s = self._asked_s = start_s
+        self._warned = ""  # the warning that was shown last
 
     @property
     def acknowledged(self) -> int:
@@ -245,7 +246,7 @@ class Feed:
         wanted = self._pending.pause_s is not None
         self._pending.poll(self.state, now_s)
         changed = self._pending.message != message or (self._pending.pause_s is not None) != wanted
-        if now_s - self._shown_s >= PROGRESS_S or changed:
+        if now_s - self._shown_s >= PROGRESS_S or changed or self._warning() != self._warned:
             self.show(now_s)
 
     def heed_emergency(self) -> None:
@@ -295,7 +296,7 @@ class Feed:
 
     def show(self, now_s: float) -> None:
         """Report the progress."""
-        self._shown_s = now_s
+        self._shown_s, self._warned = now_s, self._warning()
         if self._on_progress is None:
             return
         at, history, feed_percent = self._position, self.history, self._pending.feed_percent
@@ -312,8 +313,12 @@ class Feed:
                 file_line=history.acknowledged,
                 feed_percent=feed_percent, flow_percent=self._pending.flow_percent,
                 message=self._pending.message or self._trouble or self.reports.waiting or self._silence(),
+                warning=self._warned,
             )
         )  # fmt: skip
+
+    def _warning(self) -> str:
+        return self._journal.warning if self._journal is not None else ""
 
     def _silence(self) -> str:
         """Said while an answer is overdue; a slow command may take its time."""

@@ -1,8 +1,15 @@
 """Journal: how far a print has come, on disk, so that another run can go on where this one was cut off.
 
-A file of lines: eight hexadecimal digits of a CRC-32, a blank, a JSON value. The first holds what is printed and for which
-machine, every other one a state of its own, so that the last good one is enough. Lines are only ever appended, each in one piece.
-The file is locked as long as its print runs; the system lets go of it when the program dies, however it does.
+A file of lines: eight hexadecimal digits of a CRC-32, a blank, a JSON value. The first, padded to whole blocks, holds what is
+printed and for which machine. SLOTS more of one block each hold states of the print; the highest number is that of the newest.
+The file has its full size, on the disk, before the print begins, and records are overwritten in place: a disk that fills up later
+loses none. The slot changes with each fsync, so that the disk always holds a whole record.
+
+A journal is trusted only when its newest record is the newest of its print. The first record that cannot be written or synced is
+therefore final: the journal is marked as incomplete (incomplete_mark.py) and cannot be read any more. A computer that restarts
+loses what was not yet on the disk; `computer_ran_on` tells whether that can have happened.
+
+The file is locked as long as its print runs; the system releases the lock when the program dies, however it does.
 """
 
 import errno
@@ -10,13 +17,23 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from os.path import isdir, isfile, lexists
 from pathlib import Path
 from typing import Any, Self
+from uuid import uuid4
 from zlib import crc32
 
+from machine.link.incomplete_mark import (
+    BINARY,
+    MARK,
+    is_at,
+    is_noted_incomplete,
+    mark_incomplete,
+    note_incomplete,
+    write_at,
+)
 from profiles.errors import JournalError, OutputError, reason
 
 try:
@@ -26,17 +43,18 @@ except ImportError:  # Windows
 if sys.platform == "win32":
     import msvcrt
 
-FORMAT = 2  # in 1 the height or the table might have changed after the line that was recorded last
+FORMAT = 3  # in 2 a full disk ended the journal without a trace, in 1 the newest record might lack a change of height
 PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
 EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest record,
 EVERY_S = 0.1  # which is not older than this when something has happened since
-SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
-LONGEST_BYTES = 1_000_000  # of one record; the first one holds the resolved profile
+SYNC_S = 1.0  # between syncs; the disk is older by this and the time of an fsync when the computer restarts
+BLOCK_BYTES = 4096  # a disk writes a block whole or leaves it damaged, but its neighbour as it was
+SLOTS = 3  # one on its way to the disk, one being written, one safe
+LONGEST_BYTES = 1_000_000  # of the heading, which holds the resolved profile
 BEYOND_MM = 1e9  # and deg: no machine has such a place, and no filament such a length
 LOCKED_BYTE = 1 << 30  # on Windows, where nobody else can read what is locked: far behind the end, which LockFileEx allows
 PRIVATE = 0o600  # what a person prints concerns nobody else
-# Windows would write carriage returns into a file that is not opened as binary.
-_FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | getattr(os, "O_BINARY", 0)
+BOOT_ID = Path("/proc/sys/kernel/random/boot_id")  # of Linux
 
 
 @dataclass(frozen=True)
@@ -66,12 +84,17 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class JournalContents:
-    """A journal that was read: its heading, its last checkpoint, how many records a torn end has cost, and where that begins."""
+    """A journal that was read: its heading and its newest checkpoint.
+
+    torn: records that a power cut of the computer has damaged. records: number of the newest one, from 1; 0 when nothing was
+    recorded. computer_ran_on: the computer has surely not restarted since the print began, so all that was recorded is there.
+    """
 
     heading: JournalHeading
     last: Checkpoint
     torn: int
-    whole_bytes: int
+    records: int
+    computer_ran_on: bool
 
     @property
     def finished(self) -> bool:
@@ -88,26 +111,43 @@ class JournalContents:
 class Journal:
     """`with Journal(path, heading) as journal:` update() as often as wished, write() what must not be lost.
 
-    Writing costs one system call a record; a thread of its own brings the file to the disk, so that a slow disk never holds up
-    the line. A journal that can no longer be written ends silently, `trouble` says why. Raises OutputError when it cannot be
-    begun.
+    A record costs one write; a thread of its own brings the file to the disk, so that a slow disk never holds up the line.
+    `trouble` is "" as long as every record was written and synced, then what has happened to the journal; the print goes on.
+    Raises OutputError when the journal cannot be begun.
     """
 
     def __init__(self, path: Path, heading: JournalHeading) -> None:
         self.path, self.trouble = path, ""
         self.last = Checkpoint()
-        self._noted_s = 0.0
+        self._key, self._noted_s = uuid4().hex, 0.0
+        self._records = self._slot = 0
+        self._unsynced = self._marked = False  # marked: so that nobody can resume from what is incomplete
+        self._writing, self._syncing = threading.Lock(), threading.Lock()
         self._dirty, self._hurry, self._end = threading.Event(), threading.Event(), threading.Event()
+        values = {"format": FORMAT, "key": self._key, "boot": boot_id()} | asdict(heading)
+        self._heading = _record(values, BLOCK_BYTES)
         try:
-            self._file = os.open(path, _FLAGS, PRIVATE)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | BINARY, PRIVATE)
         except FileExistsError:
             raise OutputError(f"journal {path} exists already: each print has one of its own, choose another name") from None
         except OSError as error:
             raise OutputError(f"journal {path} cannot be written: {reason(error)}") from None
         lock(self._file)  # before the heading: whoever can read that sees the lock
-        self._write({"format": FORMAT} | asdict(heading))
+        try:
+            write_at(self._file, 0, self._heading + SLOTS * _record(_as_list(0, self.last), BLOCK_BYTES))
+            os.fsync(self._file)
+        except OSError as error:
+            os.close(self._file)
+            with suppress(OSError):
+                path.unlink()
+            raise OutputError(f"journal {path} cannot be written: {reason(error)}") from None
         self._sync_thread = threading.Thread(target=self._sync, name="journal", daemon=True)
         self._sync_thread.start()
+
+    @property
+    def warning(self) -> str:
+        """The same as a sentence for the person at the print."""
+        return f"this print can no longer be resumed: {self.trouble}" if self.trouble else ""
 
     def update(self, checkpoint: Checkpoint, now_s: float) -> None:
         """Write a checkpoint when the newest record is old."""
@@ -122,19 +162,47 @@ class Journal:
     def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
         """Write a checkpoint at once; hurry: to the disk, too, for a computer may lose its power with its printer."""
         self.last = checkpoint
-        self._write(_as_list(checkpoint))
+        with self._writing:
+            if self.trouble or self._end.is_set():
+                return
+            self._records += 1
+            self._unsynced = True
+            try:
+                record = _record(_as_list(self._records, checkpoint), BLOCK_BYTES)
+                write_at(self._file, len(self._heading) + self._slot * BLOCK_BYTES, record)
+            except OSError as error:
+                self._fail(f"cannot be written: {reason(error)}")
+        self._dirty.set()
         if hurry:
             self._hurry.set()
 
+    def settle(self) -> str:
+        """Bring everything to the disk now; returns the trouble, "" when there is none."""
+        self._to_disk()
+        return self.trouble
+
+    def abandon(self) -> None:
+        """Close and delete the journal of a print that has not begun; where it cannot be deleted nobody can resume from it."""
+        with self._writing:
+            self._fail("was abandoned")
+        self.close()
+        with suppress(OSError):
+            self.path.unlink()
+
     def close(self) -> None:
-        """Bring everything to the disk and end."""
-        if not self._end.is_set():
-            self._end.set()
-            self._dirty.set()
-            self._hurry.set()
-            self._sync_thread.join()
-            self._to_disk()
+        """Bring everything to the disk and end; from then on `trouble` is final."""
+        if self._end.is_set():
+            return
+        self._end.set()
+        self._dirty.set()
+        self._hurry.set()
+        self._sync_thread.join()
+        self._to_disk()
+        try:
             os.close(self._file)
+        except OSError as error:
+            self._end_promise(f"cannot be written: {reason(error)}")
+            self._distrust(None)
 
     def __enter__(self) -> Self:
         return self
@@ -142,31 +210,66 @@ class Journal:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def _write(self, value: Any) -> None:
-        if self.trouble or self._end.is_set():
-            return
-        record = _record(value)
-        try:
-            if os.write(self._file, record) < len(record):
-                self.trouble = "the disk is full"
-        except OSError as error:
-            self.trouble = reason(error)
-        self._dirty.set()
-
     def _sync(self) -> None:
         """fsync once a second, or in a hurry, in a thread: an SD card may take longer over it than a printer waits."""
         while not self._end.is_set():
-            self._dirty.wait()
+            self._dirty.wait(SYNC_S)
             self._dirty.clear()
             self._hurry.clear()
             self._to_disk()
-            self._hurry.wait(SYNC_S)
+            if not self._end.is_set():
+                self._hurry.wait(SYNC_S)
 
     def _to_disk(self) -> None:
+        with self._syncing:
+            if not self.trouble:
+                with self._writing:
+                    unsynced, self._unsynced = self._unsynced, False
+                    if unsynced:  # what is on its way to the disk is not written to, nor what is the newest there
+                        self._slot = (self._slot + 1) % SLOTS
+                if why := self._sync_trouble(unsynced):
+                    with self._writing:
+                        self._fail(why)
+            if self.trouble and not self._marked:
+                self._distrust(self._file)
+
+    def _sync_trouble(self, unsynced: bool) -> str:
         try:
-            os.fsync(self._file)
+            if unsynced:
+                os.fsync(self._file)
         except OSError as error:
-            self.trouble = self.trouble or reason(error)
+            return f"cannot be written: {reason(error)}"
+        return "" if is_at(self.path, self._file) else "was deleted, moved or replaced"
+
+    def _fail(self, why: str) -> None:
+        """The first failure is final: after a failed fsync Linux drops what it could not write, and reports success again."""
+        if self.trouble:
+            return
+        self._end_promise(why)
+        try:  # before another line is sent; the thread brings it to the disk
+            write_at(self._file, 0, MARK)
+        except OSError:
+            note_incomplete(self._key)
+        self._dirty.set()
+        self._hurry.set()
+
+    def _end_promise(self, why: str) -> None:
+        self.trouble = self.trouble or f"journal {self.path} {why}"
+
+    def _distrust(self, descriptor: int | None) -> None:
+        """Mark the journal; tried again each second, for a stick may come back."""
+        noted = note_incomplete(self._key)
+        self._marked = mark_incomplete(self.path, descriptor, self._heading)
+        warning = "; that could not be noted anywhere: delete it, and never resume from it"
+        if not self._marked and not noted and not self.trouble.endswith(warning):
+            self.trouble += warning
+
+
+def boot_id() -> str:
+    """Names the time since the computer was started; "" where the system does not tell."""
+    with suppress(OSError, ValueError):
+        return BOOT_ID.read_text(encoding="ascii").strip()
+    return ""
 
 
 def is_being_printed(path: Path) -> bool:
@@ -192,58 +295,77 @@ def lock(descriptor: int, shared: bool = False) -> bool:
 
 
 def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
-    """Note in a journal which one goes on with its print; a torn end is cut off. Raises JournalError."""
+    """Note in a journal which one goes on with its print. contents: as it was read. Raises JournalError, also when the journal
+    has changed since.
+    """
+    if read_journal(path) != contents:
+        raise JournalError(f"journal {path} has changed since it was read: its print was resumed elsewhere")
+    resumed = replace(contents.last, state=f"{RESUMED}{rest}")
     try:
-        with path.open("r+b") as file:
-            file.truncate(contents.whole_bytes)
-            file.seek(0, os.SEEK_END)
-            file.write(_record(_as_list(replace(contents.last, state=f"{RESUMED}{rest}"))))
-            file.flush()
+        record = _record(_as_list(contents.records + 1, resumed), BLOCK_BYTES)
+        if len(record) > BLOCK_BYTES:
+            raise JournalError(f"journal {path} cannot note a path as long as that of {rest}")
+        with path.open("r+b", buffering=0) as file:
+            heading = file.readline(LONGEST_BYTES)
+            slots = [_value(file.read(BLOCK_BYTES)) for _ in range(SLOTS)]
+            oldest = min(range(SLOTS), key=lambda slot: slots[slot][0] if slots[slot] is not None else -1)
+            write_at(file.fileno(), len(heading) + oldest * BLOCK_BYTES, record)
             os.fsync(file.fileno())
     except OSError as error:
         raise JournalError(f"journal {path} cannot be written: {reason(error)}") from None
 
 
-def _record(value: Any) -> bytes:
+def _record(value: Any, block_bytes: int) -> bytes:
+    """A line of whole blocks, filled with blanks."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
+    text = text.ljust(-(-(len(text) + 10) // block_bytes) * block_bytes - 10)
     return b"%08x %s\n" % (crc32(text), text)
 
 
-def _as_list(checkpoint: Checkpoint) -> list[Any]:
-    return [checkpoint.sent, checkpoint.acknowledged, checkpoint.executed, checkpoint.number, checkpoint.pose, checkpoint.state]
+def _as_list(number: int, checkpoint: Checkpoint) -> list[Any]:
+    lines = [checkpoint.sent, checkpoint.acknowledged, checkpoint.executed, checkpoint.number]
+    return [number, *lines, checkpoint.pose, checkpoint.state]
 
 
 def read_journal(path: Path) -> JournalContents:
-    """The contents of a journal. Raises JournalError with one sentence when it is none, or damaged before its end."""
-    heading: JournalHeading | None = None
-    last, bad, whole_bytes = Checkpoint(), 0, 0
-    for number, (value, size) in enumerate(_records(path), 1):
-        whole_bytes += size if value is not None else 0
-        if value is None:
-            bad += 1
-        elif bad:
-            raise JournalError(f"journal {path} is damaged: record {number - bad} of it cannot be read although later ones can")
-        elif heading is None:
-            heading = _heading(path, value)
-        else:
-            last = _checkpoint(path, value, number)
-        if heading is None:
-            raise JournalError(f"{path} is no journal of a print: its first line is not the heading of one")
-    if heading is None:
-        raise JournalError(f"journal {path} is empty")
-    return JournalContents(heading, last, bad, whole_bytes)
+    """The contents of a journal. Raises JournalError with one sentence when it is none, is damaged or is marked as incomplete."""
+    first, slots = _read(path)
+    if first.startswith(MARK) and first[8:10] == b" {":
+        raise _incomplete(path)
+    values = _value(first)
+    if values is None:
+        raise JournalError(f"{path} is no journal of a print: its first line is not the heading of one")
+    heading, key, boot = _heading(path, values)
+    if is_noted_incomplete(key):
+        raise _incomplete(path)
+    read = [_checkpoint(path, value, number) for number, value in enumerate(map(_value, slots), 1) if value is not None]
+    torn, ran_on = SLOTS - len(read), boot != "" and boot == boot_id()
+    if not read or (torn and ran_on):  # only a power cut of the computer tears a record that it was writing
+        raise JournalError(f"journal {path} is damaged: {torn} of its {SLOTS} records cannot be read")
+    records, last = max(read, key=lambda record: record[0])
+    return JournalContents(heading, last, torn, records, ran_on)
 
 
-def _records(path: Path) -> Iterator[tuple[Any, int]]:
-    """The value and size of each line, None where its checksum is wrong, its end is missing or it is no JSON."""
+def _incomplete(path: Path) -> JournalError:
+    return JournalError(
+        f"journal {path} is incomplete: its print went on when the journal could not be written any more, so nobody knows how "
+        "far it came, and it cannot be resumed"
+    )
+
+
+def _read(path: Path) -> tuple[bytes, list[bytes]]:
+    """The heading, and the blocks of the records."""
     if lexists(path) and not isfile(path) and not isdir(path):  # a pipe would be waited for
         raise JournalError(f"journal {path} cannot be read: it is no file")
     try:
         with path.open("rb") as file:
-            while line := file.readline(LONGEST_BYTES):
-                yield _value(line), len(line)
+            first = file.readline(LONGEST_BYTES)
+            slots = [file.read(BLOCK_BYTES) for _ in range(SLOTS)]
     except OSError as error:
         raise JournalError(f"journal {path} cannot be read: {reason(error)}") from None
+    if not first:
+        raise JournalError(f"journal {path} is empty")
+    return first, slots
 
 
 def _value(line: bytes) -> Any:
@@ -256,20 +378,23 @@ def _value(line: bytes) -> Any:
         return None
 
 
-def _heading(path: Path, value: Any) -> JournalHeading:
+def _heading(path: Path, value: Any) -> tuple[JournalHeading, str, str]:
+    """The heading, the journal's key, and the boot of its computer."""
     if not isinstance(value, dict) or value.get("format") != FORMAT:
         raise JournalError(f"journal {path} is of another version of this program: this one reads format {FORMAT}")
     match value:
-        case {"program": str(program), "sha256": str(sha256), "name": str(name), "profile": dict(profile)}:
-            return JournalHeading(program, sha256, name, profile)
+        case {"key": str(key), "boot": str(boot), "program": str(program), "sha256": str(sha256), "name": str(name),
+              "profile": dict(profile)} if key.isascii() and key.isalnum():  # fmt: skip
+            return JournalHeading(program, sha256, name, profile), key, boot
     raise JournalError(f"journal {path} is damaged: its heading does not tell program and profile")
 
 
-def _checkpoint(path: Path, value: Any, number: int) -> Checkpoint:
+def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:
+    """A record's number, and what it tells."""
     match value:
-        case [int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(state)] if _is_pose(pose):
-            return Checkpoint(sent, acknowledged, executed, wire, tuple(pose), state)
-    raise JournalError(f"journal {path} is damaged: record {number} holds no state of a print")
+        case [int(number), int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(state)] if _is_pose(pose):
+            return number, Checkpoint(sent, acknowledged, executed, wire, tuple(pose), state)
+    raise JournalError(f"journal {path} is damaged: record {slot} holds no state of a print")
 
 
 def _is_pose(values: list[Any]) -> bool:

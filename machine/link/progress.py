@@ -20,8 +20,9 @@ class Progress:
     """A moment of a print. None: not known (yet).
 
     state: printing, pausing, paused, resuming, cancelling, finishing, reconnecting. file_line: line in the program's file of the
-    newest acknowledged command, from 1. message: the newest word to the person watching, "" when there is none. heat_age_s: since
-    the temperatures were reported.
+    newest acknowledged command, from 1. message: the newest word to the person watching, "" when there is none. warning: what
+    that person must know from now on, beside every message, "" when there is nothing. heat_age_s: since the temperatures were
+    reported.
     """
 
     elapsed_s: float
@@ -39,6 +40,7 @@ class Progress:
     feed_percent: float = 100.0
     flow_percent: float = 100.0
     message: str = ""
+    warning: str = ""
     heat_age_s: float = 0.0
 
     @property

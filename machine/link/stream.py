@@ -206,8 +206,13 @@ class _Print:
         return Heaters.HALTED if halted else heaters
 
     def _hint(self) -> str:
-        """How to go on with what is half printed."""
-        if self.journal is None or not self.feed.history.executed:
+        """How to go on with what is half printed, or that this is not possible; proved by closing the journal."""
+        if self.journal is None:
+            return ""
+        self.journal.close()
+        if self.journal.trouble:
+            return f"; {self.journal.warning}"
+        if not self.feed.history.executed:
             return ""
         return f"; tiltprint resume {self.journal.path} goes on with it"
 

@@ -28,12 +28,14 @@ def list_resumable() -> int:
 def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, yes: bool = False) -> int:
     """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
 
-    named: the profile whose machine the user has named. yes: go on without asking, unless the height of the tip is in doubt. The
-    journal of the request is a new one.
+    named: the profile whose machine the user has named. yes: go on without asking, unless the height of the tip is in doubt or
+    the newest records may be missing. The journal of the request is a new one. Raises JournalError and other UserErrors.
     """
     cut_off = read_resumption(journal, printing, named)
     for sentence in cut_off.sentences():
         say(sentence)
+    if yes and not cut_off.story.computer_ran_on:
+        raise JournalError(f"journal {journal}: a person must answer that question: resume at a terminal, without --yes")
 
     def agrees(question: str) -> bool:
         say_lines(question)

@@ -51,6 +51,10 @@ from machine.reader.gcode_file import GcodeFile
 from profiles.errors import JournalError, ProfileError
 from profiles.profile import Profile, profile_of_tables
 
+RESTARTED = (
+    "this computer may have restarted since the print began, so the newest records may be missing: see that the print is no "
+    "higher than this, and that tip and table stand as told here, before you go on"
+)
 NOTHING, STOPPED = 1, 130  # what a resume ends with besides 0: the answer was no; a person has stopped the rest
 
 
@@ -82,7 +86,8 @@ class Resumption:
         return (
             f"{self.name}, {', '.join([*where, f'line {self.point.line} of {len(self.lines)}'])}",
             f"surely executed: up to line {self.point.line - 1}" + (f", at {', '.join(known)}" if known else ""),
-            *([f"the journal's end is torn: {torn} of its records could not be read"] if torn else []),
+            *([f"{torn} of the journal's records could not be read: a power cut has torn them"] if torn else []),
+            *([] if self.story.computer_ran_on else [RESTARTED]),
         )
 
 
@@ -92,11 +97,11 @@ def read_resumption(journal: Path, printing: PrintRequest, named: Profile | None
     if printing.port == SIMULATED:
         raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
     check_no_server(printing.port)
-    story = read_journal(journal)
-    if is_being_printed(journal):
+    if is_being_printed(journal):  # asked first: what is read after that does not change any more
         raise JournalError(
             f"journal {journal}: its print runs now, in another terminal or page: it can be resumed when it has ended"
         )
+    story = read_journal(journal)
     profile = _profile(journal, story.heading, named)
     check_dialect(profile.machine)
     text = _program(journal, story)
@@ -133,10 +138,7 @@ def print_rest(
                 way = plan_resume(point, status, cut_off.profile)
             if not agrees(_question(way, point, cut_off.profile)):
                 raise CancelledError
-            # From here on the printer counts its lines anew: only the new journal can tell whether it has restarted.
-            done = way.start.line - 1
-            further.write(replace(cut_off.story.last, sent=done, acknowledged=done, executed=done))
-            mark_resumed(cut_off.journal, cut_off.story, further.path)
+            _hand_over(cut_off, further, way.start.line - 1)
             return way.start
 
         with (
@@ -154,13 +156,28 @@ def print_rest(
 @contextmanager
 def _further_journal(cut_off: Resumption, printing: PrintRequest) -> Iterator[Journal]:
     """The journal of the rest; one that tells nothing is not left, for it would let the whole program begin anew."""
-    further = continue_journal(cut_off.text, cut_off.profile, cut_off.name, printing.journal)
-    try:
-        with further:
+    with continue_journal(cut_off.text, cut_off.profile, cut_off.name, printing.journal) as further:
+        try:
             yield further
-    finally:
-        if further.last == Checkpoint():
-            further.path.unlink(missing_ok=True)
+        finally:
+            if further.last == Checkpoint():
+                further.abandon()
+
+
+def _hand_over(cut_off: Resumption, further: Journal, done: int) -> None:
+    """Before the rest begins: the new journal takes over on the disk, then the old one says so. From here on the printer counts
+    its lines anew: only the new journal can tell whether it has restarted. done: lines of the program that are not repeated.
+
+    Raises JournalError when one of them cannot be written; then nothing has moved, and only the old one can be resumed.
+    """
+    further.write(replace(cut_off.story.last, sent=done, acknowledged=done, executed=done))
+    try:
+        if trouble := further.settle():
+            raise JournalError(f"{trouble}; nothing was moved or heated")
+        mark_resumed(cut_off.journal, cut_off.story, further.path)
+    except JournalError:
+        further.abandon()
+        raise
 
 
 def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> Profile:

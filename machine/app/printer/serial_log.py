@@ -58,7 +58,10 @@ class SerialLog:
                 self._write(f"{self._stamp(time.time())} {direction} {_readable(line)} (unfinished)\n")
         self._torn = {">": b"", "<": b""}
         if self._out is not None:
-            self._out.close()
+            try:
+                self._out.close()
+            except OSError as error:
+                self._fail(error)
             self._out = None
 
     def __enter__(self) -> Self:

@@ -155,15 +155,22 @@ def _pointing_to(log: SerialLog) -> Iterator[None]:
 
 
 def _point_to(log: SerialLog) -> None:
-    if not log.trouble:
+    """Say where the log is, and whether it is whole; it ends here."""
+    log.close()
+    if log.trouble:
+        say(f"what was sent and received is not wholly in {log.file}: {log.trouble}")
+    else:
         say(f"all that was sent and received is in {log.file}")
 
 
 def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal | None = None) -> int:
-    """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one.
-
-    130 when a person stopped it.
+    """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one, or
+    that this is not possible. Closes the journal first: only what is on the disk is promised. 130 when a person stopped it.
     """
+    if journal is not None:
+        journal.close()
+        if journal.trouble:
+            say(journal.warning)
     for warning in outcome.warnings:
         say(f"the printer said: {warning}")
     if outcome.warnings and log is not None:
@@ -171,7 +178,7 @@ def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal 
     if outcome.cancelled:
         heaters = f"{Heaters.HALTED.value}: {outcome.halted}" if outcome.halted else HEATERS[outcome.heaters_off]
         say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
-        if journal is not None and journal.last.executed:
+        if journal is not None and journal.last.executed and not journal.trouble:
             say(f"tiltprint resume {journal.path} goes on with it")
         return 130
     summary = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 LAST_WORD_S = 2.0  # a page that is open asks twice in this time, so it sees how the print ended
 GRACE_S = 1  # for answers under way when the print ends
-TOLD = ("acknowledged", "total", "share", "elapsed_s", "left_s", "part", "layer", "message")
+TOLD = ("acknowledged", "total", "share", "elapsed_s", "left_s", "part", "layer", "message", "warning")
 FRAMED = {"Content-Security-Policy": "frame-ancestors 'none'"}
 ORDERS = {
     "pause": Command.PAUSE,

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 from machine.app.terminal.keys import Keyboard, can_type, typing
 from machine.app.terminal.printer_messages import PrinterMessages
-from machine.app.terminal.progress import PlainLines, is_terminal
+from machine.app.terminal.progress import PlainLines, is_terminal, say
 from machine.app.terminal.screen import Screen
 from machine.dryrun.timeline import Timeline
 from machine.link.progress import Progress
@@ -62,9 +62,12 @@ class _StatusLines:
     """Plain lines: one every few seconds, and at once when something has changed."""
 
     def __init__(self) -> None:
-        self._lines, self._last = PlainLines(), ("printing", "")
+        self._lines, self._last, self._warning = PlainLines(), ("printing", ""), ""
 
     def __call__(self, progress: Progress) -> None:
+        if progress.warning != self._warning:
+            self._warning = progress.warning
+            say(progress.warning)
         before, self._last = self._last, (progress.state, progress.message)
         self._lines.show(status(progress), at_once=before != self._last)
 

@@ -37,7 +37,10 @@ class ScreenState:
 def render(state: ScreenState, now: datetime) -> RenderableType:
     """The whole screen at a moment."""
     progress = state.progress
-    lines = [_head(state), _position(state), _heat(progress), _bar(progress), _times(progress, now), *_words(state.words)]
+    lines = [_head(state), _position(state), _heat(progress), _bar(progress), _times(progress, now)]
+    if progress.warning:
+        lines.append(Text(plain_line(progress.warning), style="bold red"))
+    lines += _words(state.words)
     if state.hint or state.keys:
         lines.append(Text(plain_line(state.hint or KEYS), style="bold yellow" if state.hint else "dim"))
     return Group(*lines)

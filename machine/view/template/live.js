@@ -54,5 +54,6 @@ function liveTold(told) {
     told.heat_is_old && told.nozzle_c != null && "as last known",
     told.left_s && `${duration(told.left_s)} left`,
     told.message,
+    told.warning,
   ].filter(Boolean).join(" · ");
 }

@@ -1,18 +1,19 @@
-"""The journal: records that survive a torn end, what is surely executed, bounded cost."""
+"""The journal: whole records whatever a power cut tears, what is surely executed, bounded cost."""
 
 import json
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from zlib import crc32
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.app.printer.journal_folder import KEPT, new_journal
 from machine.link import journal as journal_module
-from machine.link.journal import EVERY_LINES, Checkpoint, Journal, JournalHeading, mark_resumed, read_journal
+from machine.link.journal import BLOCK_BYTES, EVERY_LINES, SLOTS, Checkpoint, Journal, JournalHeading, mark_resumed, read_journal
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import JournalError, OutputError
 from profiles.profile import load
@@ -39,44 +40,84 @@ def test_what_was_marked_is_read_back(tmp_path: Path) -> None:
 
 def test_every_record_is_one_checked_line_of_text(tmp_path: Path) -> None:
     lines = written(tmp_path / "j", [at(16), at(32)]).read_bytes().splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 1 + SLOTS
     for line in lines:
         assert line[:8] == b"%08x" % crc32(line[9:])
         json.loads(line[9:])
 
 
-@given(cut=st.integers(0, 400))
-def test_a_torn_end_costs_only_what_is_torn(tmp_path_factory: pytest.TempPathFactory, cut: int) -> None:
-    path = written(tmp_path_factory.mktemp("torn") / "j", [at(16 * k) for k in range(1, 9)])
+@pytest.fixture
+def restarted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[], None]:
+    """Restarts the computer, as far as its journals can tell."""
+    boot = tmp_path / "boot"
+    boot.write_text("first\n")
+    monkeypatch.setattr(journal_module, "BOOT_ID", boot)
+    return lambda: monkeypatch.setattr(journal_module, "BOOT_ID", tmp_path / "boot that nobody knows")
+
+
+def damage(path: Path, slot: int, content: bytes) -> None:
     whole = path.read_bytes()
-    left = whole[: max(len(whole) - cut, whole.index(b"\n") + 1)]
-    path.write_bytes(left)
-    records = left.count(b"\n") - 1
-    assert read_journal(path).last == (at(16 * records) if records else Checkpoint())
+    begin = len(whole) - (SLOTS - slot) * BLOCK_BYTES
+    path.write_bytes(whole[:begin] + content + whole[begin + len(content) :])
 
 
-def test_a_disk_that_left_zeros_at_the_end_costs_only_the_end(tmp_path: Path) -> None:
+@settings(max_examples=40)
+@given(records=st.integers(0, 7), slot=st.integers(0, SLOTS - 1), content=st.binary(min_size=1, max_size=BLOCK_BYTES))
+def test_a_power_cut_that_tears_a_record_leaves_one_before_it(
+    tmp_path_factory: pytest.TempPathFactory, records: int, slot: int, content: bytes
+) -> None:
+    path = tmp_path_factory.mktemp("torn") / "j"
+    with pytest.MonkeyPatch.context() as monkeypatch, Journal(path, HEADING) as journal:
+        monkeypatch.setattr(journal_module, "boot_id", lambda: "")
+        for line in range(16, 16 * records + 1, 16):
+            journal.write(at(line))
+            journal.settle()
+            journal.settle()  # with nothing new, as in a long pause
+        damage(path, slot, b"!" + content[1:])
+        story = read_journal(path)
+    assert (story.torn, story.last in [at(16 * records), at(16 * records - 16), Checkpoint()]) == (1, True)
+    assert story.last.acknowledged >= 16 * records - 16
+
+
+def test_a_torn_record_is_damage_where_the_computer_has_not_restarted(tmp_path: Path, restarted: Callable[[], None]) -> None:
     path = written(tmp_path / "j", [at(16), at(32)])
-    path.write_bytes(path.read_bytes() + bytes(3000))
-    story = read_journal(path)
-    assert (story.last, story.torn) == (at(32), 1)
-
-
-@pytest.mark.parametrize("index", [0, 1, 2])
-def test_a_record_damaged_before_the_end_is_refused_by_its_number(tmp_path: Path, index: int) -> None:
-    path = written(tmp_path / "j", [at(16), at(32), at(48)])
-    lines = path.read_bytes().splitlines(keepends=True)
-    lines[index] = lines[index].replace(b"1", b"2").replace(b"0", b"1")
-    path.write_bytes(b"".join(lines))
-    with pytest.raises(JournalError, match=r"is no journal|damaged: record 2|damaged: record 3"):
+    damage(path, 0, b"torn")
+    with pytest.raises(JournalError, match="is damaged: 1 of its 3 records cannot be read"):
         read_journal(path)
+    restarted()
+    assert read_journal(path).torn == 1
+
+
+def test_a_journal_tells_whether_its_computer_has_restarted_since(tmp_path: Path, restarted: Callable[[], None]) -> None:
+    path = written(tmp_path / "j", [at(16)])
+    assert read_journal(path).computer_ran_on
+    restarted()
+    assert not read_journal(path).computer_ran_on
+
+
+@pytest.mark.parametrize("size", [BLOCK_BYTES, 3 * BLOCK_BYTES - 1, 0])
+def test_a_journal_without_its_end_is_refused(tmp_path: Path, size: int) -> None:
+    path = written(tmp_path / "j", [at(16), at(32)])
+    path.write_bytes(path.read_bytes()[:size])
+    with pytest.raises(JournalError, match=r"is damaged|is empty"):
+        read_journal(path)
+
+
+def test_a_journal_never_grows(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", HEADING) as journal:
+        before = journal.path.stat()
+        for line in range(1000):
+            journal.write(at(line))
+        after = journal.path.stat()
+    assert (after.st_size, after.st_blocks) == (before.st_size, before.st_blocks)
 
 
 @pytest.mark.parametrize(("content", "words"), [
     (b"", "is empty"),
     (b"G28\nG1 X5\n", "is no journal of a print"),
     (b"%08x {}\n" % crc32(b"{}"), "another version"),
-    (b'%08x {"format":2}\n' % crc32(b'{"format":2}'), "does not tell program and profile"),
+    (b'%08x {"format":2}\n' % crc32(b'{"format":2}'), "another version of this program: this one reads format 3"),
+    (b'%08x {"format":3}\n' % crc32(b'{"format":3}'), "does not tell program and profile"),
     (os.urandom(5000), "is no journal"),
 ])  # fmt: skip
 def test_what_is_no_journal_is_refused_with_a_sentence(tmp_path: Path, content: bytes, words: str) -> None:
@@ -105,7 +146,7 @@ def test_notes_are_taken_ten_times_a_second(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", HEADING) as journal:
         for step in range(1, 101):
             journal.update(at(step), 0.1 + step / 100)
-    assert len((tmp_path / "j").read_bytes().splitlines()) == 1 + 10
+    assert read_journal(tmp_path / "j").records == 10
 
 
 def test_the_sender_is_never_sixteen_lines_ahead_of_the_record(tmp_path: Path) -> None:
@@ -134,15 +175,31 @@ def test_nothing_new_is_not_noted(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", HEADING) as journal:
         for second in range(100):
             journal.update(at(3), float(second))
-    assert len((tmp_path / "j").read_bytes().splitlines()) == 2
+    assert read_journal(tmp_path / "j").records == 1
 
 
-def test_a_resumed_journal_names_the_one_that_goes_on_even_after_a_torn_end(tmp_path: Path) -> None:
-    path = written(tmp_path / "j", [at(16), at(32)])
-    path.write_bytes(path.read_bytes() + b"0123abcd [4")
-    mark_resumed(path, read_journal(path), tmp_path / "rest")
-    story = read_journal(path)
-    assert (story.continued_in, story.last.executed, story.torn) == (str(tmp_path / "rest"), 16, 0)
+@given(records=st.integers(0, 7))
+def test_a_resumed_journal_names_the_one_that_goes_on(tmp_path_factory: pytest.TempPathFactory, records: int) -> None:
+    path = written(tmp_path_factory.mktemp("resumed") / "j", [at(16 * k) for k in range(1, records + 1)])
+    before = read_journal(path)
+    mark_resumed(path, before, Path("rest"))
+    after = read_journal(path)
+    assert (after.continued_in, after.last.executed) == ("rest", before.last.executed)
+
+
+def test_a_journal_that_was_resumed_elsewhere_meanwhile_is_not_resumed_again(tmp_path: Path) -> None:
+    path = written(tmp_path / "j", [at(16)])
+    read = read_journal(path)
+    mark_resumed(path, read, tmp_path / "rest")
+    with pytest.raises(JournalError, match="has changed since it was read"):
+        mark_resumed(path, read, tmp_path / "another")
+
+
+def test_a_path_too_long_for_a_record_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path / "j", [at(16)])
+    with pytest.raises(JournalError, match="cannot note a path as long as that"):
+        mark_resumed(path, read_journal(path), Path("x" * BLOCK_BYTES))
+    assert read_journal(path).last == at(16)
 
 
 def test_the_program_of_a_model_is_kept_beside_its_journal(tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ class _Shown:
         words = tuple(plain_line(word) for word in self._words.last)
         self._moments += 1
         moment = moment_of(progress, self._timeline) | {"moment": self._moments}
-        self._reporter.tell(phase=phase, progress=moment, words=words)
+        self._reporter.tell(phase=phase, progress=moment, words=words, **({"journal": ""} if progress.warning else {}))
 
 
 def moment_of(progress: Progress, timeline: Timeline) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from machine.app.commands.resume import list_resumable
 from machine.app.printer.journal_folder import new_journal, resumable_journals
 from machine.app.printer.resumption import read_resumption
 from machine.app.requests import PrintRequest
-from machine.link.journal import FORMAT
+from machine.link.journal import BLOCK_BYTES, FORMAT, SLOTS
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import UserError
 from profiles.folders import state_folder
@@ -32,13 +32,13 @@ SCALARS = (
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9) | st.sampled_from(["\0", "\ud800", "x" * 999])
 )
 ODD = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=7) | st.dictionaries(st.text(max_size=9), inner), max_leaves=9)
-KEYS = ("format", "program", "sha256", "name", "profile", "more")
-STATES = ODD | st.lists(ODD, min_size=6, max_size=6) | st.just([20, 20, 10, 20, [], "printing"])
+KEYS = ("format", "key", "boot", "program", "sha256", "name", "profile", "more")
+STATES = ODD | st.lists(ODD, min_size=7, max_size=7) | st.just([1, 20, 20, 10, 20, [], "printing"])
 DEEP = b"[" * 100_000
 
 
-def record(value: Any) -> bytes:
-    text = value if isinstance(value, bytes) else json.dumps(value).encode()
+def record(value: Any, size: int = 0) -> bytes:
+    text = (value if isinstance(value, bytes) else json.dumps(value).encode()).ljust(size - 10)
     return b"%08x %s\n" % (crc32(text), text)
 
 
@@ -64,12 +64,14 @@ def test_a_journal_with_anything_at_all_in_its_heading_or_state_ends_nothing_wit
     changed = PROFILE | {of_profile: value} if key == "profile" and of_profile else value
     heading = {
         "format": FORMAT,
+        "key": "odd",
+        "boot": "",
         "program": str(program),
         "sha256": GcodeFile(program).sha256(),
         "name": "odd",
         "profile": PROFILE,
     }
-    is_no_bug(record(heading | {key: changed}) + record(state))
+    is_no_bug(record(heading | {key: changed}) + SLOTS * record(state, BLOCK_BYTES))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import socket
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from http.client import HTTPResponse
 from pathlib import Path
 
@@ -194,6 +195,12 @@ def test_a_print_that_fails_is_told_as_stopped() -> None:
     with pytest.raises(KeyboardInterrupt):
         next(print_)
     assert json.loads(running.state()) == {"state": "stopped"}
+
+
+def test_a_warning_is_told_as_long_as_the_print_lasts() -> None:
+    watched = Watched(b"")
+    watched.follow(replace(HALF, warning="this print can no longer be resumed"))
+    assert json.loads(watched.state())["warning"] == "this print can no longer be resumed"
 
 
 def test_how_it_ended_is_said_once() -> None:

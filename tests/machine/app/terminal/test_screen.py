@@ -71,6 +71,11 @@ def test_the_printer_s_words_stand_below_and_a_question_replaces_the_keys() -> N
     assert drawn_lines[5:] == ["  echo one", "  two", "cancel?"]
 
 
+def test_a_warning_stands_above_the_printer_s_words() -> None:
+    shown = lines(replace(MOMENT, warning="this print can no longer be resumed"), ("hello",))
+    assert [line.strip() for line in shown[5:7]] == ["this print can no longer be resumed", "hello"]
+
+
 def test_words_of_the_printer_command_no_terminal() -> None:
     assert lines(MOMENT, ("\x1b]0;owned\x07\x1b[2J", "\x9b31m"))[5:7] == [r"  \x1b]0;owned\x07\x1b[2J", r"  \x9b31m"]
 

@@ -51,3 +51,13 @@ def test_temperatures_of_ten_minutes_are_lines_with_the_newest_at_the_right_edge
         "nozzleTarget": "M300.0 0.0",
         "bedTarget": "",
     }
+
+
+@needs_node
+def test_a_warning_stands_beside_the_state_on_the_tab_and_in_the_bar_of_every_tab() -> None:
+    lost = "this print can no longer be resumed"
+    more = f"{{ progress: {{ state: 'printing', share: 0.5, heat_s: 0, ...heats, warning: '{lost}' }} }}"
+    told = on_fake_page(
+        f"{PAGE} tell('printing', 0.5, {more}); return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
+    )
+    assert told == [f"printing, 50 % · {lost}", f"box at sim: printing, 50 % · {lost}", f"box: printing: {lost}"]

@@ -50,7 +50,7 @@ export function showPrint(print, commands) {
   const runs = ["printing", "hand", "leaving"].includes(phase), asking = !runs && !uploads && (!over || end === "refused"), paused = ["paused", "pausing"].includes(progress?.state);
   tell({
     "run-title": `${resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`, "run-state": stateOf(print),
-    "run-news": `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`, // a reader need not hear every per cent
+    "run-news": `${print.name}: ${over ? print.sentence : progress ? [progress.state, progress.warning].filter(Boolean).join(": ") : phase}`, // a reader need not hear every per cent
     "ask-told": print.question || (starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
       : "The server keeps the file; nothing prints before somebody starts it there."),
     "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Leave it", "pause": paused ? "Resume" : "Pause",
@@ -78,8 +78,8 @@ export function showPrint(print, commands) {
 }
 
 function stateTold(print) {
-  const { state, share, left_s: left, message } = print.progress;
-  return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message].filter(Boolean).join(" · ");
+  const { state, share, left_s: left, message, warning } = print.progress;
+  return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message, warning].filter(Boolean).join(" · ");
 }
 
 function showUpload(upload) {

@@ -17,7 +17,9 @@ from typing import Any
 
 import pytest
 
+from machine.app.printer.attendance import Observers
 from machine.app.printer.compatibility import refuse
+from machine.app.printer.serial_log import SerialLog
 from machine.app.requests import PrintRequest
 from machine.app.terminal.plain import said_to
 from machine.app.terminal.progress import say
@@ -29,12 +31,17 @@ from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.worker import LENGTH
+from machine.dryrun.timeline import UnknownTimeline
+from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
+from machine.link.progress import Progress
+from machine.link.protocol.events import Temperature
 from machine.network import follow
 from machine.network.credentials import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.profile import Profile, load
+from tests.machine.link.failing_disk import keep_notes_in
 from tests.machine.network.stand_ins import KEY, OctoPrintStandIn, stand_in
 
 PROFILE = load()
@@ -261,6 +268,34 @@ def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence
     end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
     assert end["sentence"].startswith(sentence)
     assert (end["end"], end["forcible"]) == ("refused", forcible)
+
+
+def test_an_incomplete_journal_is_refused_at_the_page_with_the_sentence_of_resume(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keep_notes_in(tmp_path / "notes", monkeypatch)
+    with Journal(tmp_path / "j", JournalHeading("p.gcode", "", "p", {})) as journal:
+        journal.path.rename(tmp_path / "moved")
+    heard = Heard()
+    wanted = ResumeOrder(tmp_path / "moved", PrintRequest("/dev/none"))
+    end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
+    assert end["end"] == "refused"
+    assert end["sentence"].startswith(f"journal {tmp_path / 'moved'} is incomplete: its print went on when the journal could not")
+
+
+def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_names_no_journal_any_more(tmp_path: Path) -> None:
+    heard, log = Heard(), SerialLog(tmp_path / "log", "p")
+    person = AtPage(heard)  # type: ignore[arg-type]
+    with (
+        log,
+        Journal(tmp_path / "j", JournalHeading("p.gcode", "", "p", {})) as journal,
+        person.show(Observers(log, journal), UnknownTimeline()) as shown,
+    ):
+        shown.open()
+        shown(Progress(1.0, Temperature()))
+        assert (heard.state["journal"], heard.state["progress"]["warning"]) == (str(tmp_path / "j"), "")
+        shown(Progress(2.0, Temperature(), warning="this print can no longer be resumed"))
+    assert (heard.state["journal"], heard.state["progress"]["warning"]) == ("", "this print can no longer be resumed")
 
 
 @pytest.mark.parametrize(("kind", "profile"), [("octoprint", PROFILE), ("duet", load("gen5x"))])
