@@ -183,11 +183,12 @@ class Journal:
 
     def abandon(self) -> None:
         """Close and delete the journal of a print that has not begun; where it cannot be deleted nobody can resume from it."""
-        with self._writing:
-            self._fail("was abandoned")
         self.close()
-        with suppress(OSError):
-            self.path.unlink()
+        try:
+            self.path.unlink(missing_ok=True)
+        except OSError:
+            self._end_promise("was abandoned")
+            self._distrust(None)
 
     def close(self) -> None:
         """Bring everything to the disk and end; from then on `trouble` is final."""

@@ -1,6 +1,7 @@
 """A journal that loses a record: it is refused from then on, wherever and however its disk fails."""
 
 import errno
+import os
 import shutil
 import subprocess
 import threading
@@ -150,3 +151,18 @@ def test_a_mark_that_can_be_placed_nowhere_is_told(tmp_path: Path, monkeypatch: 
         journal.write(at(16))
         journal.settle()
     assert journal.warning.endswith("; that could not be noted anywhere: delete it, and never resume from it")
+
+
+def test_the_journal_of_a_print_that_never_began_is_deleted_and_where_that_fails_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notes = tmp_path / "notes"
+    notes.mkdir()
+    keep_notes_in(notes, monkeypatch)
+    journals = [Journal(tmp_path / name, HEADING) for name in ("deleted", "kept")]
+    journals[0].abandon()
+    assert (journals[0].path.exists(), list(notes.rglob("*.incomplete"))) == (False, [])
+    monkeypatch.setattr(Path, "unlink", lambda *_given, **_options: os.rmdir(tmp_path))
+    journals[1].abandon()
+    with pytest.raises(JournalError, match=INCOMPLETE):
+        read_journal(journals[1].path)
