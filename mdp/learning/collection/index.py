@@ -75,9 +75,9 @@ def unfinished(folder: Path, rows: Iterable[Row], wanted: Iterable[Search]) -> l
     return [search for search in wanted if search not in done]
 
 
-NO_RISK, NO_CUT, FAILED = "no risky face", "nothing feasible", "failed: "
+NO_RISK, NO_CUT, NO_SIDE, FAILED = "no risky face", "nothing feasible", "no further side to rest on", "failed: "
 
 
 def is_settled(row: Row) -> bool:
     """Whether a search has no record for a reason that stays."""
-    return row.excluded in (NO_RISK, NO_CUT)
+    return row.excluded in (NO_RISK, NO_CUT, NO_SIDE)

@@ -1,7 +1,7 @@
 """Models: the solids of a folder to learn from, made coarser where they are too fine, in several orientations."""
 
 from itertools import pairwise
-from math import cos, radians, sin
+from math import cos, radians
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -21,7 +21,6 @@ ARRAYS = ".npz"
 MOST_MOVED = 0.002  # share of the diagonal by which a coarser surface may lie off
 FINEST_MOVED = MOST_MOVED / 2**8  # tried first, then twice as much each time: at most nine simplifications
 SIDES_APART_DEG = 20.0  # directions of two sides that count as different
-TURN_DEG = 137.5  # the golden angle: no two turns come close to each other
 
 
 def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
@@ -75,20 +74,19 @@ def coarser(mesh: Mesh, most_faces: int) -> Mesh:
     return standing_still(simpler, np.eye(3))
 
 
-def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh:
-    """The mesh in one of its orientations, which are the same whatever number is asked for.
+def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh | None:
+    """The mesh in one of its resting poses; None where it has fewer.
 
-    0: as it stands. Then it rests on its other sides that leave something risky, each as different from those before as can be.
-    Then the same again, turned about z by the golden angle, so that the sampled directions meet other faces.
+    0: as it stands. 1 and up: on its other sides, in the order of `other_sides`, which does not depend on the number.
     """
-    sides = [np.eye(3), *(other_sides(mesh, angle_deg) if number > 0 else [])]
-    turns, side = divmod(number, len(sides))
-    turned = mesh if side == 0 else standing_still(mesh, sides[side])
-    return turned if turns == 0 else standing_still(turned, _about_z(radians(TURN_DEG * turns)))
+    if number == 0:
+        return mesh
+    sides = other_sides(mesh, angle_deg)
+    return standing_still(mesh, sides[number - 1]) if number <= len(sides) else None
 
 
 def other_sides(mesh: Mesh, angle_deg: float) -> list[Floats]:
-    """Rotations (3, 3) onto the sides that a mesh can rest on beside the present one, the most different first."""
+    """Rotations (3, 3) onto the other sides that a mesh rests on with a risky face left, the most different first."""
     left = [orientation.rotation for orientation in resting_orientations(mesh, angle_deg) if orientation.risky_mm2 > 0.0]
     directions, sides = [UP], list[Floats]()
     while left:
@@ -99,7 +97,3 @@ def other_sides(mesh: Mesh, angle_deg: float) -> list[Floats]:
         sides.append(left.pop(farthest))
         directions.append(sides[-1][2])
     return sides
-
-
-def _about_z(angle: float) -> Floats:
-    return np.array([[cos(angle), -sin(angle), 0.0], [sin(angle), cos(angle), 0.0], [0.0, 0.0, 1.0]])

@@ -7,7 +7,7 @@ from time import process_time
 
 import numpy as np
 
-from mdp.learning.collection.index import FAILED, NO_CUT, NO_RISK, Row, Search
+from mdp.learning.collection.index import FAILED, NO_CUT, NO_RISK, NO_SIDE, Row, Search
 from mdp.learning.collection.models import coarser, oriented, read_model
 from mdp.search.search import decompose
 from profiles.errors import UserError
@@ -63,9 +63,11 @@ def run(search: Search, path: Path, settings: Settings) -> Result:
         if settings.most_faces is not None:
             mesh = coarser(mesh, settings.most_faces)
             row = replace(row, faces_after=len(mesh.faces))
-        mesh = oriented(mesh, search.orientation, profile.process.self_supporting_angle_deg)
+        resting = oriented(mesh, search.orientation, profile.process.self_supporting_angle_deg)
+        if resting is None:
+            return Result(replace(row, excluded=NO_SIDE, seconds=round(process_time() - began, 2)))
         records: list[bytes] = []
-        decomposition = decompose(mesh, search.id, profile, on_record=records.append)
+        decomposition = decompose(resting, search.id, profile, on_record=records.append)
     except UserError as error:
         return Result(replace(row, excluded=f"{FAILED}{error}", seconds=round(process_time() - began, 2)))
     limit_s = settings.time_limit_s

@@ -9,7 +9,7 @@ import pytest
 
 from mdp.batch.rows import append_row
 from mdp.learning.collection.index import INDEX, Row, Search, read_index, unfinished, write_index
-from mdp.learning.collection.models import coarser, model_files, oriented, other_sides, read_model
+from mdp.learning.collection.models import coarser, model_files, oriented, read_model
 from mdp.learning.collection.task import Settings, run
 from mdp.learning.summary import main as summarize
 from mdp.mesh import Mesh
@@ -56,13 +56,17 @@ def test_a_search_that_the_clock_ended_is_told_apart(tmp_path: Path) -> None:
     assert run(Search("ball", 0, "paper"), path, Settings(1, None, 0.0)).row.late == 1
 
 
-def test_orientations_rest_on_different_sides_then_turn() -> None:
+def test_orientations_are_the_sides_that_a_model_rests_on_and_end_with_them() -> None:
     mesh = shapes.tee()  # on either end of its bar it leans on the foot of its stem, on its back nothing is risky
-    assert len(other_sides(mesh, 45.0)) == 2
-    sizes = [np.ptp(oriented(mesh, k, 45.0).vertices, axis=0).round(2).tolist() for k in range(5)]
-    assert sizes[:3] == [[40.0, 10.0, 40.0], [46.96, 10.0, 40.25], [46.96, 10.0, 40.25]]
-    assert sizes[3:] == [[36.25, 34.4, 40.0], [41.38, 39.1, 40.25]]
-    assert oriented(mesh, 3, 45.0).bounds_mm[0][2] == 0.0
+    poses = [oriented(mesh, k, 45.0) for k in range(4)]
+    sizes = [pose and np.ptp(pose.vertices, axis=0).round(2).tolist() for pose in poses]
+    assert sizes == [[40.0, 10.0, 40.0], [46.96, 10.0, 40.25], [46.96, 10.0, 40.25], None]
+
+
+def test_a_model_without_a_further_side_is_not_searched_again_in_another_turn(tmp_path: Path) -> None:
+    result = run(Search("tee", 3, "paper"), _npz(tmp_path / "tee.npz", shapes.tee()), Settings(beam_width=1))
+    assert (result.row.excluded, result.record) == ("no further side to rest on", b"")
+    assert unfinished(tmp_path, [result.row], [result.row.search]) == []
 
 
 def test_a_fine_model_is_made_coarser_within_two_thousandths_of_its_diagonal() -> None:
