@@ -1,23 +1,52 @@
 """Plane: a cutting or base plane of the workpiece frame."""
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 
 from mdp.mesh import Floats, dot
+from profiles.errors import PlanError
+from profiles.frozen import Vector
 
 UP = np.array([0.0, 0.0, 1.0])
+LEAST_LENGTH, MOST_LENGTH = 1e-6, 1e6  # of a vector that is meant as a direction
+UNIT = 1e-12  # a vector whose squared length differs less from 1 keeps its bits, so that a plan cuts the same planes again
+
+
+def unit_direction(x: float, y: float, z: float) -> Vector | None:
+    """The vector scaled to length 1, no component beyond 1; None if it is not finite, or too short or long to be a direction.
+
+    A component beyond 1, even by one rounding, has no arc sine.
+
+    >>> unit_direction(0.0, 3.0, 4.0), unit_direction(0.0, 0.0, 0.0)
+    ((0.0, 0.6, 0.8), None)
+    """
+    length = hypot(x, y, z)
+    if not LEAST_LENGTH <= length <= MOST_LENGTH:
+        return None
+    if abs(x * x + y * y + z * z - 1.0) <= UNIT and max(abs(x), abs(y), abs(z)) <= 1.0:
+        return x, y, z
+    return x / length, y / length, z / length
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """The points p with normal . p = offset_mm; normal is a unit vector and the printing direction above the plane."""
+    """The points p with normal . p = offset_mm; normal (3,) is the printing direction above the plane.
+
+    A normal of another length than 1 is scaled to it; offset_mm is along the scaled one. Raises PlanError for a normal that
+    `unit_direction` refuses.
+    """
 
     normal: Floats
     offset_mm: float
 
     def __post_init__(self) -> None:
-        normal = np.array(self.normal, dtype=np.float64)
+        given = np.asarray(self.normal, dtype=np.float64).tolist()
+        direction = unit_direction(*given)
+        if direction is None:
+            raise PlanError(f"the normal of a plane is {given}: a direction of a length of about 1 is expected")
+        normal = np.array(direction)
         normal.setflags(write=False)
         object.__setattr__(self, "normal", normal)
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mdp.mesh import parse_colour
+from mdp.plane import unit_direction
 from mdp.plans.plan_file import (
     KEYS,
     PART_KEYS,
@@ -29,9 +30,7 @@ from profiles.toml_text import read_toml
 
 MOST_BYTES = 10_000_000  # far more than the workbench writes; a file as large is refused unread
 MOST_ZONES = 1000  # of a kind: every face is asked for each
-LEAST_NORMAL, MOST_NORMAL = 1e-6, 1e6  # lengths of a normal; what lies beyond is a slip of the pen
 MOST_MM = 1e5  # fifty times what any printer makes (mdp.read.MOST_MM)
-UNIT = 1e-12  # a normal whose length differs less from 1 is left as it is, so that a plan gives the same bits again
 
 
 def read_plan(path: Path) -> PlanFile:
@@ -166,11 +165,10 @@ class _Reader:
         return value
 
     def _unit(self, value: Any, key: str) -> Vector:
-        x, y, z = self._numbers(value, key, 3)
-        length = hypot(x, y, z)
-        if not LEAST_NORMAL <= length <= MOST_NORMAL:
+        direction = unit_direction(*self._numbers(value, key, 3))
+        if direction is None:
             raise self._error(f"{key} is {_show(value)}: a direction of a length of about 1 is expected")
-        return (x, y, z) if abs(x * x + y * y + z * z - 1.0) <= UNIT else (x / length, y / length, z / length)
+        return direction
 
     def _vector(self, value: Any, key: str) -> Vector:
         x, y, z = (self._number(entry, key) for entry in self._numbers(value, key, 3))

@@ -68,7 +68,7 @@ def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
 
 def _alike(pads: Sequence[Pad]) -> bool:
     """Whether all pads lean by the same, enough to be those of a piece."""
-    leans = np.degrees(np.arccos([pad.ways[2, 2] for pad in pads]))
+    leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
     return bool(leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG)
 
 

@@ -114,8 +114,9 @@ def tops(bars: Bars, lattice: Lattice) -> Floats:
         d = ((b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length)
         s = (up[1] * d[2] - up[2] * d[1], up[2] * d[0] - up[0] * d[2], up[0] * d[1] - up[1] * d[0])
         slabs = ((d[0], d[1], d[2], 0.0, length), (s[0], s[1], s[2], -half, half), (up[0], up[1], up[2], -height, 0.0))
-        reach = [0.5 * (length * abs(d[n]) + height * abs(up[n])) + half * np.sqrt(1.0 - up[n] * up[n]) for n in range(2)]
-        ceiling = max(a[2], b[2]) + half * np.sqrt(max(0.0, 1.0 - up[2] * up[2])) + height * max(0.0, -up[2]) + ROUNDING_MM
+        sines = [np.sqrt(max(0.0, 1.0 - up[n] * up[n])) for n in range(3)]
+        reach = [0.5 * (length * abs(d[n]) + height * abs(up[n])) + half * sines[n] for n in range(2)]
+        ceiling = max(a[2], b[2]) + half * sines[2] + height * max(0.0, -up[2]) + ROUNDING_MM
         if abs(d[0] * up[0] + d[1] * up[1] + d[2] * up[2]) > ROUNDING_MM:
             ceiling = -NOTHING  # its sides are no rectangle
         i0, i1 = _columns(0.5 * (a[0] + b[0] - height * up[0]), reach[0], 0, lattice)

@@ -1,6 +1,6 @@
 """The balance of plastic and room against closed formulas, and against faults planted into a good program."""
 
-from math import cos, pi, radians, sin, tan
+from math import cos, nextafter, pi, radians, sin, tan
 
 import numpy as np
 import pytest
@@ -47,6 +47,14 @@ def test_no_plastic_is_lost_wherever_a_bar_lies(turn_deg: float) -> None:
     begin, end = (np.array([[*way[side], 0.0] for way in ways]) for side in (0, 1))
     bars = Bars(begin, end, np.zeros((3, 3)), np.array([0.2, 0.2, 0.01]), np.ones(3))
     assert laid(bars, mm3, lattice).sum() == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("beyond", [1.0, nextafter(1.0, 2.0)])
+def test_a_bar_laid_sideways_is_not_lost_to_a_rounding_of_its_direction(beyond: float) -> None:
+    lattice = lattice_over(FIELD, 0.05)
+    top = tops(bar((5.0, 0.0, 0.0), (5.0, 0.0, 4.0), (beyond, 0.0, 0.0), 0.5, 0.2), lattice)
+    under = int((4.9 - lattice.origin[0]) / lattice.cell), int((0.0 - lattice.origin[1]) / lattice.cell)
+    assert top[under] == pytest.approx(4.0, abs=0.51)  # its end is round: half its width
 
 
 @pytest.mark.parametrize("slant_deg", [0.0, 30.0, 60.0])

@@ -1,11 +1,11 @@
 """Values: what a page has sent with a command, checked one by one; each raises PlanError with a sentence for what it is not."""
 
 from collections.abc import Iterable
-from math import hypot
 from typing import Any, TypeGuard
 
 import numpy as np
 
+from mdp.plane import unit_direction
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 
@@ -13,7 +13,6 @@ Asked = dict[str, Any]  # a command `{"do": NAME, ...}` as it comes from a page
 MOST_MM = 1e5
 MOST_NUMBER = 1e300  # an int of a page may be longer than any float
 ROTATION_ERROR = 1e-6
-LEAST_LENGTH, MOST_LENGTH = 1e-6, 1e6  # of a direction
 
 
 def is_number(value: Any) -> TypeGuard[int | float]:
@@ -55,11 +54,10 @@ def vector(asked: Asked, key: str, most: float = MOST_NUMBER) -> Vector:
 
 def unit_vector(asked: Asked, key: str) -> Vector:
     """A direction, whose length is made 1."""
-    value = vector(asked, key)
-    length = hypot(*value)
-    if not LEAST_LENGTH <= length <= MOST_LENGTH:
+    direction = unit_direction(*vector(asked, key))
+    if direction is None:
         raise PlanError(f"{key} is {asked[key]}: a direction of a length of about 1 is expected")
-    return vector_of(x / length for x in value)
+    return direction
 
 
 def vector_of(values: Iterable[float]) -> Vector:
