@@ -5,6 +5,7 @@ have left is asked of what they have left, so all but the last are cut for that:
 trial has in common with the one before not again. Of a plane that is dragged what was cut before it is the same.
 """
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -25,7 +26,8 @@ from mdp.zone import NO_ZONES, Zones
 from profiles.profile import Profile
 
 MOST_TRIED = 16  # places for a plane that the sweep finds nothing against
-APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were refused
+APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were refused;
+# once a place is found, those passed over on the way to it are searched by bisection
 
 Key = tuple[float, float, float, float]
 
@@ -87,22 +89,29 @@ class Trials:
 
     def nearest(self, planes: Sequence[Plane], number: int) -> Plane | None:
         """The plane of the part of a number at the nearest place along its normal where all planes can be cut, else leaning by a
-        few degrees; None: there is none among the likely ones. planes as in attempt."""
+        few degrees; None: there is none among MOST_TRIED places. planes as in attempt."""
         if not self.attempt(planes).refused:
             return planes[number - 2]
         if not self._cut_later(planes, number):
             return None
         apart_mm = APART_SHARE * float(np.ptp(self._problem.mesh.vertices @ planes[number - 2].normal))
-        refused: list[Plane] = []
+        refused, passed_over = list[Plane](), list[Plane]()
         for plane in planes_near(self._problem, self._node, planes[number - 2]):
-            if any(plane.normal is other.normal and abs(plane.offset_mm - other.offset_mm) < apart_mm for other in refused):
-                continue
-            if not self.attempt((*planes[: number - 2], plane, *planes[number - 1 :])).refused:
-                return plane
-            refused.append(plane)
-            if len(refused) == MOST_TRIED:
-                break
+            if any(_are_near(plane, other, apart_mm) for other in refused):
+                passed_over.append(plane)
+            elif self._can_take(planes, number, plane):
+                nearer = [other for other in passed_over if _are_near(plane, other, apart_mm)]
+                first = bisect_left(nearer, True, key=lambda other: self._can_take(planes, number, other))
+                return (*nearer, plane)[first]
+            else:
+                refused.append(plane)
+                if len(refused) == MOST_TRIED:
+                    break
         return None
+
+    def _can_take(self, planes: Sequence[Plane], number: int, plane: Plane) -> bool:
+        """Whether all planes can be cut with another one for the part of a number."""
+        return not self.attempt((*planes[: number - 2], plane, *planes[number - 1 :])).refused
 
     @property
     def _node(self) -> Node:
@@ -139,6 +148,11 @@ class Trials:
         parts, _ = self._forecast.parts(order[:done])
         obstacle = find_refused(self._problem, self._node, order[done], why)
         return Trial((*[None] * (len(order) - done), *parts[::-1]), len(order) + 1 - done, why.text, obstacle=obstacle)
+
+
+def _are_near(plane: Plane, other: Plane, apart_mm: float) -> bool:
+    """Whether two planes have the same normal and lie less than apart_mm from each other."""
+    return abs(plane.offset_mm - other.offset_mm) < apart_mm and np.array_equal(plane.normal, other.normal)
 
 
 def _key(plane: Plane) -> Key:

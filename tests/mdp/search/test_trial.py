@@ -146,6 +146,14 @@ def test_a_plane_is_shifted_to_the_nearest_place_where_it_can_be_cut(wanted_mm: 
     assert (nearest.normal.tolist(), nearest.offset_mm) == ([0.0, 0.0, 1.0], pytest.approx(nearest_mm))
 
 
+@pytest.mark.parametrize("wanted_mm", [23.0, 20.0, 18.0])
+def test_a_plane_dragged_past_its_neighbour_goes_to_a_place_just_behind_it(wanted_mm: float) -> None:
+    up = np.array([0.0, 0.0, 1.0])
+    nearest = trials(box(10.0, 10.0, 100.0)).nearest((Plane(up, 24.0), Plane(up, wanted_mm)), 3)
+    assert nearest is not None
+    assert (nearest.normal.tolist(), 24.0 < nearest.offset_mm < 24.6) == ([0.0, 0.0, 1.0], True)
+
+
 def test_where_no_level_plane_can_be_cut_the_nearest_one_leans() -> None:
     outline = [(0, 0), (40, 0), *((40 - 0.5 * k, 0.25 * (k + step)) for k in range(40) for step in (0, 1)), (0, 10)]
     stairs = standing(m3.Manifold.extrude(m3.CrossSection([outline]), 20).rotate((90, 0, 0)))
