@@ -39,7 +39,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the records and their index.csv")
     parser.add_argument("--beam-width", type=int, default=50, metavar="B")
     parser.add_argument("--terms", default="paper,ours", help=f"of {', '.join(TERMS)}: paper searches as published")
-    parser.add_argument("--orientations", type=int, default=1, metavar="N", help="of each model: as given, then resting on up to N - 1 other sides")
+    parser.add_argument("--orientations", type=int, default=1, metavar="N", help="of each model: as given, then on other sides")
     parser.add_argument("--faces", type=int, metavar="N", help="finer models are made coarser first")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a dask scheduler; else processes of this machine's own")
     parser.add_argument("--workers", type=int, default=THREADS, metavar="N", help="processes on this machine, one core each")
