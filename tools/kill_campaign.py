@@ -1,11 +1,15 @@
 """Kill a host, or cut the power, at random moments of a print and resume from its journal.
 
-Run: python tools/kill_campaign.py [MOMENTS] [SEED] [--power stock|advanced]   (default 200 moments; figures: tools/RESULTS.md)
+Run: python tools/kill_campaign.py [MOMENTS] [SEED] [--power stock|advanced | --repeats]
+(default 200 moments; figures: tools/RESULTS.md)
 A moment passes when the executed moves, both runs together, are the program's without a gap; what was done twice is counted.
 
 Without --power the host is killed and the printer, in another process, lives on. With it both lose their power: a printer in
 memory, as stock Marlins are built (no ADVANCED_OK) or with ADVANCED_OK, on a line of 115200 baud. Where the journal leaves the
 height in doubt it is counted, and the height that is nearest to the real one is chosen, as a person would who looks.
+
+With --repeats nothing is resumed: of one print it is counted how many strokes were done but not on record, at random moments and
+at the worst one; on record in the file, and on the disk (what a computer keeps that loses its power together with the printer).
 """
 
 import argparse
@@ -21,13 +25,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from math import inf
+from math import cos, inf, pi, sin
 from pathlib import Path
 from time import monotonic, sleep
 
 import numpy as np
 
-from machine.link.journal import Journal, JournalHeading, read_journal
+from machine.link.journal import SYNC_S, Checkpoint, Journal, JournalHeading, read_journal
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint, heights_mm, is_in_doubt, plan_resume, read_interrupted_print
@@ -54,6 +58,8 @@ SPEED = 500.0  # times real time, of every other printer: its planner is full wh
 BAUD, RING = 115200, 128
 IN_DOUBT = "height in doubt, asked"  # one end of a power cut
 LIFT_MM, GROUP = 0.6, 10  # every tenth stroke is reached by a lifted travel
+CURVE_STROKES, CURVE_MM = 600, 24.0  # of a round wall, 0.25 mm long each
+STROKE = re.compile(r"G1 (X|E\d)")  # pushes filament
 
 
 @dataclass(frozen=True)
@@ -316,6 +322,68 @@ def cut_campaign(cuts: int, seed: int, build: BuildOptions) -> list[Result]:
         return [power_cut(build, text, Path(name) / f"{number}", cut_s, whole) for number, cut_s in enumerate(moments)]
 
 
+def curved_program(layers: int = LAYERS // 2, strokes: int = CURVE_STROKES) -> list[str]:
+    """A round wall of short strokes, which the line brings hardly fast enough."""
+    lines = [*START, "G0 Z60 F900", "G0 X10 Y10 F6000"]
+    for layer in range(layers):
+        lines += [";LAYER_CHANGE", f"G0 Z{60 + 0.2 * layer:.2f} F900"]
+        for number in range(strokes):
+            angle = 2 * pi * number / CURVE_STROKES
+            lines.append(f"G1 X{30 + CURVE_MM * cos(angle):.3f} Y{30 + CURVE_MM * sin(angle):.3f} E0.0{5 + number % 3} F3600")
+    return lines
+
+
+class _TimedJournal(Journal):
+    """A journal that remembers when it held which line to be executed: in its file, and on the disk."""
+
+    def __init__(self, path: Path, now_s: Callable[[], float]) -> None:
+        self.in_file: list[tuple[float, int]] = [(0.0, 0)]
+        self.on_disk: list[tuple[float, int]] = [(0.0, 0)]
+        self._now_s = now_s
+        super().__init__(path, JournalHeading("p.gcode", "", "campaign", {}))
+
+    def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
+        """Note the time, too. Of what is not in a hurry the disk gets what is in the file once in SYNC_S."""
+        super().write(checkpoint, hurry)
+        now_s = self._now_s()
+        if hurry or now_s - self.on_disk[-1][0] >= SYNC_S:
+            self.on_disk.append((now_s, checkpoint.executed if hurry else self.in_file[-1][1]))
+        self.in_file.append((now_s, checkpoint.executed))
+
+
+def count_repeats(build: BuildOptions, lines: list[str], moments: int = 1000, seed: int = 1) -> dict[str, tuple[float, int]]:
+    """Strokes that a print would do twice after a power cut: on average of random moments and at the worst one of all, for a
+    journal of which the whole file is left, and for one of which the disk's part is left.
+    """
+    printer = VirtualPrinter(PROFILE.machine, build, baud=BAUD)
+    with tempfile.TemporaryDirectory() as name, _TimedJournal(Path(name) / "journal", lambda: printer.now_s) as journal:
+        print_lines(lines, PATH, BAUD, profile=PROFILE, medium=printer.medium, journal=journal)
+    record = printer.record
+    pushes = record.end[:, 5] - record.start[:, 5] > 1e-9
+    ends_s = np.sort((record.begin_s + record.duration_s)[pushes])
+    before = np.cumsum([0, *(STROKE.match(line) is not None for line in lines)])
+    cuts_s = np.random.default_rng(seed).uniform(record.begin_s[pushes][0], ends_s[-1], moments)
+    counts = {}
+    for where, notes in (("file", journal.in_file), ("disk", journal.on_disk)):
+        times_s, executed = np.array([time_s for time_s, _ in notes]), before[[line for _, line in notes]]
+        twice, worst = (
+            np.searchsorted(ends_s, at_s, side="right") - executed[np.searchsorted(times_s, at_s, side="right") - 1]
+            for at_s in (cuts_s, ends_s)
+        )
+        counts[where] = float(twice.mean()), int(worst.max())
+    return counts
+
+
+def show_repeats(moments: int, seed: int) -> None:
+    """A row for each program and build."""
+    print("| program | Marlin | twice, mean | most | the computer lost its power, too: mean | most |\n|---|---|---|---|---|---|")
+    for program_name, lines in (("lifted travels", lifted_program()), ("strokes of 0.25 mm", curved_program())):
+        for build in ("stock", "advanced"):
+            counts = count_repeats(BuildOptions(advanced_ok=build == "advanced", rx_ring=RING), lines, moments, seed)
+            (mean, most), (disk_mean, disk_most) = counts["file"], counts["disk"]
+            print(f"| {program_name} | {build} | {mean:.1f} | {most} | {disk_mean:.1f} | {disk_most} |")
+
+
 def main() -> None:
     """Run the campaign and print a table."""
     if sys.argv[1:2] == ["--printer"]:
@@ -325,7 +393,11 @@ def main() -> None:
     parser.add_argument("moments", type=int, nargs="?", default=200)
     parser.add_argument("seed", type=int, nargs="?", default=1)
     parser.add_argument("--power", choices=("stock", "advanced"))
+    parser.add_argument("--repeats", action="store_true")
     given = parser.parse_args()
+    if given.repeats:
+        show_repeats(given.moments, given.seed)
+        return
     if given.power:
         show_cuts(cut_campaign(given.moments, given.seed, BuildOptions(advanced_ok=given.power == "advanced", rx_ring=RING)))
         return

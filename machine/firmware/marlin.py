@@ -72,7 +72,7 @@ MARLIN = Firmware(
     name="Marlin",
     signs=("marlin",),
     dialects={"marlin": DIALECT},
-    line=LineRules(reports_rotary_axes=True, waiting_moves=BLOCK_BUFFER_SIZE + BUFSIZE, keep_awake=MOTORS_STAY_ON),
+    line=LineRules(reports_rotary_axes=True, waiting_moves=PLANNED_BLOCKS, keep_awake=MOTORS_STAY_ON),
     simulated=SIMULATED,
     probing=PROBING,
 )

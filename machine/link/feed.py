@@ -10,8 +10,8 @@ from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
 from machine.gcode.words import PAUSE_REMARK
 from machine.link.exchange import Exchange
-from machine.link.journal import EVERY_LINES, FINISHED, LEFT, PAUSED, Checkpoint, Journal
-from machine.link.line_history import Barriers, LineHistory, SentLine, shifts
+from machine.link.journal import FINISHED, LEFT, PAUSED, Checkpoint, Journal
+from machine.link.line_history import Barriers, LineHistory, PlannerReports, SentLine, shifts
 from machine.link.line_outcome import position_differences
 from machine.link.pause.park_moves import lift_move
 from machine.link.pause.pause import Pause
@@ -29,7 +29,7 @@ PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
-MUTE_LINES = 4  # between records of the journal where answers do not name lines: what was done since is done twice
+WATCH_S, WATCH_MOST_S = 0.02, 5.0  # the least time between questions how many moves wait, and how long they may bring no news
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
 
@@ -48,7 +48,9 @@ class Feed:
     ) -> None:
         self._job, self._journal, self._on_progress = job, journal, on_progress
         machine = job.profile.machine if job.profile is not None else None
-        self.modal, self.history, self._position = ModalState(axes_of(machine)), LineHistory(), ProgramPosition()
+        self.modal, self._position = ModalState(axes_of(machine)), ProgramPosition()
+        self._planner = PlannerReports()
+        self.history = LineHistory(planner=self._planner)
         self._bounds = PrintedBounds(machine) if machine is not None else None
         self._pending = PendingCommands(self.modal.axes, job.limit, control, stop)
         # A bed that cannot be heated is as warm as its room.
@@ -112,8 +114,8 @@ class Feed:
 
     def _send(self, line: int, command: str) -> None:
         if self._journal is not None:
-            shift, advanced = shifts(command, self.modal.axes.letters), self.exchange.connection.advanced
-            if shift or self._journal.record_due(line, EVERY_LINES if advanced else MUTE_LINES):
+            shift = shifts(command, self.modal.axes.letters)
+            if shift or self._journal.record_due(line):
                 self.history.sent = line
                 self._record(hurry=shift)
         number = self.exchange.send(command)
@@ -145,8 +147,7 @@ class Feed:
         if self._journal is not None:
             history, now_s = self.history, self.exchange.medium.now_s()
             if self._barriers.due(command, self._prints, history.tracked):
-                self.exchange.drain()
-                history.end_moves()
+                self._end_moves()
                 self._record()
             if self._barriers.check_due(command, history.tracked, now_s):
                 self._check_position()
@@ -163,12 +164,39 @@ class Feed:
 
     def _new_history(self, before: int = 0) -> LineHistory:
         connection = self.exchange.connection
-        return LineHistory(before, None if connection.advanced else connection.greeting.waiting_moves)
+        waiting = None if connection.advanced else connection.greeting.waiting_moves
+        return LineHistory(before, waiting, self._planner)
+
+    def _end_moves(self) -> None:
+        """Wait until every move sent so far is over."""
+        self._follow_moves()
+        self.exchange.drain()
+        self._note_end()
+
+    def _note_end(self) -> None:
+        """Every move is over: the question that was answered last came after M400."""
+        self.history.end_moves(self.exchange.connection.window.sent - 1)
+
+    def _follow_moves(self) -> None:
+        """Wait while more than one move is planned, so far as the printer reports that, and keep the journal up with them."""
+        exchange, history = self.exchange, self.history
+        waiting, news_s = inf, exchange.medium.now_s()
+        while history.tracked and self._journal is not None and history.waiting > 1:
+            if history.waiting < waiting:
+                waiting, news_s = history.waiting, exchange.medium.now_s()
+                self._record()
+            elif exchange.medium.now_s() - news_s > WATCH_MOST_S:
+                break
+            else:
+                exchange.wait(max(WATCH_S, (exchange.medium.now_s() - news_s) / 2))
+            exchange.send("M114")  # its ok reports the planner, it waits for nothing and changes nothing
+            exchange.settle()
 
     def _position_errors(self) -> list[str]:
         """Axes on which the printer's own position is not the program's, all moves over; none where it does not report it."""
+        self._follow_moves()
         position = self.exchange.ask_position()
-        self.history.end_moves()
+        self._note_end()
         return position_differences(self.modal, position.axes, NEAR) if position is not None else []
 
     def _check_position(self) -> None:
@@ -204,8 +232,7 @@ class Feed:
             exchange.send("M155 S0")
         for command in self._pending.undo_overrides():
             exchange.send(command)
-        exchange.drain()
-        self.history.end_moves()
+        self._end_moves()
         self.finished = True
         self._record()
         self.show(exchange.medium.now_s())

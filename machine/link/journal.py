@@ -45,7 +45,7 @@ if sys.platform == "win32":
 
 FORMAT = 3  # in 2 a full disk ended the journal without a trace, in 1 the newest record might lack a change of height
 PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
-EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest record,
+EVERY_LINES = 4  # the sender never gets so many lines ahead of the newest record,
 EVERY_S = 0.1  # which is not older than this when something has happened since
 SYNC_S = 1.0  # between syncs; the disk is older by this and the time of an fsync when the computer restarts
 BLOCK_BYTES = 4096  # a disk writes a block whole or leaves it damaged, but its neighbour as it was

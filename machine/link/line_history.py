@@ -4,12 +4,13 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from machine.firmware.marlin import BLOCK_BUFFER_SIZE
+from machine.firmware.marlin import PLANNED_BLOCKS
 from machine.gcode.words import read_words, split_command
 
 MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any word from the planner, nothing can be known
-
-
+# Marlin drops a move of fewer than MIN_STEPS_PER_SEGMENT (6) steps on every axis and adds it to the next one (planner.cpp). One
+# of twice as many has a block of its own whatever was dropped before: X Y Z and E in mm at 80 steps, tilt and turn in deg at 8.
+OWN_BLOCK = (0.15, 0.15, 0.15, 1.5, 1.5, 0.15)
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not report what it has executed
 
@@ -23,23 +24,60 @@ class SentLine(NamedTuple):
     pose: tuple[float | None, ...]
 
 
+class PlannerReports:
+    """What ADVANCED_OK reports of a planner: P, the free places right after a line was planned.
+
+    As many as Marlin's by default, until it reports more, or the same number twice while nothing moves.
+    """
+
+    def __init__(self) -> None:
+        self.reported = False
+        self._places, self._free, self._idle_free = PLANNED_BLOCKS, 0, 0
+
+    def waiting_beside(self, free: int) -> int:
+        """How many moves wait. The less of two reports counts: a damaged digit in one of them must not make a waiting move an
+        executed one.
+        """
+        self.reported, self._places = True, max(self._places, free)
+        least, self._free = min(free, self._free), free
+        return self._places - least
+
+    def rest(self) -> None:
+        """Nothing moves: all places are free."""
+        if self.reported and self._free == self._idle_free:
+            self._places = self._free
+        self._idle_free = self._free
+
+
 class LineHistory:
     """Lines of the program, from 1; 0 or the line before the first one sent means none.
 
-    Acknowledged is not executed: a move may wait in the planner. What ADVANCED_OK reports of free places bounds how many do; of a
-    printer that does not report them its firmware bounds it (waiting), or it is only known after a barrier (None).
+    Acknowledged is not executed: a move may wait in the planner. The planner's own reports bound how many do; where there are
+    none the firmware does (waiting), or nothing is known until a barrier (None).
     """
 
-    def __init__(self, before: int = 0, waiting: int | None = None) -> None:
+    def __init__(self, before: int = 0, waiting: int | None = None, planner: PlannerReports | None = None) -> None:
         self.before = self.sent = self.acknowledged = self.executed = before
         self.number = 0  # the newest wire number that is acknowledged
         self.commands = 0  # acknowledged commands of the program
         self.pose: tuple[float | None, ...] = ()  # after the newest acknowledged command
         self._flight: deque[SentLine] = deque()
-        self._planned: deque[SentLine] = deque()
-        self._blocks = BLOCK_BUFFER_SIZE  # a printer that reports more free places has more
-        self._free, self._waiting = 0, waiting
-        self.tracked = False  # the printer tells what it has executed
+        self._planned: deque[int] = deque()  # of each place that the planner may still hold the first line that may be in it
+        self._begins, self._begins_at = 0, tuple[float | None, ...]()  # the first line of the newest place, the pose before it
+        self._has_block = True  # the newest place surely has one: the next move gets another
+        self._loose = 0  # moves from this line on may be part of the next block only; 0: none
+        self._planner, self._waiting = planner or PlannerReports(), waiting
+        self._reported_by = 0  # the wire number of the newest line whose answer reported the planner
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the printer reports what it has executed."""
+        return self._planner.reported
+
+    @property
+    def waiting(self) -> int:
+        """How many moves may still wait in the planner."""
+        return len(self._planned)
 
     @property
     def only_unanswered(self) -> SentLine | None:
@@ -58,32 +96,46 @@ class LineHistory:
         flight, planned = self._flight, self._planned
         while flight and flight[0].number <= number:
             step = flight.popleft()
+            if step.moves and len(planned) < MOST_WAITING:
+                self._plan(step)
             self.acknowledged, self.pose = step.line, step.pose
             self.commands += 1
-            if step.moves and len(planned) < MOST_WAITING:
-                planned.append(step)
-        if free is None:
-            waiting = self._waiting
-        else:
-            self.tracked, waiting = True, self._waiting_beside(free)
+        waiting = self._waiting
+        if free is not None:
+            waiting, self._reported_by = self._planner.waiting_beside(free), number
         if waiting is None:
             return
-        while len(planned) > waiting:
+        while len(planned) > waiting + (not self._has_block):
             planned.popleft()
-        self.executed = max(self.executed, planned[0].line - 1 if planned else self.acknowledged)
+        surely = planned[0] - 1 if planned else self._loose - 1 if self._loose else self.acknowledged
+        self.executed = max(self.executed, surely)
 
-    def _waiting_beside(self, free: int) -> int:
-        """How many moves wait. The less of two answers counts: a damaged digit in one of them must not make a waiting move an
-        executed one.
-        """
-        self._blocks = max(self._blocks, free + 1)
-        least, self._free = min(free, self._free), free
-        return self._blocks - least
+    def _plan(self, step: SentLine) -> None:
+        """A move is in the planner, with a block of its own or, where it is too short for one, perhaps with the next."""
+        if self._has_block:
+            self._planned.append(self._loose or step.line)
+            self._begins, self._begins_at = step.line, self.pose or step.pose
+        whole = _has_own_block(self.pose, step.pose)
+        self._has_block = whole or _has_own_block(self._begins_at, step.pose)
+        self._loose = 0 if whole else self._begins
+        if not self._has_block:  # of an axis that was not known the way counts from here
+            self._begins_at = tuple(b if a is None else a for a, b in zip(self._begins_at, step.pose, strict=True))
 
-    def end_moves(self) -> None:
-        """Every move acknowledged so far is over."""
+    def end_moves(self, since: int) -> None:
+        """Every move acknowledged so far is over, and was when the line `since` of the wire was answered."""
         self._planned.clear()
+        self._has_block, self._loose = True, 0
+        if self._reported_by >= since:
+            self._planner.rest()
         self.executed = self.acknowledged
+
+
+def _has_own_block(before: Sequence[float | None], after: Sequence[float | None]) -> bool:
+    """Whether the way between two poses is long enough on one axis; of axes that are not known it counts as none."""
+    for a, b, least in zip(before, after, OWN_BLOCK, strict=False):
+        if a is not None and b is not None and not -least < b - a < least:
+            return True
+    return False
 
 
 class Barriers:

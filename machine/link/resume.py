@@ -28,7 +28,7 @@ from machine.link.status import PrinterStatus
 from machine.planning.reorient import Turn
 from mdp.mesh import Floats
 from mdp.pose import Pose
-from profiles.errors import JournalError, SilenceError
+from profiles.errors import FirmwareError, JournalError, SilenceError
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -42,6 +42,10 @@ HOME_IT = (
 NO_ANSWER = (
     "the printer did not answer when it was asked where it stands: is it switched on, is --baud the firmware's rate, does it "
     "still heat or move? Nothing was changed: when it has come to rest, resume can be tried again"
+)
+FAULTY = (
+    "the printer does not say where it stands, but reports: {}. Nothing was changed: when that is put right (Klipper's "
+    "FIRMWARE_RESTART, another firmware's reset), resume can be tried again"
 )
 SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
 UNSURE_MM = 0.005
@@ -132,7 +136,11 @@ def has_not_restarted(point: InterruptedPrint, status: PrinterStatus) -> bool | 
 
 
 def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile) -> ResumePlan:
-    """Decide. Raises JournalError where going on would be a guess, SilenceError where the printer has reported nothing."""
+    """Decide. Raises JournalError where going on would be a guess, FirmwareError or SilenceError where the printer has not
+    reported its place.
+    """
+    if status.position is None and status.fault:
+        raise FirmwareError(FAULTY.format(status.fault))
     if status.position is None and status.last_number is None:
         raise SilenceError(NO_ANSWER)
     alive = has_not_restarted(point, status)

@@ -9,7 +9,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Banner, Event, Ok, Position, Resend, Start, Temperature, position_in, read_event
+from machine.link.protocol.events import (
+    Banner,
+    Event,
+    FirmwareFault,
+    Ok,
+    Position,
+    Resend,
+    Start,
+    Temperature,
+    position_in,
+    read_event,
+)
 from machine.link.protocol.framing import FAR_NUMBER, frame
 from machine.link.shutdown import Orders
 
@@ -23,17 +34,20 @@ STILL_S = 300.0  # a printer that still works on its queue answers when that is 
 class PrinterStatus:
     """The number of the last line the printer has taken, where it says it stands, its temperatures; None: not reported.
 
-    greeted: the firmware said its greeting meanwhile: it has just restarted.
+    greeted: the firmware said its greeting meanwhile: it has just restarted. fault: its own words for an error, "" for none.
     """
 
     last_number: int | None = None
     position: Position | None = None
     temperature: Temperature = field(default_factory=Temperature)
     greeted: bool = False
+    fault: str = ""
 
     def _read(self, line: bytes) -> Event:
         """Any line; a board that restarts begins its line numbers anew."""
         event = read_event(line)
+        if isinstance(event, FirmwareFault):
+            self.fault = event.text.removeprefix("!!").strip()
         if isinstance(event, Start | Banner):
             self.greeted, self.last_number = True, None if self.last_number is None else 0
         return event

@@ -6,16 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.firmware.marlin import BLOCK_BUFFER_SIZE
-from machine.link.line_history import CHECK_MUTE_S, CHECK_S, Barriers, LineHistory, SentLine, shifts
+from machine.link.line_history import CHECK_MUTE_S, CHECK_S, Barriers, LineHistory, PlannerReports, SentLine, shifts
 
-POSE = (1.5, -2.0, 60.25, 30.0, 725.0, 12.34567)
+MM = 2.0  # between the ends of moves
 
 
-def moves(count: int) -> Iterator[SentLine]:
-    """Commands of lines 1, 2, ..., wire numbers from 4 on; every fourth moves nothing."""
+def moves(count: int, step_mm: float = MM) -> Iterator[SentLine]:
+    """Commands of lines 1, 2, ..., wire numbers from 4 on, along X; every fourth moves nothing."""
     for line in range(1, count + 1):
-        yield SentLine(line + 3, line, bool(line % 4), POSE)
+        yield SentLine(line + 3, line, bool(line % 4), (step_mm * line, -2.0, 60.25, 30.0, 725.0, 12.34567))
 
 
 def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> None:
@@ -23,22 +22,68 @@ def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> Non
     for step in moves(40):
         history.send(step)
     for _ in range(2):
-        history.acknowledge(33, BLOCK_BUFFER_SIZE - 1)
+        history.acknowledge(33, 14)
     assert (history.sent, history.acknowledged, history.executed) == (40, 30, 29)
+    for _ in range(2):
+        history.acknowledge(33, 15)
+    assert history.executed == 30
     history.acknowledge(33, 5)
-    assert history.executed == 29
+    assert history.executed == 30
 
 
-@given(st.lists(st.integers(0, 15), min_size=1, max_size=60))
-def test_what_counts_as_executed_never_holds_a_move_that_waits(free: list[int]) -> None:
-    """The planner is simulated: it holds at most 15 moves, the oldest leave as many places as `free` asks for."""
-    history, waiting = LineHistory(), []
-    for step, places in zip(moves(len(free)), free, strict=True):
+@given(
+    st.lists(st.tuples(st.integers(0, 15), st.sampled_from([0.0, 0.03, -0.03, 0.08, -0.08, 0.2, 2.0])), min_size=1, max_size=60)
+)
+def test_what_counts_as_executed_never_holds_a_move_that_waits(steps: list[tuple[int, float]]) -> None:
+    """The planner is simulated: it holds at most 15 blocks, the oldest leave as many places as asked for, and a move of fewer
+    than 6 of 80 steps per mm is dropped and added to the next one, as in Marlin (MIN_STEPS_PER_SEGMENT).
+    """
+    history, blocks = LineHistory(), list[list[int]]()
+    at_mm, planned_mm, dropped = 0.0, 0.0, list[int]()
+    for line, (places, length_mm) in enumerate(steps, 1):
+        at_mm += length_mm
+        history.send(SentLine(line, line, length_mm != 0.0, (at_mm, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        if length_mm != 0.0:
+            dropped.append(line)
+            if abs(at_mm - planned_mm) >= 6 / 80:
+                blocks.append(dropped)
+                planned_mm, dropped = at_mm, []
+        del blocks[: max(0, len(blocks) - (15 - places))]
+        history.acknowledge(line, 15 - len(blocks))
+        waiting = [*(block[0] for block in blocks), *dropped]
+        assert history.executed < min(waiting, default=line + 1)
+
+
+def test_moves_too_short_for_a_place_of_their_own_wait_together() -> None:
+    history = LineHistory(waiting=15)
+    for step in moves(160, step_mm=0.04):
         history.send(step)
-        waiting += [step.line] if step.moves else []
-        del waiting[: max(0, len(waiting) - (15 - places))]
-        history.acknowledge(step.number, 15 - len(waiting))
-        assert history.executed < min(waiting, default=len(free) + 1)
+        history.acknowledge(step.number)
+    assert 160 - 70 <= history.executed <= 160 - 15 * 2  # two moves of 0.04 mm make a block of 6 steps at 80 per mm
+
+
+def test_a_smaller_planner_is_known_once_it_has_been_at_rest_twice() -> None:
+    planner = PlannerReports()
+    for _ in range(2):
+        planner.waiting_beside(7)
+        planner.rest()
+    assert [planner.waiting_beside(7), planner.waiting_beside(0)] == [0, 7]
+
+
+def test_an_answer_from_before_the_end_of_the_moves_says_nothing_of_the_size_of_the_planner() -> None:
+    planner = PlannerReports()
+    history = LineHistory(planner=planner)
+    for step in moves(3):
+        history.send(step)
+        history.acknowledge(step.number, 0)
+        history.end_moves(step.number + 1)  # the answer to M400 was lost
+    assert [planner.waiting_beside(0), planner.waiting_beside(3)] == [15, 15]
+
+
+def test_a_larger_planner_is_known_as_soon_as_it_reports_more() -> None:
+    planner = PlannerReports()
+    planner.waiting_beside(31)
+    assert [planner.waiting_beside(31), planner.waiting_beside(11)] == [0, 20]
 
 
 def test_a_damaged_number_of_free_places_moves_nothing_on() -> None:
@@ -55,7 +100,7 @@ def test_without_word_of_the_planner_only_a_barrier_tells() -> None:
         history.send(step)
         history.acknowledge(step.number)
     assert (history.acknowledged, history.executed) == (40, 0)
-    history.end_moves()
+    history.end_moves(44)
     assert history.executed == 40
 
 
