@@ -30,13 +30,13 @@ from machine.link.protocol.acknowledgement import Acknowledgement
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.flow_control import FlowControl
 from machine.link.protocol.framing import LINE_LIMIT, frame
-from machine.link.protocol.greeting import GREETING, Greeting
+from machine.link.protocol.greeting import GREETING, PLAIN_QUESTION, Greeting
 from machine.link.protocol.questions import QUESTION, QUESTIONS_MOST, Questions
-from machine.link.protocol.resends import Resends
+from machine.link.protocol.resends import ASKED_LIMIT, Resends
 from machine.link.protocol.states import TABLE, Signal, State
 from machine.link.protocol.timeout import Timeouts, Timing
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, GREETING_LINES, Window
-from profiles.errors import LocalProtocolError, PrinterError
+from profiles.errors import LocalProtocolError, PrinterError, SilenceError
 
 BEFORE_NUMBERS = (State.DRAIN, State.SYNC)  # an error is of what came before: no line of ours has a number yet
 GREETING_STATES = (*BEFORE_NUMBERS, State.HELLO)
@@ -96,7 +96,8 @@ class Connection:
         if not self.can_send(command):
             return 0
         self._send(command, now_s)
-        self._last_number_used = self.window.wire_number(self.window.sent) >= self.greeting.firmware.line.last_number
+        last_number = self.greeting.firmware.line.last_number
+        self._last_number_used = not self.greeting.keeps_numbers and self.window.wire_number(self.window.sent) >= last_number
         return self.window.sent
 
     def take(self) -> bytes:
@@ -153,11 +154,14 @@ class Connection:
                 if not isinstance(event, events.PlainOk) and (identity := events.identity_in(event)):
                     self._learn(identity)
                 self._handle_ok(event, now_s)
-            case events.Resend() if self.state is not State.SYNC:
+            case events.Resend() if self.state is State.SYNC:
+                self.greeting.wanted = event.line
+            case events.Resend():
                 self._handle_resend(event, now_s)
             case events.LineError() if self.state in BEFORE_NUMBERS:
                 self.greeting.heard = event.text
             case events.LineError():
+                self.resends.words = event.text
                 self._oks.expect_resend_ok(self._timeouts.hear_line_error(now_s))
             case events.Busy():
                 self.greeting.heard = event.text
@@ -193,7 +197,9 @@ class Connection:
             self._follow(Signal.UNCHECKED, now_s, verdict.torn_line(self.window.last_acknowledged))
             return
         if self.state is State.SYNC:
-            if ok.line is not None or ok.planner_free is None:  # else it belongs to the rest of a line torn by a restart
+            if self.greeting.asked_plainly and self.greeting.identity:
+                self._follow(Signal.SILENT, now_s, verdict.no_line_numbers())
+            elif ok.line is not None or ok.planner_free is None:  # else it belongs to the rest of a line torn by a restart
                 self._follow(Signal.SYNCED, now_s)
         elif self.state is State.QUIET:
             if self.resends.alone and ok.line is None and ok.temperature is None:
@@ -246,9 +252,12 @@ class Connection:
         window = self.window
         number = window.line_number(resend.line)
         plausible = window.can_mean(number)
-        if self.state is State.HELLO or (plausible and self.state is not State.QUIET):
+        if self.state is State.HELLO:
+            self.greeting.wanted = resend.line
+            self._follow(Signal.RESEND, now_s)
+        elif plausible and self.state is not State.QUIET:
             if too_much := self.resends.request(number):
-                self._follow(Signal.IMPOSSIBLE, now_s, verdict.noise(resend.line, too_much))
+                self._follow(Signal.IMPOSSIBLE, now_s, self._refusal(number, too_much))
                 return
             window.acknowledged = number - 1
             self._follow(Signal.RESEND, now_s)
@@ -260,6 +269,13 @@ class Connection:
         else:
             self._questions.implausible = number
             self._follow(Signal.IMPLAUSIBLE, now_s)
+
+    def _refusal(self, number: int, too_much: str) -> PrinterError:
+        """Why lines are not repeated any more: one that the printer does not take as it is, or too many."""
+        line, command = self.window.wire_number(number), self.window.command(number)
+        if self.resends.same_line and command:
+            return verdict.refused_line(line, command, ASKED_LIMIT, self.resends.words)
+        return verdict.noise(line, too_much)
 
     def _follow(self, signal: Signal, now_s: float, error: PrinterError | None = None) -> None:
         """Follow the table, then do what belongs to entering the state."""
@@ -280,12 +296,7 @@ class Connection:
         """What is said on entering a state, and what is known from then on."""
         match self.state:
             case State.SYNC:
-                error = self.greeting.give_up(self._decoder)
-                if error is not None:
-                    self._follow(Signal.SILENT, now_s, error)
-                    return
-                self.window.reset()
-                self._out += GREETING
+                self._greet(now_s)
             case State.HELLO:
                 self._send("M115", now_s)
             case State.OPEN:
@@ -302,6 +313,21 @@ class Connection:
                     self._out += framed
                 else:
                     self._follow(Signal.CAUGHT_UP, now_s)
+
+    def _greet(self, now_s: float) -> None:
+        """Begin the line numbers with M110, or where a firmware without it wants them; not without end."""
+        first = self.greeting.attempt(self._decoder)
+        if isinstance(first, SilenceError) and not self.greeting.asked_plainly:
+            self.greeting.asked_plainly = True
+            self._out += PLAIN_QUESTION
+        elif isinstance(first, PrinterError):
+            self._follow(Signal.SILENT, now_s, first)
+        else:
+            self.window.reset(first or 1)
+            if first:
+                self._follow(Signal.SYNCED, now_s)
+            else:
+                self._out += GREETING
 
     def _ask(self, now_s: float) -> None:
         """Ask what has arrived, or give M110, which is not checked for sequence, once more; not without end."""

@@ -128,7 +128,8 @@ Event = Ok | Resend | Busy | LineError | FirmwareFault | Start | Banner | Wait |
 
 NAME = "FIRMWARE_NAME:"
 OK = re.compile(rb"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
-RESEND = re.compile(r"(?:resend:|rs)\s*N?(\d{1,10})", re.IGNORECASE)
+# Teacup says why behind it: "rs N120 Expected checksum 67", "rs N120 Expected line number 120".
+RESEND = re.compile(r"(?:resend:|rs)\s*N?:?(\d{1,10})(?:\s+expected (?:checksum|line number) \d+)?", re.IGNORECASE)
 NOZZLE = re.compile(r"(?:^|\s)T0?:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 BED = re.compile(r"(?:^|\s)B:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 AXIS = re.compile(r"([A-Z]):\s*(-?\d+\.?\d*)")
@@ -147,6 +148,8 @@ OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
 # whose `!!` names nothing but the reason.
 SHUTDOWN = re.compile(r"// ?(Klipper state: Shutdown|Printer is shutdown)")
 UNKNOWN = re.compile(r'Unknown command: ?"?([A-Z][A-Z0-9_.]*)|\b([GM]\d+): Command is not supported')
+# Klipper's klippy.py, message_startup; older ones begin it with the second sentence.
+STARTING = ("printer is not ready", "host software is attempting to connect")
 MISSING = ("missing checksum", "no checksum", "no line number")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
 # Said by a firmware that has stopped for good, its heaters off: Marlin's kill(), Klipper's shutdown, RepRapFirmware's M112.
@@ -202,6 +205,11 @@ def unknown_command(event: Event) -> str:
 def lacks_checksum(event: Event) -> bool:
     """Whether a line was refused because it had no number or no checksum."""
     return isinstance(event, LineError) and any(words in event.text.lower() for words in MISSING)
+
+
+def is_starting(event: Event) -> bool:
+    """Whether a firmware refuses a command because it is still starting: it will take it in a few moments."""
+    return isinstance(event, FirmwareFault) and any(words in event.text.lower() for words in STARTING)
 
 
 def is_halt(event: Event) -> bool:

@@ -1,4 +1,4 @@
-"""The greeting: what a printer answers to M115, and how often it has been greeted in vain."""
+"""The greeting: how line numbers are agreed on, what a printer answers to M115, and how often it has been greeted in vain."""
 
 from machine.firmware import Firmware, identify
 from machine.firmware.marlin import MARLIN
@@ -10,17 +10,23 @@ from profiles.errors import PrinterError
 # No newline before it: an empty line counts as a line where checksums are insisted on (OctoPrint's virtual printer: Missing
 # checksum), and is answered with ok by Klipper and Smoothieware. What stands half written there costs one greeting.
 GREETING = b"N0 M110 N0*125\n"
+# The last attempt: a printer that answers it is there, at this rate, and takes no numbered lines. The newline ends a half line.
+PLAIN_QUESTION = b"\nM115\n"
+UNANSWERED_MOST = 3  # M110 in vain; then numbered lines are sent all the same, for the firmware may not know it
 
 
 class Greeting:
     """identity: the FIRMWARE_NAME line; firmware: the one it names; area: limits of its axes, where it reports them. heard: the
-    last words of a printer that were no answer to a greeting.
+    last words of a printer that were no answer to a greeting. wanted: the line number that the printer has asked for since the
+    last attempt, 0: none. keeps_numbers: it ignores M110. asked_plainly: PLAIN_QUESTION is under way.
     """
 
     def __init__(self, firmware: Firmware = MARLIN, rx_bytes: int | None = None, baud: int | None = None) -> None:
         self.firmware, self.identity, self.heard = firmware, "", ""
         self.capabilities: dict[str, bool] = {}
         self.area: Area | None = None
+        self.wanted = self._wanted_before = 0
+        self.keeps_numbers = self.asked_plainly = self._skipped = False
         self._rx_bytes, self._baud, self._tries = rx_bytes, baud, 0
 
     @property
@@ -52,9 +58,18 @@ class Greeting:
         else:
             self.area = answer
 
-    def give_up(self, decoder: LineDecoder) -> PrinterError | None:
-        """Why there is no sense in one more greeting; None when there is, and it counts as given."""
-        error = failed_greeting(decoder, self._tries, self._baud, self.heard)
-        if error is None:
-            self._tries += 1
-        return error
+    def attempt(self, decoder: LineDecoder) -> int | PrinterError:
+        """How to greet once more: the number of the first line, 0: after M110. Or why there is no sense in it.
+
+        A firmware that ignores M110 goes on with a number of its own: it asks for it after two attempts, or one without M110.
+        """
+        wanted, self.wanted = self.wanted, 0
+        self.keeps_numbers = wanted > 0 and (wanted == self._wanted_before or self._skipped)
+        self._wanted_before = wanted
+        if (error := failed_greeting(decoder, self._tries, self._baud, self.heard)) is not None:
+            return error
+        self._tries += 1
+        if self.keeps_numbers:
+            return wanted
+        self._skipped = self._tries > UNANSWERED_MOST and not wanted
+        return int(self._skipped)

@@ -11,14 +11,19 @@ NOISE_LIMIT = 20  # of them asked for again: a tenth, at which a print has a blo
 
 class Resends:
     """next_line: the first one still to be repeated; repeated: how many were, in all; alone: nothing but the `ok` that belongs to
-    the Resend is on its way.
+    the Resend is on its way; words: what the printer has said of the line that it refused last.
     """
 
     def __init__(self) -> None:
         self.next_line = self.repeated = 0
-        self.alone = False
+        self.alone, self.words = False, ""
         self._asked = self._times = 0
         self._asked_lines: deque[int] = deque()
+
+    @property
+    def same_line(self) -> bool:
+        """Whether of the last lines only the newest one was asked for: it is refused, others pass."""
+        return len(set(self._asked_lines)) == 1
 
     def request(self, number: int) -> str:
         """Take note of a Resend; what is too much about it, "" when the line can be repeated."""

@@ -23,7 +23,18 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: s
         return RemoteProtocolError(text)
     if heard:
         return RemoteProtocolError(f"the printer did not take {tries} greetings: the last that it said was {heard[:60]!r}")
-    return SilenceError(f"the printer did not answer {tries} greetings: it may be off, or speak at another rate than {at}")
+    return SilenceError(
+        f"the printer did not answer {tries} greetings (M110, M115 with line numbers): it may be off, or speak at another "
+        f"rate than {at}"
+    )
+
+
+def no_line_numbers() -> PrinterError:
+    """It answers a line without number, and none that has one."""
+    return RemoteProtocolError(
+        "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
+        "lines, for a damaged one could not be told"
+    )
 
 
 def silence(line: int, questions: int) -> PrinterError:
@@ -51,6 +62,15 @@ def lost_answer(line: int, command: str, firmware: str) -> PrinterError:
     return RemoteProtocolError(
         f"line {line} ({command}) was not answered, and {firmware} never asks for a lost line again: "
         "whether it was done is not known"
+    )
+
+
+def refused_line(line: int, command: str, times: int, words: str) -> PrinterError:
+    """One line is asked for again and again while those before it passed. words: the printer's, "" when it says no more."""
+    said = f": {words[:80]!r}" if words else ""
+    return RemoteProtocolError(
+        f"the printer has refused line {line} ({command}) {times} times{said}; lines before it passed, so its firmware does not "
+        "take this command as it is, or the cable has just become too noisy"
     )
 
 

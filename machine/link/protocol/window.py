@@ -40,10 +40,11 @@ class Window:
         self._before = 0
         self._history: dict[int, bytes] = {}
 
-    def reset(self) -> None:
-        """Nothing was sent yet."""
+    def reset(self, first: int = 1) -> None:
+        """Nothing was sent yet. first: the number of the first line on the wire."""
         self.clear_flight()
-        self.sent = self.acknowledged = self._before = 0
+        self.sent = self.acknowledged = 0
+        self._before = 1 - first
         self._history.clear()
 
     def wire_number(self, number: int) -> int:

@@ -1,6 +1,7 @@
 """The connection on a bench: what a printer says, the clock, and the bytes that the sender writes."""
 
 import random
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -146,6 +147,81 @@ def test_a_printer_that_takes_no_greeting_is_told_by_what_it_said() -> None:
         table.wait(3.1)
     assert str(table.connection.fault) == (
         "the printer did not take 6 greetings: the last that it said was 'Error: Missing checksum'"
+    )
+
+
+class Counting:
+    """A firmware that counts lines from `last` on; what it makes of M110 is its own affair."""
+
+    def __init__(self, last: int, m110: bytes, takes_numbers: bool = True) -> None:
+        self.last, self.m110, self.takes_numbers = last, m110, takes_numbers
+
+    def answer(self, line: bytes) -> bytes:
+        numbered = re.match(rb"N(\d+) (.*)\*\d+$", line)
+        command = numbered[2] if numbered else line
+        if command.startswith(b"M110"):
+            return self.m110
+        if numbered and not self.takes_numbers:
+            return b""
+        if numbered and int(numbered[1]) != self.last + 1:
+            return b"Error:Line Number is not Last Line Number+1, Last Line: %d\nResend: %d\nok\n" % (self.last, self.last + 1)
+        self.last += numbered is not None
+        return {b"M115": b"FIRMWARE_NAME:Own\nok\n", b"M105": b"ok T:20.0 /0.0\n"}.get(command, b"ok\n")
+
+
+def converse(printer: Counting, seconds: float = 40.0) -> Table:
+    """A connection and a printer, until it is open or has failed."""
+    table = Table()
+    while table.now_s < seconds and table.connection.fault is None and table.connection.state is not State.OPEN:
+        table.wait(0.1)
+        for line in table.wire().splitlines():
+            table.say(printer.answer(line) if line else b"")
+    return table
+
+
+@pytest.mark.parametrize("m110", [
+    b"",  # not known, and not a word about it
+    b"ok\n",  # taken without effect: prusa3d/Prusa-Firmware#232
+    b"Error:Line Number is not Last Line Number+1, Last Line: 57\nResend: 58\nok\n",
+    b"Resend: 58\n",
+    b'echo:Unknown command: "M110 N0"\nok\n',
+])  # fmt: skip
+@pytest.mark.parametrize("last", [0, 57])
+def test_a_printer_that_does_not_heed_m110_is_given_the_numbers_it_asks_for(m110: bytes, last: int) -> None:
+    printer = Counting(last, m110.replace(b"57", b"%d" % last).replace(b"58", b"%d" % (last + 1)))
+    table = converse(printer)
+    assert table.connection.fault is None
+    assert printer.last == last + 2
+    assert table.send("G1 X1") == frame(last + 3, "G1 X1")
+
+
+def test_a_printer_that_keeps_its_own_numbers_is_never_told_to_begin_anew() -> None:
+    printer = Counting(99_897, b"ok\n")
+    table = converse(printer)
+    table.send("G1 X1")
+    table.say(b"ok\n")
+    table.wait(0.1)
+    assert table.send("G1 X2") == frame(99_901, "G1 X2")
+
+
+def test_a_printer_that_answers_only_lines_without_numbers_is_told_from_one_that_is_off() -> None:
+    table = converse(Counting(0, b"", takes_numbers=False))
+    assert str(table.connection.fault) == (
+        "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
+        "lines, for a damaged one could not be told"
+    )
+
+
+def test_a_command_that_is_refused_for_ever_is_named_with_the_printers_words() -> None:
+    """OctoPrint/OctoPrint#1468: a Marlin whose display command eats part of its line."""
+    table = opened()
+    table.send("M117 Printing...")
+    for _ in range(11):
+        table.say(b"Error:checksum mismatch, Last Line: 10\nResend: 11\nok\n")
+        table.wait(0.2)
+    assert str(table.connection.fault) == (
+        "the printer has refused line 11 (M117 Printing...) 10 times: 'Error:checksum mismatch, Last Line: 10'; lines before it "
+        "passed, so its firmware does not take this command as it is, or the cable has just become too noisy"
     )
 
 

@@ -18,6 +18,9 @@ LINES: list[tuple[bytes, events.Event]] = [
     (b"Resend: 12", events.Resend(12)),
     (b"Resend:12\r", events.Resend(12)),
     (b"rs N12", events.Resend(12)),
+    (b"rs N120 Expected checksum 67", events.Resend(120)),  # Teacup, kliment/Printrun#271
+    (b"rs N120 Expected line number 120", events.Resend(120)),
+    (b"Resend: N:12", events.Resend(12)),
     (b"echo:busy: processing", events.Busy("echo:busy: processing")),
     (b"busy: paused for user", events.Busy("busy: paused for user")),
     (b"X:1.00 Y:2.00 Z:3.00 A:-30.00 C:725.00 E:0.10 Count X:80 Y:160", events.Position((
