@@ -7,7 +7,8 @@ from enum import Enum
 from threading import Event as Flag
 from time import monotonic
 
-from machine.firmware.line import BAUDS
+from machine.firmware import identify
+from machine.firmware.line import BAUDS, LineRules
 from machine.link.port import Port
 from machine.link.protocol import events
 from machine.link.protocol.decoder import LineDecoder
@@ -27,10 +28,16 @@ class Kind(Enum):
 
     PRINTER = "printer"
     BUSY = "busy printer"
+    STARTING = "starting printer"
     HALTED = "halted printer"
     STRANGER = "no printer"
     RUBBISH = "rubbish"
     SILENT = "silent"
+
+    @property
+    def is_printer(self) -> bool:
+        """Whether it is one, though perhaps none that can print now."""
+        return self in (Kind.PRINTER, Kind.BUSY, Kind.STARTING, Kind.HALTED)
 
 
 @dataclass(frozen=True)
@@ -38,13 +45,14 @@ class Answer:
     """What answers. words: the firmware's own line, its error, what it is busy with, or the last words of a stranger.
 
     letters: axes that M114 reports, the filament's left out; "" when none. limits: letter -> least and greatest
-    value, of a firmware that reports them.
+    value, of a firmware that reports them. revival: what lets a printer that has halted print again.
     """
 
     kind: Kind
     words: str = ""
     letters: str = ""
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    revival: str = LineRules.revival
 
     @property
     def firmware(self) -> str:
@@ -59,7 +67,7 @@ def ask(port: Port, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> A
     inquiry = _Inquiry(port, stop or Flag())
     inquiry.listen("M115", timeout_s, lambda: inquiry.named)
     if inquiry.named:
-        inquiry.listen("M114", POSITION_S, lambda: inquiry.placed)
+        inquiry.listen("M114", POSITION_S, lambda: inquiry.placed or inquiry.starting)
     return inquiry.answer()
 
 
@@ -75,7 +83,7 @@ def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: F
         if rate != baud:
             port.set_baud(rate)
             answer = ask(port, QUICK_S, stop)
-            if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED):
+            if answer.kind.is_printer:
                 return answer, rate
     port.set_baud(baud)
     return first, baud
@@ -89,7 +97,7 @@ class _Inquiry:
         self._decoder = LineDecoder()
         self._words = self._fault = self._letters = ""
         self._area: events.Area | None = None
-        self._ok = self.named = self.placed = self._refused = False
+        self._ok = self.named = self.placed = self.starting = self._refused = False
         self._busy = ""  # what it says of that
         self._next_number = 0  # that a firmware which insists on numbers and checksums wants
 
@@ -122,7 +130,13 @@ class _Inquiry:
     def answer(self) -> Answer:
         """What all of it amounts to."""
         if self._fault:
-            return Answer(Kind.STRANGER if GRBL_SAYS.fullmatch(self._fault) else Kind.HALTED, self._fault)
+            if GRBL_SAYS.fullmatch(self._fault):
+                return Answer(Kind.STRANGER, self._fault)
+            firmware = identify(self._words)
+            revival = LineRules.revival if firmware is None else firmware.line.revival
+            return Answer(Kind.HALTED, self._fault.removeprefix("!!").strip(), revival=revival)
+        if self.starting:
+            return Answer(Kind.STARTING, self._words)
         if self._words or self._ok or self._refused:
             return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
         if self._busy:
@@ -133,7 +147,9 @@ class _Inquiry:
         return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
 
     def _read(self, event: events.Event) -> None:
-        if isinstance(event, events.FirmwareFault):
+        if events.is_starting(event):
+            self.starting = True
+        elif isinstance(event, events.FirmwareFault):
             self._fault = event.text
         elif isinstance(event, events.Busy):
             self._busy = event.text.rpartition("busy:")[2].strip() or "busy"

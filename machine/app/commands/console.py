@@ -69,7 +69,7 @@ def console(request: ConsoleRequest) -> int:
                 shown.hear(data)
 
         hint = "; /help tells what can be typed" if sys.stdin.isatty() else ""
-        say(describe_answer(identify_printer(wire, request.baud), request.baud) + hint)
+        say(describe_answer(identify_printer(wire, request.baud, halted=True), request.baud) + hint)
         session = CommandSession(TappedWire(wire, tell), dialect_of(machine).longest_line)
         return _Console(session, shown, request.leave_heaters).run()
 
@@ -96,7 +96,11 @@ class _Console:
         except StopError:
             raise self._session.stop() from None
         except PrinterError as error:
-            raise type(error)(f"{error}{self._given_up()}") from None
+            if not self._session.restarts:
+                raise type(error)(f"{error}{self._given_up()}") from None
+        if self._session.restarts:
+            say("the printer restarts, its heaters are off: the next console or print waits until it is ready")
+            return code
         try:
             self._leave(ask=typed and not code)
         except KeyboardInterrupt:

@@ -3,11 +3,13 @@
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.protocol.events import Event, Ok, Position, Temperature, position_in, unknown_command
-from machine.link.protocol.framing import LINE_LIMIT, command_of
+from machine.link.protocol.framing import LINE_LIMIT, command_of, name_of
 from machine.link.protocol.timeout import Timing
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from profiles.errors import FirmwareError, PortError
 
+# Klipper's: heaters go off and the conversation ends.
+RESTARTS = frozenset({"RESTART", "FIRMWARE_RESTART"})
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
 
 
@@ -47,6 +49,11 @@ class CommandSession:
             self._command = command
             self.exchange.send(command)
             self.exchange.settle()
+
+    @property
+    def restarts(self) -> bool:
+        """Whether the newest command restarts the printer."""
+        return bool(self._command) and name_of(self._command) in RESTARTS and self._command not in self.unknown
 
     def listen(self) -> None:
         """One short turn without sending anything."""

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
+from time import monotonic, sleep
 
 from machine.app.embedded_profile import read_embedded_profile
 from machine.app.pipeline.programs import refuse_errors
@@ -12,7 +13,8 @@ from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import find_starvation
 from machine.firmware import dialect_of, dialects, firmware_of, identify
-from machine.link.identification import Answer, Kind, ask_at_any_rate
+from machine.firmware.line import LineRules
+from machine.link.identification import Answer, Kind, ask, ask_at_any_rate
 from machine.link.port import Port, open_port
 from machine.program import Program
 from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError, SilenceError
@@ -20,22 +22,32 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 ECHO = ("M114", "M115")
+STARTING_S, STARTING_AGAIN_S = 60.0, 5.0  # Klipper takes 5 to 20 s until its boards are connected
 SLACK = 0.01  # mm or deg: what the firmware and the program round
 # What a program depends on: made for one such machine it is wrong on another. Speeds and accelerations are not among it.
 SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
 AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 
 
-def identify_printer(wire: Port, baud: int) -> Answer:
-    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
+def identify_printer(wire: Port, baud: int, halted: bool = False) -> Answer:
+    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is.
+
+    One that is still starting is waited for. halted: one that has halted will do, if a command lets it print again.
+    """
     answer, rate = ask_at_any_rate(wire, baud)
-    check_answer(answer, wire.name, baud, rate)
+    end_s = monotonic() + STARTING_S
+    while answer.kind is Kind.STARTING and monotonic() < end_s:
+        say(f"{answer.firmware} at {wire.name} is still starting: waiting up to {end_s - monotonic():.0f} s more")
+        sleep(STARTING_AGAIN_S)
+        answer = ask(wire)
+    if not (halted and answer.kind is Kind.HALTED and rate == baud and answer.revival != LineRules.revival):
+        check_answer(answer, wire.name, baud, rate)
     return answer
 
 
 def check_answer(answer: Answer, port: str, baud: int, rate: int) -> None:
     """Refuse what is no printer, or one that answers at another rate; raises PrinterError with a sentence of what it is."""
-    if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED) and rate != baud:
+    if answer.kind.is_printer and rate != baud:
         raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: use --baud {rate}")
     if answer.kind is not Kind.PRINTER:
         error, refusal, _ = NO_PRINTERS[answer.kind]
@@ -48,7 +60,7 @@ def _words(answer: Answer) -> dict[str, str]:
     usual = answer.words.startswith(("processing", "paused for", "busy")) or not words
     work = "it heats, moves or waits for a person" if usual else words
     stranger = "it sends back what it is told" if answer.words in ECHO else f"it says {words!r}"
-    return {"words": words, "work": work, "stranger": stranger}
+    return {"words": words, "work": work, "stranger": stranger, "firmware": answer.firmware, "revival": answer.revival}
 
 
 # What answers that is no printer to print on: the error, as a sentence, and how it is listed.
@@ -58,9 +70,14 @@ NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
         "the printer at {port} is busy ({work}): wait until it is done, or restart it",
         "a printer that is busy ({work}), at {baud} baud",
     ),
+    Kind.STARTING: (
+        PrinterError,
+        "the printer at {port} is still starting ({firmware}): if it does not become ready, look at Klipper's own log",
+        "a printer that is still starting ({firmware}), at {baud} baud",
+    ),
     Kind.HALTED: (
         FirmwareError,
-        "the printer at {port} has stopped with an error of its own ({words}): switch it off and on again",
+        "the printer at {port} has stopped with an error of its own ({words}): {revival} before the next print",
         "a printer that has stopped with an error ({words}), at {baud} baud",
     ),
     Kind.STRANGER: (

@@ -85,7 +85,7 @@ def answer_words(report: PortReport) -> str:
 def port_json(report: PortReport) -> dict[str, Any]:
     """The same for a program: every key always there, null where it is not known."""
     answer, device = report.answer, report.device
-    printer = answer is not None and answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED)
+    printer = answer is not None and answer.kind.is_printer
     return {
         "port": device.name,
         "path": device.path,

@@ -66,6 +66,17 @@ def test_lines_of_a_pipe_are_sent_and_answers_are_shown(done: Done, capsys: Caps
     assert err.splitlines()[0].endswith("axes X Y Z A C, at 115200 baud")
 
 
+def test_a_klipper_that_has_shut_down_can_be_restarted(piped: Piped, capsys: Capsys) -> None:
+    """It answers M115, M110 and M105; everything else but the restart is refused."""
+    refused = "// MCU 'mcu' shutdown: Timer too close\n// Printer is shutdown\n!! MCU 'mcu' shutdown: Timer too close\nok"
+    known = {"M115": "ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0", "M110": "ok", "M105": "ok T:0"}
+    with on_terminal(scripted({**known, "FIRMWARE_RESTART": "ok\n// Klipper state: Disconnect"}, refused)) as path:
+        assert piped("FIRMWARE_RESTART\n", path) == 0
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        "the printer restarts, its heaters are off: the next console or print waits until it is ready"
+    )
+
+
 def test_an_empty_pipe_is_no_error(done: Done, capsys: Capsys) -> None:
     assert done("")[0] == 0
     assert capsys.readouterr().out == ""

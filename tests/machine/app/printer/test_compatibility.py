@@ -15,6 +15,7 @@ from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
 from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import PrinterError
 from profiles.profile import load
 from tests.machine.peers import PATIENCE_S, behind_rfc2217, hear_out, on_terminal, scripted
 from tests.machine.peers import Answer as Words
@@ -97,6 +98,67 @@ def test_the_rate_is_found_behind_rfc_2217_too(monkeypatch: pytest.MonkeyPatch) 
     with on_terminal(talking_at(230400)) as path, behind_rfc2217(path) as address, open_port(address, 115200) as port:
         answer, rate = compatibility.ask_at_any_rate(port, 115200)
     assert (answer.kind, answer.letters, rate) == (Kind.PRINTER, "XYZAC", 230400)
+
+
+KLIPPER = "ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0"
+# klippy/gcode.py, _respond_error, with the messages of klippy/klippy.py and of klippy/mcu.py.
+STARTING = (
+    "// Printer is not ready\n// The klippy host software is attempting to connect.  Please\n// retry in a few moments.\n"
+    "!! Printer is not ready\nok"
+)
+SHUT_DOWN = (
+    "// MCU 'mcu' shutdown: Timer too close\n// Once the underlying issue is corrected, use the\n"
+    '// "FIRMWARE_RESTART" command to reset the firmware, reload the\n// config, and restart the host software.\n'
+    "// Printer is shutdown\n!! MCU 'mcu' shutdown: Timer too close\nok"
+)
+READY = "X:0.000 Y:0.000 Z:0.000 E:0.000\nok"
+
+
+def klipper(*places: str) -> Words:
+    """A Klipper that answers M114 as told, in turn, the last one again and again."""
+    waiting = list(places)
+
+    def answer(data: bytes, _baud: int) -> bytes:
+        said = []
+        for line in data.split(b"\n"):
+            if b"M114" in line:
+                said.append(waiting.pop(0) if len(waiting) > 1 else waiting[0])
+            elif line:
+                said.append(KLIPPER if b"M115" in line else "ok T:0" if b"M105" in line else "ok")
+        return "".join(f"{text}\n" for text in said).encode("ascii")
+
+    return answer
+
+
+def test_a_klipper_that_has_shut_down_wants_a_firmware_restart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with on_terminal(klipper(SHUT_DOWN)) as path:
+        assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"tiltprint: the printer at {path} has stopped with an error of its own (MCU 'mcu' shutdown: Timer too close): "
+        "send FIRMWARE_RESTART by tiltprint console before the next print"
+    )
+
+
+def test_a_klipper_that_is_still_starting_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(compatibility, "STARTING_AGAIN_S", 0.0)
+    with on_terminal(klipper(STARTING, STARTING, READY)) as path, open_port(path, 115200) as wire:
+        answer = compatibility.identify_printer(wire, 115200)
+    assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZ")
+    told = capsys.readouterr().err.splitlines()
+    assert [line.partition(":")[0] for line in told] == [f"Klipper v0.13.0 at {path} is still starting"] * 2
+
+
+def test_a_klipper_that_never_becomes_ready_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compatibility, "STARTING_AGAIN_S", 0.01)
+    monkeypatch.setattr(compatibility, "STARTING_S", 0.05)
+    with (
+        on_terminal(klipper(STARTING)) as path,
+        open_port(path, 115200) as wire,
+        pytest.raises(PrinterError, match=r"is still starting \(Klipper v0.13.0\): if it does not become ready"),
+    ):
+        compatibility.identify_printer(wire, 115200)
 
 
 def test_a_busy_port_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
