@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from time import monotonic, sleep
 from typing import Protocol
 
-from machine.link.port import open_port
+from machine.link.port import SerialDevice, open_port, serial_devices
 from profiles.errors import PortError
 
 EVERY_S = 0.2
@@ -35,6 +35,7 @@ class Wire(Protocol):
 class Medium:
     """How a line is opened (name, baud; raises PortError), what time it is (s), and how time is spent (s).
 
+    devices: the serial ports that there are, where a lost one may have come back.
     lost_s: so long a port that vanished in mid-print is waited for; a person finds the plug in two minutes, and a hot nozzle
     should not stand in the print for longer.
     """
@@ -42,17 +43,23 @@ class Medium:
     open: Callable[[str, int], Wire] = open_port
     now_s: Callable[[], float] = monotonic
     wait: Callable[[float], None] = sleep
+    devices: Callable[[], tuple[SerialDevice, ...]] = serial_devices
     lost_s: float = 120.0
 
 
 SERIAL = Medium()
 
 
-def reopen(name: str, baud: int, medium: Medium, on_turn: Callable[[], None], end_s: float) -> Wire | None:
-    """The wire to the printer once it is there again, None when it is not by end_s. on_turn() may raise to end the wait."""
+def reopen(find: Callable[[], str | None], baud: int, medium: Medium, on_turn: Callable[[], None], end_s: float) -> Wire | None:
+    """The wire to the printer once it is there again, None when it is not by end_s.
+
+    find: the name of its port, None while it has none. on_turn() may raise to end the wait.
+    """
     while medium.now_s() < end_s:
         on_turn()
         medium.wait(EVERY_S)
+        if (name := find()) is None:
+            continue
         try:
             return medium.open(name, baud)
         except PortError:

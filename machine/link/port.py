@@ -5,6 +5,7 @@ import os
 import select
 import socket
 import stat
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic
@@ -39,12 +40,17 @@ with suppress(ImportError):
 
 @dataclass(frozen=True)
 class SerialDevice:
-    """A serial port of this computer. name: the stable one of a USB adapter where there is one, else the path."""
+    """A serial port of this computer. name: the stable one of a USB adapter where there is one, else the path.
+
+    model: vendor and product of a USB device; location: the USB socket it is plugged into; "" where they are not known.
+    """
 
     name: str
     path: str
     description: str
     serial_number: str
+    model: str = ""
+    location: str = ""
 
 
 class RefusedPortError(PortError):
@@ -229,6 +235,8 @@ def serial_devices() -> tuple[SerialDevice, ...]:
             path=port.device,
             description=_description(port),
             serial_number=port.serial_number or "",
+            model=_model(port),
+            location=port.location or "",
         )
         for port in (() if list_ports is None else list_ports.comports())
     ]
@@ -251,8 +259,30 @@ def stable_name(port: str) -> str:
 def _description(port: Any) -> str:
     """Maker and product as the adapter itself reports them over USB."""
     words = [word for word in (port.manufacturer, port.product or port.description) if word and word != "n/a"]
-    ids = f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None and port.pid is not None else ""
+    ids = _model(port)
     return " ".join([*dict.fromkeys(words), *([f"({ids})"] if ids else [])])
+
+
+def _model(port: Any) -> str:
+    return f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None and port.pid is not None else ""
+
+
+def find_device(port: str, devices: Sequence[SerialDevice]) -> SerialDevice | None:
+    """The device that is open under a name; None of an address, a pseudo-terminal, or what the system does not list."""
+    path = os.path.realpath(port)
+    return next((device for device in devices if port == device.name or path == os.path.realpath(device.path)), None)
+
+
+def find_again(lost: SerialDevice, devices: Sequence[SerialDevice]) -> SerialDevice | None:
+    """A USB device that was lost, under whatever name it is there now; None while it is not.
+
+    It is the one of its model with its serial number, or without any in its socket, or without that under its path: never another
+    one, though it has taken its name. Where several have the same number the socket decides, too.
+    """
+    same = [device for device in devices if (device.model, device.serial_number) == (lost.model, lost.serial_number)]
+    if not lost.serial_number or len(same) > 1:
+        same = [device for device in same if device.location == lost.location and (lost.location or device.path == lost.path)]
+    return same[0] if len(same) == 1 else None
 
 
 def port_names() -> list[str]:

@@ -10,7 +10,7 @@ from machine.link.journal import Journal
 from machine.link.line_outcome import line_was_done
 from machine.link.medium import SERIAL, Medium, reopen
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
-from machine.link.port import stable_name
+from machine.link.port import find_again, find_device, stable_name
 from machine.link.progress import PrintJob, Progress, Schedule, last_known
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
@@ -79,10 +79,9 @@ def print_lines(
         total = sum(1 for number, line in enumerate(lines, 1) if command_of(line, number, limit))
     job = PrintJob(total, schedule, limit, profile)
     feed = Feed(job, control=control, journal=journal, on_progress=on_progress, stop=stop, start_s=medium.now_s())
-    name = stable_name(port)
+    finder = _PortFinder(feed, port, baud, medium)
     wire = medium.open(port, baud)
     rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
-    finder = _PortFinder(feed, name, baud, medium)
     exchange = Exchange(
         wire, medium, timing=timing or Timing(), on_event=feed.handle_event, on_turn=feed.handle_turn, on_lost=finder,
         limit=limit, rx_bytes=rx_bytes, baud=baud,
@@ -97,15 +96,34 @@ def print_lines(
 class _PortFinder:
     """Waits for a lost port. A firmware that cannot be asked by line number is asked for its place instead."""
 
-    def __init__(self, feed: Feed, name: str, baud: int, medium: Medium) -> None:
-        self._feed, self._name, self._baud, self._medium = feed, name, baud, medium
+    def __init__(self, feed: Feed, port: str, baud: int, medium: Medium) -> None:
+        self._feed, self._name, self._baud, self._medium = feed, stable_name(port), baud, medium
+        self._device = find_device(port, medium.devices())
+        self._path = "" if self._device is None else self._device.path
+
+    def _find(self) -> str | None:
+        """The name of the printer's port now. A device that USB tells nothing of is looked for under its own name only."""
+        if self._device is None or not self._device.model:
+            return self._name
+        device = find_again(self._device, self._medium.devices())
+        if device is None:
+            return None
+        self._path = device.path
+        return device.name
 
     def __call__(self, error: PortError) -> Reconnection:
+        before = self._path
+        reconnection = self._reconnect(error)
+        if self._path != before:
+            self._feed.set_state(self._feed.state, f"the printer has come back at {self._path}")
+        return reconnection
+
+    def _reconnect(self, error: PortError) -> Reconnection:
         feed, medium = self._feed, self._medium
         feed.exchange.wire.close()
         end_s = medium.now_s() + medium.lost_s
         with feed.in_state("reconnecting", f"{error}; waiting {medium.lost_s:.0f} s for it to come back"):
-            while (wire := reopen(self._name, self._baud, medium, feed.poll, end_s)) is not None:
+            while (wire := reopen(self._find, self._baud, medium, feed.poll, end_s)) is not None:
                 if feed.exchange.connection.greeting.firmware.line.resends:
                     return Reconnection(wire, None)
                 feed.exchange.wire = wire  # whoever cancels meanwhile wants the heaters off

@@ -13,15 +13,18 @@ from time import monotonic
 import pytest
 
 from machine.link import port as port_module
-from machine.link.medium import SERIAL
-from machine.link.port import Port, open_port, serial_devices
+from machine.link.medium import SERIAL, Wire
+from machine.link.port import Port, SerialDevice, find_again, find_device, open_port, serial_devices
 from machine.link.protocol.timeout import Timing
 from machine.link.stream import print_lines
 from machine.simulator.board import BuildOptions
+from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
+from machine.simulator.virtual import VirtualPrinter
 from profiles.errors import PortError
 from profiles.profile import load
+from tests.machine.link.test_stream import HEAT, assert_executed, strokes
 from tests.machine.peers import PATIENCE_S, RATES, behind_rfc2217, on_socket, on_terminal
 
 MACHINE = load().machine
@@ -202,6 +205,7 @@ def test_serial_devices_are_told_once_and_stable_names_first(monkeypatch: pytest
             self.device, self.product, self.serial_number = device, product, number
             self.manufacturer, self.description = None, "n/a"
             self.vid, self.pid = (0x2341, 0x42) if product else (None, None)
+            self.location = "1-1.2" if product else None
 
     ports = [Found("/dev/ttyS0", None, None), Found("/dev/ttyACM0", "Mega 2560", "7533")]
     monkeypatch.setattr(port_module.list_ports, "comports", lambda: ports)
@@ -211,3 +215,76 @@ def test_serial_devices_are_told_once_and_stable_names_first(monkeypatch: pytest
         ("/dev/serial/by-id/usb-Mega", "/dev/ttyACM0", "Mega 2560 (2341:0042)", "7533"),
         ("/dev/ttyS0", "/dev/ttyS0", "", ""),
     ]
+
+
+def adapter(path: str, number: str = "7533", socket_: str = "1-1.2", model: str = "2341:0042") -> SerialDevice:
+    return SerialDevice(path, path, "", number, model, socket_)
+
+
+HOME = adapter("/dev/ttyACM0")
+
+
+@pytest.mark.parametrize(("lost", "there", "found"), [
+    (HOME, [adapter("/dev/ttyACM1")], "/dev/ttyACM1"),
+    (HOME, [adapter("/dev/ttyACM1", socket_="3-2")], "/dev/ttyACM1"),  # plugged into another socket
+    (HOME, [], None),
+    (HOME, [adapter("/dev/ttyACM0", number="9999")], None),  # another one of the same model has taken its name
+    (HOME, [adapter("/dev/ttyACM0", model="1a86:7523")], None),
+    (HOME, [adapter("/dev/ttyACM1", socket_="3-2"), adapter("/dev/ttyACM2")], "/dev/ttyACM2"),  # two with one number
+    (HOME, [adapter("/dev/ttyACM1", socket_="3-2"), adapter("/dev/ttyACM2", socket_="3-3")], None),
+    (adapter("/dev/ttyUSB0", ""), [adapter("/dev/ttyUSB1", "")], "/dev/ttyUSB1"),
+    (adapter("/dev/ttyUSB0", ""), [adapter("/dev/ttyUSB0", "", socket_="3-2")], None),
+    (adapter("/dev/ttyUSB0", ""), [adapter("/dev/ttyUSB0", "9999")], None),
+    (adapter("COM3", "", ""), [adapter("COM4", "", "")], None),  # neither number nor socket: the name is all there is
+    (adapter("COM3", "", ""), [adapter("COM3", "", "")], "COM3"),
+])  # fmt: skip
+def test_a_lost_adapter_is_found_by_its_serial_number_or_its_socket_and_no_other_is_taken_for_it(
+    lost: SerialDevice, there: list[SerialDevice], found: str | None
+) -> None:
+    device = find_again(lost, there)
+    assert (None if device is None else device.path) == found
+
+
+def test_a_device_is_known_by_its_path_and_by_its_stable_name() -> None:
+    stable = replace(HOME, name="/dev/serial/by-id/usb-Mega")
+    for name in ("/dev/ttyACM0", "/dev/serial/by-id/usb-Mega"):
+        assert find_device(name, [adapter("/dev/ttyACM1"), stable]) is stable
+    assert find_device("socket://printer:23", [stable]) is None
+
+
+def test_a_printer_that_comes_back_under_another_name_prints_on_and_its_new_port_is_told() -> None:
+    printer = VirtualPrinter(MACHINE, faults=FaultScript((Fault("disconnect", 30, unit="line", seconds=2.0),)))
+    opened, messages = list[str](), list[str]()
+
+    def devices() -> tuple[SerialDevice, ...]:
+        another = adapter("/dev/ttyACM0", number="9999")
+        return (adapter("/dev/ttyACM1"), another) if opened else (HOME,)
+
+    def open_it(name: str, baud: int) -> Wire:
+        wire = printer.medium.open(name, baud)
+        opened.append(name)
+        return wire
+
+    medium = replace(printer.medium, open=open_it, devices=devices)
+    lines = HEAT + strokes(60)
+    outcome = print_lines(lines, "/dev/ttyACM0", medium=medium, on_progress=lambda moment: messages.append(moment.message))
+    assert_executed(printer.record, lines)
+    assert (outcome.cancelled, opened) == (False, ["/dev/ttyACM0", "/dev/ttyACM1"])
+    assert "the printer has come back at /dev/ttyACM1" in messages
+
+
+def test_another_printer_under_the_name_of_the_lost_one_is_never_opened() -> None:
+    printer = VirtualPrinter(MACHINE, faults=FaultScript((Fault("disconnect", 30, unit="line", seconds=2.0),)))
+    opened = list[str]()
+
+    def devices() -> tuple[SerialDevice, ...]:
+        return (adapter("/dev/ttyACM0", number="9999" if opened else "7533"),)
+
+    def open_it(name: str, baud: int) -> Wire:
+        opened.append(name)
+        return printer.medium.open(name, baud)
+
+    medium = replace(printer.medium, open=open_it, devices=devices)
+    with pytest.raises(PortError, match="it did not come back within 120 s"):
+        print_lines(HEAT + strokes(60), "/dev/ttyACM0", medium=medium)
+    assert opened == ["/dev/ttyACM0"]
