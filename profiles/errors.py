@@ -47,6 +47,19 @@ def causes(error: BaseException | None) -> list[BaseException]:
     return beneath
 
 
+def add_words(error: BaseException, words: str) -> None:
+    """Say more about an error on its way: a UserError in its sentence behind a semicolon, any other in a note."""
+    if isinstance(error, UserError):
+        error.args = (f"{error}; {words}",)
+    else:
+        error.add_note(words)
+
+
+def notes(error: BaseException) -> str:
+    """The notes that were added to an error on its way, each behind a semicolon; "" where there are none."""
+    return "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
+
+
 class ProfileError(UserError):
     """A profile or a --set option is wrong; the message lists every problem with its key."""
 

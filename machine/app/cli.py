@@ -17,7 +17,7 @@ from machine.app import model_cli, printer_cli, setup_cli
 from machine.app.terminal.interrupts import outside_compiler
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.usage import sentence
-from profiles.errors import UserError, causes
+from profiles.errors import UserError, causes, notes
 
 ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by what --install-completion writes: words are wanted, no command
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -77,8 +77,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         return _complain(sentence(error, given))
     except UserError as error:
         return _complain(str(error))
-    except (KeyboardInterrupt, typer.Abort):
-        return _complain("interrupted", 130)
+    except (KeyboardInterrupt, typer.Abort) as error:
+        return _complain(f"interrupted{notes(error)}", 130)
     except BrokenPipeError:
         return 0
     except Exception as error:  # noqa: BLE001 - the one place where a bug becomes a message and a log file

@@ -8,7 +8,7 @@ from contextlib import suppress
 from importlib.metadata import distributions
 from pathlib import Path
 
-from profiles.errors import OutputError, reason
+from profiles.errors import OutputError, notes, reason
 from profiles.folders import state_folder
 
 KEPT = 20  # logs of bugs
@@ -28,13 +28,13 @@ def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
 
 
 def bug_in_words(error: BaseException, arguments: Sequence[str]) -> str:
-    """The sentence for a person, with the log that the bug got; a full disk takes none."""
+    """The sentence for a person, with the error's notes and the log that the bug got; a full disk takes none."""
     try:
         details = f"the details are in {log_bug(error, arguments)}"
     except (OSError, OutputError) as unwritten:
         why = reason(unwritten) if isinstance(unwritten, OSError) else str(unwritten)
         details = f"the details could not be written: {why}"
-    return f"a bug in tiltprint: {type(error).__name__}: {error}; {details}"
+    return f"a bug in tiltprint: {type(error).__name__}: {error}{notes(error)}; {details}"
 
 
 def _thin(folder: Path) -> None:

@@ -1,13 +1,27 @@
-"""Leaving a printer safely in mid-print: moves stopped, heaters and fan off, the tip lifted; and the emergency stop."""
+"""Leaving a printer safely: moves stopped, heaters and fan off, the tip lifted; the emergency stop; and the guard that sees to it."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
+from types import TracebackType
+from typing import Self
 
+from machine.link.exchange import Exchange
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Ok, Position, Resend, is_halt, lacks_checksum, position_in, read_event, temperature_in
+from machine.link.protocol.events import (
+    Ok,
+    Position,
+    Resend,
+    Temperature,
+    is_halt,
+    lacks_checksum,
+    position_in,
+    read_event,
+    temperature_in,
+)
 from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
-from profiles.errors import PortError
+from profiles.errors import PortError, PrinterError, add_words
 
 # M108 ends a wait for heat and M410 a move where the firmware reads them out of turn. Nothing homes or turns the table: the
 # head may be inside the part.
@@ -19,10 +33,12 @@ HOMING_ORDERS = ("M108", *HEATERS_OFF)
 AGAIN_S = 2.0  # noise may eat an order; without the proof they are given again this often
 OLD_REPORTS_S = 1.0  # a report from before the orders proves nothing; a printer that never falls silent is not waited for
 SETTLE_S = 20.0  # lines that the printer had already taken are run first
+FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
 HOMING_S = 600.0  # five axes at the speed of the slowest; a dwell is not ended by anything either
 LIFT_S = 10.0  # a lift of some millimetres at any Z axis' speed
 STOP_AGAIN_S, STOP_MOST_S = 0.5, 2.0
 PARTIAL_BYTES = 4096
+UNCONFIRMED = "did not confirm M112: cut the power"
 
 
 @dataclass
@@ -46,8 +62,7 @@ class Orders:
         if self.insists:
             self._ask_number(commands)
         else:
-            # The newline ends a half line.
-            self.wire.write("".join(["\n", *(f"{command}\n" for command in commands)]).encode("ascii"))
+            self.wire.write(as_lines(commands))
         return self.wait_for(lambda line: self._heed(line, commands) or is_wanted(line), end_s)
 
     def wait_for(self, is_wanted: Callable[[bytes], bool], end_s: float) -> bool:
@@ -75,6 +90,11 @@ class Orders:
     def _ask_number(self, commands: Sequence[str]) -> None:
         self._waiting = tuple(commands)
         self.wire.write(frame(FAR_NUMBER, "M105"))  # what was refused has ended a half line
+
+
+def as_lines(commands: Sequence[str]) -> bytes:
+    """Commands as lines without numbers; the newline before them ends a half line."""
+    return "".join(["\n", *(f"{command}\n" for command in commands)]).encode("ascii")
 
 
 class Heaters(Enum):
@@ -126,8 +146,74 @@ class _Shown:
         report = temperature_in(event)
         self.answered = self.answered or isinstance(event, Ok)
         self.halted = self.halted or _shows_kill(line)
-        self.off = self.off or (report is not None and report.nozzle_target_c == 0 and report.bed_target_c in (0, None))
+        self.off = self.off or (report is not None and shows_off(report))
         return self.off or self.halted
+
+
+def shows_off(report: Temperature) -> bool:
+    """Whether a temperature report proves that nozzle and bed are off; a printer without a bed reports none."""
+    return report.nozzle_target_c == 0 and report.bed_target_c in (0, None)
+
+
+class HeaterGuard:
+    """`with guard:` around everything that is sent to a printer: however the block is left, the heaters go off.
+
+    That holds for every exception, KeyboardInterrupt and SystemExit included, and for one that comes while they are being
+    switched off. The error says what the printer has confirmed. Only release() lets go of a printer whose heaters may be on.
+    is_needed: whether anything has been sent that may heat. on_turn: called while the printer is listened to, may raise.
+    heaters: how they were left; None: not ordered off yet.
+    """
+
+    def __init__(self, exchange: Exchange, is_needed: Callable[[], bool], on_turn: Callable[[], None]) -> None:
+        self.heaters: Heaters | None = None
+        self._exchange, self._is_needed, self._on_turn = exchange, is_needed, on_turn
+        self._began = self._released = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.leave(error)
+
+    def leave(self, error: BaseException | None) -> None:
+        """The end of the block, by an error or without one."""
+        if self._released or self.heaters is not None or not self._is_needed():
+            return
+        try:
+            if not self._began:
+                self.switch_off(FAULT_S if isinstance(error, PrinterError) else SETTLE_S)
+        finally:
+            if self.heaters is None:  # interrupted meanwhile: the orders are given, the proof is not awaited
+                self.heaters = Heaters.UNPROVED
+                with suppress(PortError):
+                    self._exchange.wire.write(as_lines(HOMING_ORDERS if self._exchange.waits else ORDERS))
+            if error is not None:
+                add_words(error, self.heaters.value)
+
+    def release(self) -> None:
+        """The heaters may stay as they are: the program has run to its own end, or a person wants them on."""
+        self._released = True
+
+    def switch_off(self, timeout_s: float = SETTLE_S, waits: bool = True) -> Heaters:
+        """heaters_off() for the printer of the exchange. waits: for the end of homing."""
+        self._began, exchange = True, self._exchange
+        try:
+            heaters = heaters_off(exchange.wire, exchange.medium, timeout_s, waits and exchange.waits, self._on_turn)
+        except PortError:
+            heaters = Heaters.UNPROVED
+        self.heaters = Heaters.HALTED if heaters is Heaters.UNPROVED and exchange.connection.halted else heaters
+        return self.heaters
+
+    def stop(self) -> str:
+        """The emergency stop, in words."""
+        halted = emergency_stop(self._exchange.wire, self._exchange.medium)
+        self.heaters = Heaters.HALTED if halted else Heaters.UNPROVED
+        return f"emergency stop: the printer {f'has halted; {self.revival}' if halted else UNCONFIRMED}"
+
+    @property
+    def revival(self) -> str:
+        """What a person does about a printer that has halted."""
+        return f"{self._exchange.connection.greeting.firmware.line.revival} before the next print"
 
 
 def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn: Callable[[], None]) -> Position | None:

@@ -1,6 +1,7 @@
 """Streaming a program to a printer: checked first, fed as fast as the window allows, a barrier at the end, a safe way out."""
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Event as Flag
 
@@ -15,14 +16,14 @@ from machine.link.progress import PrintJob, Progress, Schedule, last_known
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint
-from machine.link.shutdown import SETTLE_S, Heaters, emergency_stop, heaters_off, lift_tip
+from machine.link.shutdown import SETTLE_S, HeaterGuard, Heaters, lift_tip
 from machine.link.status import PrinterStatus, query_status
-from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
+from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError, add_words
 from profiles.profile import Profile
 
 # After an error the printer may be deaf: the orders are given, the proof is not awaited for long. A halted or restarted
 # firmware has switched its heaters off by itself.
-HEATERS_OFF_S: dict[type[PrinterError], float] = {FirmwareError: 1.0, SilenceError: 5.0}
+HEATERS_OFF_S: dict[type[PrinterError], float] = {FirmwareError: 1.0, SilenceError: 5.0, PortError: 2.0}
 
 
 @dataclass(frozen=True)
@@ -151,26 +152,38 @@ class _Print:
     medium: Medium
     journal: Journal | None
 
+    def __post_init__(self) -> None:
+        self._guard = HeaterGuard(self.exchange, lambda: self.feed.started, self.feed.heed_emergency)
+
     def run(self, lines: Iterable[str], begin: Callable[[PrinterStatus], ResumePoint] | None) -> Outcome:
         start_s = self.medium.now_s()
+        try:
+            with self._guard:
+                return self._outcome(start_s, self._run(lines, begin))
+        except EmergencyError:  # asked for while the guard was switching the heaters off
+            raise FirmwareError(self._stop()) from None
+
+    def _run(self, lines: Iterable[str], begin: Callable[[PrinterStatus], ResumePoint] | None) -> Heaters | None:
+        """The print, and what its end has left of the heaters; None when the program has run to its own end, or not begun."""
         try:
             if begin is not None:
                 self.feed.resume_point = begin(query_status(self.exchange.wire, self.medium, self.feed.poll))
             self.exchange.greet()
             self.feed.run(lines)
         except CancelledError:
-            return self._outcome(start_s, self._cancel())
+            return self._cancel()
         except EmergencyError:
             raise FirmwareError(self._stop()) from None
         except PrinterError as error:
-            if not self.feed.started:
-                raise
-            raise type(error)(f"{error}; {self._leave(error)}{self._hint()}") from None
-        except BaseException:
             if self.feed.started:
-                self._shut_down(SETTLE_S)
+                add_words(error, f"{self._leave(error)}{self._hint()}")
             raise
-        return self._outcome(start_s, None)
+        except BaseException as error:
+            if self.feed.started:
+                add_words(error, self._shut_down(SETTLE_S).value)
+            raise
+        self._guard.release()
+        return None
 
     def _cancel(self) -> Heaters | None:
         if not self.feed.started:
@@ -182,26 +195,18 @@ class _Print:
     def _stop(self) -> str:
         """The emergency stop, in words."""
         heat = self._last_known()
-        halted = emergency_stop(self.exchange.wire, self.medium)
+        words = self._guard.stop()
         self.feed.set_state("cancelling")
-        if halted:
-            return f"emergency stop: the printer has halted; {self._revival()}{heat}"
-        return f"emergency stop: the printer did not confirm M112: cut the power{heat}"
-
-    def _revival(self) -> str:
-        """What a person does about a printer that has halted."""
-        return f"{self.exchange.connection.greeting.firmware.line.revival} before the next print"
+        return f"{words}{heat}"
 
     def _leave(self, error: PrinterError) -> str:
         """Heaters off before an error goes its way; words on whether the printer proved it, and how hot it was if not."""
         heat = self._last_known()
-        if isinstance(error, PortError):
-            return f"{Heaters.UNPROVED.value}{heat}"
         timeout_s = HEATERS_OFF_S.get(type(error), SETTLE_S)
-        alive = not isinstance(error, FirmwareError)
+        alive = not isinstance(error, FirmwareError | PortError)
         waits = alive and not isinstance(error, SilenceError)  # whose homing has been waited for already
         heaters = self._shut_down(timeout_s, alive, waits)
-        words = f"{heaters.value}: {self._revival()}" if heaters is Heaters.HALTED else heaters.value
+        words = f"{heaters.value}: {self._guard.revival}" if heaters is Heaters.HALTED else heaters.value
         return words if heaters is Heaters.OFF else f"{words}{heat}"
 
     def _last_known(self) -> str:
@@ -212,16 +217,14 @@ class _Print:
         """Heaters off, the tip lifted where the printer is alive and knows its place; waits: for the end of homing."""
         exchange, feed = self.exchange, self.feed
         try:
-            heaters = heaters_off(exchange.wire, self.medium, timeout_s, waits and exchange.waits, feed.heed_emergency)
+            heaters = self._guard.switch_off(timeout_s, waits)
             move = feed.lift_move() if heaters is Heaters.OFF and alive else None
             if move is not None:
-                feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.heed_emergency))
-        except PortError:
-            return Heaters.UNPROVED
+                with suppress(PortError):
+                    feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.heed_emergency))
         except EmergencyError:
             raise FirmwareError(self._stop()) from None
-        halted = heaters is Heaters.UNPROVED and exchange.connection.halted
-        return Heaters.HALTED if halted else heaters
+        return heaters
 
     def _hint(self) -> str:
         """How to go on with what is half printed, or that this is not possible; proved by closing the journal."""
@@ -245,5 +248,5 @@ class _Print:
             firmware=feed.reports.firmware,
             warnings=tuple(feed.reports.warnings),
             heaters_off=None if heaters is None else heaters is not Heaters.UNPROVED,
-            halted=self._revival() if heaters is Heaters.HALTED else "",
+            halted=self._guard.revival if heaters is Heaters.HALTED else "",
         )

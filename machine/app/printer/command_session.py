@@ -1,16 +1,17 @@
 """Command session: single commands to a printer over the same protocol as a print, and a safe end of it."""
 
+from types import TracebackType
+from typing import Self
+
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.protocol.events import Event, Ok, Position, Temperature, position_in, unknown_command
 from machine.link.protocol.framing import LINE_LIMIT, command_of, name_of
 from machine.link.protocol.timeout import Timing
-from machine.link.shutdown import Heaters, emergency_stop, heaters_off
-from profiles.errors import FirmwareError, PortError
+from machine.link.shutdown import HeaterGuard, Heaters, shows_off
+from profiles.errors import FirmwareError, PortError, PrinterError
 
-# Klipper's: heaters go off and the conversation ends.
-RESTARTS = frozenset({"RESTART", "FIRMWARE_RESTART"})
-FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
+RESTARTS = frozenset({"RESTART", "FIRMWARE_RESTART"})  # Klipper's: heaters go off and the conversation ends
 
 
 class LeftError(Exception):
@@ -22,21 +23,46 @@ class StopError(Exception):
 
 
 class CommandSession:
-    """greet(), then command() after command, then leave(). One thread at a time; order() may be called from any other.
+    """`with session:` greet(), then command() after command. One thread at a time; order() may be called from any other.
 
-    unknown: commands that the printer did not know; heat, position: as it has told them last.
+    However the block is left, the heaters go off: see HeaterGuard, which also says what an error is told. At a normal end
+    PrinterError is raised where the printer does not confirm that, and nothing is done when keep_heat is set. StopError becomes
+    the emergency stop. Before the greeting nothing was sent that heats.
+    unknown: commands that the printer did not know; heat, position: what it reported last.
     """
 
     def __init__(self, wire: Wire, limit: int = LINE_LIMIT, medium: Medium = SERIAL) -> None:
         self.unknown: list[str] = []
+        self.keep_heat = self._leaving = False
         self._limit = limit
-        self._ordered: type[Exception] | None = None
+        self._ordered: type[LeftError | StopError] | None = None
         self.heat = Temperature()
         self.position: Position | None = None
         self._command = ""
         self.exchange = Exchange(
             wire, medium, timing=Timing(), on_event=self._heard, on_turn=self._turned, on_lost=self._lost, limit=limit
         )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._leaving = True
+        guard = HeaterGuard(self.exchange, lambda: self.exchange.greeted, self._check_stop)
+        try:
+            if isinstance(error, StopError):
+                raise error
+            if error is not None:
+                guard.leave(error)
+                return
+            with guard:
+                if self.keep_heat or not self.exchange.greeted or self.switch_off():
+                    guard.release()
+        except StopError:
+            with guard:
+                raise FirmwareError(guard.stop()) from None
+        if guard.heaters is Heaters.UNPROVED:
+            raise PrinterError("the printer did not confirm that its heaters are off: look at it")
 
     def greet(self) -> None:
         """Agree on line numbers; raises PrinterError."""
@@ -59,16 +85,9 @@ class CommandSession:
         """One short turn without sending anything."""
         self.exchange.pump()
 
-    def order(self, what: type[Exception]) -> None:
+    def order(self, what: type[LeftError | StopError]) -> None:
         """Raise LeftError or StopError in the thread that talks, whatever it waits for."""
         self._ordered = what
-
-    def stop(self) -> FirmwareError:
-        """The emergency stop; returns what became of it as an error to raise."""
-        if emergency_stop(self.exchange.wire, self.exchange.medium):
-            revival = self.exchange.connection.greeting.firmware.line.revival
-            return FirmwareError(f"emergency stop: the printer has halted; {revival} before the next print")
-        return FirmwareError("emergency stop: the printer did not confirm M112: cut the power")
 
     def heated(self) -> str:
         """Which heaters are on, as words; "" when none is. A command under way may have switched them on a moment ago."""
@@ -80,21 +99,13 @@ class CommandSession:
 
     def switch_off(self) -> bool:
         """Heaters off; True when the printer's own report shows it. A command under way is broken off."""
-        if self._idle():
-            for command in ("M104 S0", "M140 S0"):
+        if not self._idle():
+            return HeaterGuard(self.exchange, lambda: True, self._check_stop).switch_off() is not Heaters.UNPROVED
+        self.command("M105")
+        if not shows_off(self.heat):
+            for command in ("M104 S0", "M140 S0", "M105"):
                 self.command(command)
-            return not self.heated()
-        return heaters_off(self.exchange.wire, self.exchange.medium, homing=self.exchange.waits) is not Heaters.UNPROVED
-
-    def give_up(self) -> bool:
-        """The same after an error: order it without the protocol, for the printer may not follow it any more."""
-        try:
-            heaters = (
-                heaters_off(self.exchange.wire, self.exchange.medium, FAULT_S) if self.exchange.greeted else Heaters.UNPROVED
-            )
-        except PortError:
-            return False
-        return heaters is not Heaters.UNPROVED or self.exchange.connection.halted
+        return shows_off(self.heat)
 
     def _idle(self) -> bool:
         window = self.exchange.connection.window
@@ -111,9 +122,16 @@ class CommandSession:
 
     def _turned(self, now_s: float) -> None:
         del now_s
-        ordered, self._ordered = self._ordered, None
-        if ordered is not None:
-            raise ordered
+        if self._ordered is LeftError and not self._leaving:
+            self._ordered = None
+            raise LeftError
+        self._check_stop()
+
+    def _check_stop(self) -> None:
+        """Raises StopError where that was ordered: it counts while the session is left, too."""
+        if self._ordered is StopError:
+            self._ordered = None
+            raise StopError
 
     def _lost(self, error: PortError) -> Reconnection:
         raise error

@@ -15,7 +15,7 @@ from machine.firmware import dialect_of
 from machine.link.port import open_port
 from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.simulator import SimulatedPrinter
-from profiles.errors import UserError
+from profiles.errors import PrinterError, add_words
 from profiles.machine import Machine
 
 HOT_C = 50.0  # a nozzle from which plastic may hang
@@ -23,7 +23,8 @@ HOT_C = 50.0  # a nozzle from which plastic may hang
 
 @contextmanager
 def cold_session(port: PortRequest, machine: Machine, table: ProbedTable | None = None) -> Iterator[ProbingSession]:
-    """A conversation with the machine at the port, or with the simulated one, whose table may be sensed."""
+    """A conversation with the machine at the port, or with the simulated one, whose table may be sensed; its heaters off at the
+    end."""
     with ExitStack() as stack:
         path = port.port
         if path == SIMULATED:
@@ -36,7 +37,7 @@ def cold_session(port: PortRequest, machine: Machine, table: ProbedTable | None 
         answer = identify_printer(wire, port.baud)
         say(describe_answer(answer, port.baud))
         check_machine(answer, machine, False)
-        session = ProbingSession(TappedWire(wire, log.note), dialect_of(machine).longest_line)
+        session = stack.enter_context(ProbingSession(TappedWire(wire, log.note), dialect_of(machine).longest_line))
         session.greet()
         yield session
 
@@ -45,7 +46,8 @@ def begin_cold(session: ProbingSession, mover: PrinterMover, machine: Machine) -
     """Heaters off, homed, the tip at the top."""
     if hot := session.heated():
         say(f"{hot}: switched off, measuring is done cold")
-        session.switch_off()
+        if not session.switch_off():
+            raise PrinterError("the printer did not confirm that its heaters are off: measuring is done cold")
     if (nozzle_c := session.nozzle_c()) > HOT_C:
         say(f"the nozzle is {nozzle_c:.0f} deg C hot: plastic that hangs from it falsifies every contact")
     mover.start()
@@ -57,10 +59,10 @@ def tip_raised_after(mover: PrinterMover) -> Iterator[None]:
     """Raise the tip whatever has gone wrong, and say so."""
     try:
         yield
-    except UserError as error:
+    except BaseException as error:
         mover.retreat()
-        raise type(error)(f"{error}; {mover.raised}nothing is saved") from None
-    except KeyboardInterrupt:
-        mover.retreat()
-        say(f"interrupted: {mover.raised}nothing is saved, the table stands as it stood")
+        if isinstance(error, KeyboardInterrupt):
+            say(f"interrupted: {mover.raised}nothing is saved, the table stands as it stood")
+        else:
+            add_words(error, f"{mover.raised}nothing is saved")
         raise

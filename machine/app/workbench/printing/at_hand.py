@@ -16,6 +16,7 @@ from machine.app.printer.command_session import CommandSession, LeftError, StopE
 from machine.app.printer.compatibility import check_machine, check_speed, describe_answer, identify_printer
 from machine.app.printer.server_checks import check_no_server
 from machine.app.requests import SIMULATED
+from machine.app.terminal.interrupts import calling
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
@@ -26,7 +27,7 @@ from machine.link.pending_commands import Command
 from machine.link.port import open_port
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.pose import level
-from profiles.errors import MoveError, PrinterError
+from profiles.errors import MoveError, PrinterError, UserError
 from profiles.machine import Machine
 
 LOOK_S = 1.0  # between questions after temperatures and place
@@ -34,6 +35,7 @@ IDLE_S = 1800.0
 LEVEL_DEG = 0.05  # M114 reports hundredths
 MOST_JOG_MM = 100.0
 JOG_MM_S = {"X": 50.0, "Y": 50.0, "Z": 10.0}
+LET_GO = "let go of; the heaters are off"
 HEATS = ("M104", "M109", "M140", "M190")
 
 
@@ -43,6 +45,7 @@ def by_hand(order: HandOrder, person: AtPage, checks: Checks) -> State:
     check_speed(printing.sim_speed)
     check_no_server(printing.port)
     with ExitStack() as stack:
+        stack.enter_context(calling(person.leave))  # a termination request lets go of the printer, its heaters off
         simulated = printing.port == SIMULATED
         path = stack.enter_context(SimulatedPrinter(machine, printing.sim_speed or inf)).path if simulated else printing.port
         wire = stack.enter_context(open_port(path, printing.baud))
@@ -51,7 +54,6 @@ def by_hand(order: HandOrder, person: AtPage, checks: Checks) -> State:
             check_machine(None if simulated else answer, machine, force=False)
         session = CommandSession(wire, dialect_of(machine).longest_line)
         person.interrupt = lambda word: session.order(StopError if word == Command.EMERGENCY_STOP else LeftError)
-        session.greet()
         return Hand(order, session, checks).serve(person)
 
 
@@ -67,41 +69,38 @@ class Hand:
         self._moments = 0
 
     def serve(self, person: AtPage) -> State:
-        """Until the person lets go, nobody is there any more, or nothing was asked for so long."""
-        keep_heat = idle = False
-        try:
-            while not person.lets_go():
-                try:
-                    command = person.by_hand.get_nowait()
-                except Empty:
-                    idle = monotonic() - self._asked_s > IDLE_S
-                    if idle:
-                        break
-                    self._listen()
-                    continue
-                self._asked_s = monotonic()
-                if command.does == HandDoes.LET_GO:
-                    keep_heat = command.keep_heat
-                    break
-                self._do(command)
-        except StopError:
-            raise self._session.stop() from None
-        except LeftError:
-            pass
-        except PrinterError as error:
-            off = self._session.give_up()
-            raise type(error)(f"{error}{'' if off else '; its heaters may still be on, look at the printer'}") from None
-        self._tell(phase="leaving")
-        return self._ended(keep_heat, idle)
+        """Greet the printer and do what the person asks for until he lets go or has asked for nothing for IDLE_S; how it ended.
 
-    def _ended(self, keep_heat: bool, idle: bool) -> State:
-        heated = self._session.heated()
-        if keep_heat:
-            return {"end": "done", "sentence": f"let go of; {heated} stays on" if heated else "let go of; no heater is on"}
-        if not self._session.switch_off():
-            raise PrinterError("the printer did not confirm that its heaters are off: look at it")
-        why = "nothing was asked for half an hour" if idle else "let go of"
-        return {"end": "done", "sentence": f"{why}; the heaters are off"}
+        However it ends, the heaters go off unless he let go and wants them on. Raises UserError.
+        """
+        with self._session as session:
+            try:
+                session.greet()
+                sentence = self._until_let_go(person)
+            except LeftError:
+                sentence = LET_GO if session.exchange.greeted else "let go of; nothing was heated or moved"
+            self._tell(phase="leaving")
+        return {"end": "done", "sentence": sentence}
+
+    def _until_let_go(self, person: AtPage) -> str:
+        """Command after command; the sentence of the end."""
+        while not person.lets_go():
+            try:
+                command = person.by_hand.get_nowait()
+            except Empty:
+                if monotonic() - self._asked_s > IDLE_S:
+                    return "nothing was asked for half an hour; the heaters are off"
+                self._listen()
+                continue
+            self._asked_s = monotonic()
+            if command.does == HandDoes.LET_GO and command.keep_heat:
+                heated = self._session.heated()
+                self._session.keep_heat = True
+                return f"let go of; {heated} stays on" if heated else "let go of; no heater is on"
+            if command.does == HandDoes.LET_GO:
+                break
+            self._do(command)
+        return LET_GO
 
     def _listen(self) -> None:
         self._session.listen()
@@ -141,10 +140,12 @@ class Hand:
         return {} if self._session.position is None else dict(self._session.position.axes)
 
     def _do(self, command: HandCommand) -> None:
-        """One command; what cannot be done is told, and nothing moves."""
+        """One command; what cannot be done is told, and nothing moves. Raises PrinterError."""
         try:
             lines = self._lines(command)
-        except MoveError as error:
+        except PrinterError:
+            raise
+        except UserError as error:  # a start block that cannot be filled in, too
             self._problem = str(error)
         else:
             self._problem = ""

@@ -17,8 +17,10 @@ from prompt_toolkit.output import DummyOutput
 from prompt_toolkit.renderer import Renderer
 
 from machine.app.cli import main
+from machine.app.commands import console
 from machine.app.commands.console import Shown, _Console
 from machine.app.printer import compatibility
+from machine.app.printer.command_session import CommandSession
 from machine.app.terminal.interrupts import interrupting
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
@@ -250,6 +252,35 @@ def test_the_end_of_a_closed_terminal_that_comes_before_its_signal_is_an_interru
     monkeypatch.setattr(console, "_read_line", at_end)
     with pytest.raises(KeyboardInterrupt):
         console._read_on(None)
+
+
+def test_a_bug_while_a_line_is_sent_ends_the_console_with_the_heaters_off(
+    monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    command = CommandSession.command
+
+    def planted(self: CommandSession, line: str) -> None:
+        if line == "M503":
+            raise ZeroDivisionError("planted")
+        command(self, line)
+
+    monkeypatch.setattr(sys, "stdin", Terminal())
+    monkeypatch.setattr(CommandSession, "command", planted)
+    with SimulatedPrinter(MACHINE) as printer, create_pipe_input() as keys:
+        prompt: PromptSession[str] = PromptSession(input=keys, output=DummyOutput())
+        monkeypatch.setattr(console, "_prompt_session", lambda: prompt)
+        keys.send_text("M104 S200\nM503\n")
+        later = Timer(10.0, keys.send_text, ("/quit\n",))  # nobody types it where the console ends by itself
+        later.start()
+        code = main(["console", "--port", printer.path])
+        later.cancel()
+        assert (code, printer.record.nozzle_target_c) == (3, 0.0)
+        assert printer.record.happened("nozzle 200")
+    assert "ZeroDivisionError: planted; the printer reports its heaters off" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.002, 0.01, 0.6])  # in the midst of putting the answer above the prompt, or at rest

@@ -1,0 +1,252 @@
+"""However a printer is left, its heaters go off: an error is raised at every step of every loop that commands one."""
+
+import io
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Self
+
+import pytest
+
+from machine.app.commands import console as console_module
+from machine.app.commands.console import console
+from machine.app.commands.measuring import at_port
+from machine.app.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
+from machine.app.commands.measuring.mover import PrinterMover
+from machine.app.commands.measuring.prober import ProbingSession
+from machine.app.printer.command_session import CommandSession, LeftError, StopError
+from machine.app.requests import ConsoleRequest, PortRequest, PrintRequest
+from machine.app.workbench.printing import at_hand
+from machine.app.workbench.printing.at_hand import by_hand
+from machine.app.workbench.printing.at_page import AtPage
+from machine.app.workbench.printing.checks import Checks
+from machine.app.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
+from machine.calibration.program import calibration_pen
+from machine.link.medium import Medium, Wire
+from machine.link.stream import print_lines
+from machine.simulator.virtual import PATH, VirtualPrinter
+from mdp.pose import Pose
+from profiles.errors import FirmwareError, MoveError, PortError, PrinterError
+from profiles.profile import load
+
+# Fast axes make a run short; the printer of every run is another one.
+PROFILE = load(settings=["machine.x.speed_mm_s=500", "machine.y.speed_mm_s=500", "machine.z.speed_mm_s=100"])
+ERRORS = (RuntimeError, KeyboardInterrupt, MoveError, OSError, PortError)
+HEAT, HOME, JOG = HandCommand(HandDoes.HEAT), HandCommand(HandDoes.HOME), HandCommand(HandDoes.JOG, "X", 5.0)
+MonkeyPatch = pytest.MonkeyPatch
+
+
+@dataclass
+class Steps:
+    """Counts the steps of a run, from 1, and raises an error at some of them. last: the newest values that were told."""
+
+    error: BaseException = field(default_factory=RuntimeError)
+    raise_at: tuple[int, ...] = ()
+    count: int = 0
+    last: dict[str, object] = field(default_factory=dict)
+
+    def take(self, *ignored: object, **told: object) -> None:
+        self.count += 1
+        self.last |= told
+        if self.count in self.raise_at:
+            raise self.error
+
+    def on_wire(self, medium: Medium) -> Medium:
+        """The medium, every wire of which takes steps."""
+        return replace(medium, open=lambda name, baud: SteppedWire(medium.open(name, baud), self))
+
+
+class SteppedWire:
+    """A step before and after every write, and after every read that has brought something."""
+
+    def __init__(self, wire: Wire, steps: Steps) -> None:
+        self.name, self.discard, self.close = wire.name, wire.discard, wire.close
+        self._wire, self._steps = wire, steps
+
+    def write(self, data: bytes) -> None:
+        self._steps.take()
+        self._wire.write(data)
+        self._steps.take()
+
+    def read(self) -> bytes:
+        if data := self._wire.read():
+            self._steps.take()
+        return data
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+Loop = Callable[[Steps, VirtualPrinter, MonkeyPatch], None]
+
+
+def in_hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch, *commands: HandCommand) -> State:
+    """What a person does by hand, and how it ended."""
+    medium = steps.on_wire(printer.medium)
+    monkeypatch.setattr(at_hand, "open_port", medium.open)
+    monkeypatch.setattr(at_hand, "CommandSession", partial(CommandSession, medium=medium))
+    told = type("Told", (), {"tell": steps.take, "heard": None})()
+    person = AtPage(told)
+    for command in commands:
+        person.by_hand.put(command)
+    return by_hand(HandOrder(PROFILE, PrintRequest(PATH)), person, Checks(told))
+
+
+def hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:
+    in_hand(steps, printer, monkeypatch, HEAT, HOME, JOG, HandCommand(HandDoes.LET_GO))
+
+
+def console_of_a_pipe(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:
+    medium = steps.on_wire(printer.medium)
+    monkeypatch.setattr(console_module, "open_port", medium.open)
+    monkeypatch.setattr(console_module, "CommandSession", partial(CommandSession, medium=medium))
+    monkeypatch.setattr(sys, "stdin", io.StringIO("M104 S200\nM140 S60\nG28\nG1 X5 F6000\nM400\n"))
+    console(ConsoleRequest(PROFILE, PATH))
+
+
+def measuring(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:
+    medium = steps.on_wire(printer.medium)
+    monkeypatch.setattr(at_port, "open_port", medium.open)
+    monkeypatch.setattr(at_port, "ProbingSession", partial(ProbingSession, medium=medium))
+    with cold_session(PortRequest(PATH), PROFILE.machine) as session:
+        mover = PrinterMover(session, calibration_pen(PROFILE))
+        with tip_raised_after(mover):
+            begin_cold(session, mover, PROFILE.machine)
+            session.command("M104 S200")  # as a macro of the machine's own would
+            mover.turn(Pose(10.0, 0.0))
+            mover.cross(5.0, 5.0)
+            mover.arrive()
+
+
+def streamed(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:
+    del monkeypatch
+    program = ["M104 S200", "M140 S60", "G28 X Y Z", "G92 A0 C0", "G1 X5 F6000", "G1 Z20", "M104 S0", "M140 S0"]
+    print_lines(program, PATH, on_progress=steps.take, medium=steps.on_wire(printer.medium), profile=PROFILE)
+
+
+LOOPS = pytest.mark.parametrize("loop", [hand, console_of_a_pipe, measuring, streamed])
+
+
+@pytest.fixture(autouse=True)
+def _folders(tmp_path: Path, monkeypatch: MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+
+def targets_c(printer: VirtualPrinter) -> tuple[float, float]:
+    """What nozzle and bed are to be, once all that was sent is done."""
+    printer.firmware.advance()
+    return printer.record.nozzle_target_c, printer.record.bed_target_c
+
+
+@LOOPS
+def test_an_error_at_any_step_leaves_the_heaters_off(loop: Loop, monkeypatch: MonkeyPatch) -> None:
+    whole, printer = Steps(), VirtualPrinter(PROFILE.machine)
+    loop(whole, printer, monkeypatch)
+    assert printer.record.happened("nozzle 2")
+    assert targets_c(printer) == (0.0, 0.0)
+    hot = []
+    for step in range(1, whole.count + 1):
+        runs = [(error(), (step,)) for error in (ERRORS[step % 5], ERRORS[(step + 2) % 5])]
+        for error, at in (*runs, (KeyboardInterrupt(), (step, step + 1))):  # the last: again while the heaters are switched off
+            printer = VirtualPrinter(PROFILE.machine)
+            with suppress(type(error), PrinterError):
+                loop(Steps(error, at), printer, monkeypatch)
+            if targets_c(printer) != (0.0, 0.0):
+                hot.append((at, type(error).__name__))
+    assert hot == []
+
+
+def test_heaters_that_are_to_stay_on_go_off_when_letting_go_fails(monkeypatch: MonkeyPatch) -> None:
+    whole, printer, keeping = Steps(), VirtualPrinter(PROFILE.machine), HandCommand(HandDoes.LET_GO, keep_heat=True)
+    ended = in_hand(whole, printer, monkeypatch, HEAT, keeping)
+    assert targets_c(printer) == (215.0, 60.0)
+    assert ended["sentence"] == "let go of; nozzle set to 215 deg C and bed set to 60 deg C stays on"
+    for step in range(1, whole.count + 1):
+        printer = VirtualPrinter(PROFILE.machine)
+        with pytest.raises(RuntimeError):
+            in_hand(Steps(RuntimeError(), (step,)), printer, monkeypatch, HEAT, keeping)
+        assert targets_c(printer) == (0.0, 0.0)
+
+
+@LOOPS
+def test_an_error_says_what_became_of_the_heaters(loop: Loop, monkeypatch: MonkeyPatch) -> None:
+    whole = Steps()
+    loop(whole, VirtualPrinter(PROFILE.machine), monkeypatch)
+    refused, bug = MoveError("cannot be moved"), RuntimeError("a bug")
+    for error in (refused, bug):
+        with pytest.raises(type(error)):
+            loop(Steps(error, (whole.count // 2,)), VirtualPrinter(PROFILE.machine), monkeypatch)
+    assert str(refused).endswith("; the printer reports its heaters off")
+    assert bug.__notes__[-1] == "the printer reports its heaters off"
+
+
+def test_a_start_block_that_cannot_be_filled_in_is_told_and_nothing_moves(monkeypatch: MonkeyPatch) -> None:
+    gcode = PROFILE.machine.gcode.model_copy(update={"start": "M104 S{warmth}\nG28"})
+    broken = PROFILE.model_copy(update={"machine": PROFILE.machine.model_copy(update={"gcode": gcode})})
+    monkeypatch.setattr(f"{__name__}.PROFILE", broken)
+    steps, printer = Steps(), VirtualPrinter(PROFILE.machine)
+    ended = in_hand(steps, printer, monkeypatch, HEAT, HOME, HandCommand(HandDoes.LET_GO))
+    assert "{warmth}" in steps.last["progress"]["message"]
+    assert (ended["sentence"], targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
+    assert not printer.record.happened("homed XYZAC")
+
+
+def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyPatch) -> None:
+    class Terminated(Steps):
+        def take(self, *ignored: object, **told: object) -> None:
+            super().take(**told)
+            if self.last.get("phase") == "hand" and self.last["progress"]["nozzle_target_c"] == 215.0 and not self.raise_at:
+                self.raise_at = (-1,)
+                signal.raise_signal(signal.SIGTERM)
+
+    def not_heard(number: int, frame: object) -> None:
+        raise AssertionError("the process would have ended here")
+
+    printer, before = VirtualPrinter(PROFILE.machine), signal.signal(signal.SIGTERM, not_heard)
+    try:
+        ended = in_hand(Terminated(), printer, monkeypatch, HEAT)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert (ended["sentence"], targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
+
+
+def test_an_emergency_stop_counts_while_the_heaters_are_switched_off() -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"), session_at(printer) as session:
+        session.greet()
+        session.order(StopError)
+    assert printer.record.happened("M112")
+
+
+def test_who_leaves_twice_ends_a_session_once() -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    with session_at(printer) as session:
+        session.greet()
+        session.command("M104 S200")
+        session.order(LeftError)  # heard of when the heaters are asked for: it is left already
+    assert targets_c(printer) == (0.0, 0.0)
+
+
+def test_measuring_does_not_begin_at_heaters_that_the_printer_does_not_confirm_to_be_off() -> None:
+    class Stubborn(ProbingSession):
+        def switch_off(self) -> bool:
+            return False
+
+    printer = VirtualPrinter(PROFILE.machine)
+    session = Stubborn(printer.medium.open(PATH, 0), medium=printer.medium)
+    session.greet()
+    session.command("M104 S200")
+    with pytest.raises(PrinterError, match="did not confirm that its heaters are off: measuring is done cold"):
+        begin_cold(session, PrinterMover(session, calibration_pen(PROFILE)), PROFILE.machine)
+    assert not printer.record.happened("homed XYZAC")
+
+
+def session_at(printer: VirtualPrinter) -> CommandSession:
+    return CommandSession(printer.medium.open(PATH, 0), medium=printer.medium)
