@@ -7,7 +7,8 @@ from math import pi
 import numpy as np
 
 from machine.firmware import dialect_of
-from machine.gcode.blocks import check_blocks
+from machine.gcode.blocks import check_blocks, cold_block
+from machine.gcode.commands import COMMANDS, TOOL, command_in
 from machine.gcode.pen import Pen, number
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
@@ -27,7 +28,6 @@ TILTS_DEG = (60.0, 45.0, 30.0, 20.0, 15.0, 10.0)
 MOST_MARK_RADIUS_MM = 45.0
 MARGIN_MM = 10.0  # how far the centres of a machine that is not calibrated yet may be from where the profile has them
 ABOVE_MM = 8.0
-HEATING = ("M104", "M109", "M140", "M190", "M141", "M191", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT")
 
 
 @dataclass(frozen=True)
@@ -103,11 +103,16 @@ def calibration_pen(profile: Profile) -> Pen:
 
 
 def cold_start(pen: Pen) -> Iterator[str]:
-    """Homing as the start block does it but without heat, and the modes of a program."""
+    """Homing as the start block does it but without heat, and the modes of a program; a comment for what is left out because it
+    may heat. Raises MoveError where the machine is not homed without that."""
     dialect = pen.dialect
+    start = cold_block(_fill(pen.machine.gcode.start, pen), dialect)
+    yield from (f"; left out, for it may heat: {line}" for line in start.left_out)
+    if any(command_in(line) is COMMANDS[TOOL] for line in start.lines):  # it goes to its active temperature when it is selected
+        yield dialect.nozzle.format(number(0.0))
     for word in dialect.before_start:
         yield from _fill(word, pen)
-    yield from (line for line in _fill(pen.machine.gcode.start, pen) if line.split(" ")[0] not in HEATING)
+    yield from start.lines
     yield from (mode for mode in dialect.modes if mode not in ("M83", "M82"))
     for word in dialect.after_start:
         yield from _fill(word, pen)

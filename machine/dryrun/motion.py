@@ -7,13 +7,14 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_own
 from machine.firmware import dialect_of
+from machine.gcode.commands import EVERY
 from machine.planning.limits import ROUNDING, axis_limits
 from machine.planning.timing import axis_speeds, lengths, move_times
 from machine.reader.parsed import AT_ONCE, MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
-STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
+STANDSTILLS = frozenset(name for name, command in EVERY.items() if command.waits or command.homes)
 SLACK = 1.001
 ROUNDING_MM_S = 1.0 / 60.0  # F is written as a whole number
 STILL = 3  # the measure of what does not move

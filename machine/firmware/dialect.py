@@ -1,7 +1,10 @@
 """Dialect: what is written for a firmware and what its words mean when they are read."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
+
+from machine.firmware.command import Command
 
 # What G90 and G91 mean for the filament: they set its mode too; nothing; G91 makes it relative while it lasts.
 FilamentMode = Literal["set", "apart", "carried"]
@@ -60,3 +63,4 @@ class Dialect:
     homed_before: bool = False  # runs no program before its axes are homed by hand; G28 means another thing there
     endstop_word: str = ""  # of G1: with 1, 3 or 4 the move ends at an end stop
     wait_for_person: tuple[str, ...] = ("M0 {text}",)  # says {text} and waits; where it can, the tip may be jogged meanwhile
+    commands: Mapping[str, Command] = field(default_factory=dict)  # its rows beside those of machine.gcode.commands

@@ -4,8 +4,15 @@ M851 and M850 switch its A/C kinematics, whose places count from the turn axis. 
 M104, M109, M140 and M190 need a plug-in of the machine's own.
 """
 
+from machine.firmware.command import Command
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
+
+COMMANDS = {
+    "G61": Command("exact path", changes=True),
+    "M850": Command("do not follow the table", changes=True),
+    "M851": Command("follow the table", changes=True),
+}
 
 DIALECT = Dialect(
     firmware="grblHAL",
@@ -30,6 +37,7 @@ DIALECT = Dialect(
     serial=False,
     follow_persists=True,
     wait_for_person=("(MSG, {text})", "M0"),
+    commands=COMMANDS,
 )
 
 GRBLHAL = Firmware(name="grblHAL", dialects={"grblhal": DIALECT})

@@ -10,6 +10,7 @@ nothing: when the program behind it dies the port closes. M114 names X Y Z E onl
 from collections.abc import Mapping
 from dataclasses import replace
 
+from machine.firmware.command import HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
@@ -22,6 +23,46 @@ _STANDS = (
     "MANUAL_STEPPER STEPPER={tilt_stepper} SET_POSITION={tilt_deg}",
     "MANUAL_STEPPER STEPPER={turn_stepper} SET_POSITION={turn_deg}",
 )
+
+# klipper3d.org/G-Codes.html. Any other name is a macro of the machine's own: most of PRINT_START's kind heat.
+# fmt: off
+COMMANDS = {
+    "HOME_": Command("a macro such as HOME_AB that homes the axes it names", moves="other", homes=True),
+    "MANUAL_STEPPER": Command("turn or home a [manual_stepper]", moves="table", answer_s=HOMING_S),
+    "FORCE_MOVE": Command("turn a motor", moves="other"),
+    "SET_KINEMATIC_POSITION": Command("call the head's place", changes=True),
+    "SET_GCODE_OFFSET": Command("offset of all moves, a baby step"),
+    "SAVE_GCODE_STATE": Command("store the modes"),
+    "RESTORE_GCODE_STATE": Command("return to the stored modes, with MOVE=1 to the place", moves="other", changes=True),
+    "PROBE": Command("probe one point", moves="other", probes=True),
+    "BED_MESH_CALIBRATE": Command("probe the bed", moves="other", probes=True, answer_s=PROBING_S),
+    "BED_MESH_CLEAR": Command("mesh of the bed off"),
+    "BED_MESH_PROFILE": Command("load or store a mesh of the bed"),
+    "Z_TILT_ADJUST": Command("align the Z motors", moves="other", probes=True),
+    "QUAD_GANTRY_LEVEL": Command("level the gantry", moves="other", probes=True),
+    "SET_HEATER_TEMPERATURE": Command("set a heater's temperature", heats="named", repeatable=True),
+    "TEMPERATURE_WAIT": Command("wait for a temperature", waits="heat", answer_s=HEATING_S, repeatable=True),
+    "TURN_OFF_HEATERS": Command("all heaters off"),
+    "PID_CALIBRATE": Command("tune a heater, which heats it", heats="any"),
+    "SET_VELOCITY_LIMIT": Command("speed and acceleration limits", modal=True, tunes=True),
+    "SET_PRESSURE_ADVANCE": Command("pressure advance", modal=True, tunes=True),
+    "SET_STEPPER_ENABLE": Command("a motor on or off", motors=True),
+    "SET_FAN_SPEED": Command("fan"),
+    "SET_LED": Command("lights"),
+    "SET_IDLE_TIMEOUT": Command("idle time until heaters and motors go off"),
+    "PAUSE": Command("pause, a macro", waits="person", answer_s=PERSON_S),
+    "CLEAR_PAUSE": Command("forget the pause"),
+    "RESUME": Command("resume, a macro", heats="any"),
+    "CANCEL_PRINT": Command("cancel, a macro", heats="any"),
+    "SDCARD_PRINT_FILE": Command("start a file", heats="any"),
+    "SET_DISPLAY_TEXT": Command("show a text", shows=True, repeatable=True),
+    "SET_PRINT_STATS_INFO": Command("layers of the print", shows=True, repeatable=True),
+    "EXCLUDE_OBJECT": Command("leave out an object", shows=True),
+    "EXCLUDE_OBJECT_DEFINE": Command("name an object", shows=True),
+    "EXCLUDE_OBJECT_START": Command("an object begins", shows=True),
+    "EXCLUDE_OBJECT_END": Command("an object ends", shows=True),
+}
+# fmt: on
 
 STEPPERS = Dialect(
     firmware="Klipper with MANUAL_STEPPER",
@@ -46,6 +87,7 @@ STEPPERS = Dialect(
     macros=True,
     stands=_STANDS,
     wait_for_person=("M117 {text}", "PAUSE"),
+    commands=COMMANDS,
 )
 
 _LETTERS = (
@@ -63,11 +105,6 @@ AXES = replace(
     stands=(*_STANDS, *_LETTERS),
     before_end=_FREE,
 )
-
-# What is shown, and what lets a part be left out: without their sections Klipper says that it does not know them, and prints on.
-OPTIONAL = frozenset({
-    "SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT", "EXCLUDE_OBJECT_DEFINE", "EXCLUDE_OBJECT_START", "EXCLUDE_OBJECT_END",
-})  # fmt: skip
 
 
 def stepper_name(axis: RotaryAxis) -> str:

@@ -6,12 +6,26 @@ code that it does not know and that the machine has not remapped, at a word with
 (rs274ngc/interp_array.cc, interp_check.cc).
 """
 
+from machine.firmware.command import Command
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 
 _LACKS = (
     "G29 G32 M17 M18 M82 M83 M84 M201 M203 M204 M205 M207 M208 M220 M221 M300 M302 M400 M420 M486 M500 M501 M568 M572 M600 M900"
 )
+
+# linuxcnc.org/docs, gcode; M428 and M429 are the remaps of the sample configuration for xyzac-trt-kins.
+COMMANDS = {
+    "G61": Command("exact path", changes=True),
+    "M428": Command("follow the table", changes=True),
+    "M429": Command("do not follow the table", changes=True),
+    "M66": Command("wait for an input", waits="person"),
+    **{
+        f"M{code}": Command("a script of the machine's own", heats="any")
+        for code in range(100, 200)
+        if code not in (104, 106, 107, 109, 140, 190)  # scripts, too, but what they do is known
+    },
+}
 
 DIALECT = Dialect(
     firmware="LinuxCNC",
@@ -36,6 +50,7 @@ DIALECT = Dialect(
     follow_persists=True,
     homed_before=True,
     wait_for_person=("(MSG, {text})", "M0"),
+    commands=COMMANDS,
 )
 
 LINUXCNC = Firmware(name="LinuxCNC", dialects={"linuxcnc": DIALECT})

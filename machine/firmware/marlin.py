@@ -4,12 +4,45 @@ TCP (G43.4, G49) exists in the fork DerAndere1/Marlin, branch Marlin2ForPipetBot
 Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
 """
 
+from machine.firmware.command import HEATING_S, PROBING_S, Command
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
 from machine.firmware.marlin_settings import settings_report
 from machine.firmware.probing import ProbingRules
 from machine.firmware.simulation import Idle, SimulationRules
+
+# Meanings from gcode/gcode.h; what heats: gcode/bedlevel/G26.cpp, gcode/probe/G76_M871.cpp, gcode/temp/M306.cpp.
+# fmt: off
+COMMANDS = {
+    "G12": Command("clean the nozzle", moves="other"),
+    "G26": Command("print a test pattern of the mesh", moves="other", heats="any"),
+    "G27": Command("park", moves="other"),
+    "G42": Command("move to a point of the mesh", moves="other"),
+    "G43.4": Command("follow the table", changes=True),
+    "G60": Command("store the position"),
+    "G61": Command("return to the stored position", moves="other"),
+    "G76": Command("tune the probe for heat", moves="other", probes=True, heats="any", answer_s=PROBING_S),
+    "M48": Command("repeatability of the probe", moves="other", probes=True, answer_s=PROBING_S),
+    "M113": Command("interval of `busy:`"),
+    "M120": Command("end stops on"),
+    "M121": Command("end stops off"),
+    "M154": Command("report the position every so many seconds"),
+    "M192": Command("wait for the probe's temperature", waits="heat", answer_s=HEATING_S),
+    "M193": Command("wait for the cooler", waits="heat", answer_s=HEATING_S),
+    "M218": Command("offset of a tool", changes=True),
+    "M280": Command("turn a servo"),
+    "M290": Command("baby step"),
+    "M306": Command("tune a heater's model, which heats it", heats="any", answer_s=HEATING_S),
+    "M412": Command("filament sensor"),
+    "M425": Command("backlash"),
+    "M428": Command("home offset from here", changes=True),
+    "M665": Command("geometry of the machine"),
+    "M851": Command("offset of the probe", changes=True),
+    "M876": Command("answer to a question of the printer"),
+    "M906": Command("current of the motors"),
+}
+# fmt: on
 
 DIALECT = Dialect(
     firmware="Marlin",
@@ -30,6 +63,7 @@ DIALECT = Dialect(
     filament_mode="set",
     stands=("G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",),
     wait_for_person=("M0 {text}",),
+    commands=COMMANDS,
 )
 
 # Configuration_adv.h and module/planner.h, bugfix-2.1.x of 2024-09, which the dry run's planner and the simulated one share.

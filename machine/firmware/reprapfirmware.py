@@ -9,11 +9,42 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from machine.firmware.command import PERSON_S, Command
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
 from machine.firmware.probing import ProbingRules
 from machine.firmware.simulation import SimulatedSettings, SimulationRules
+
+# docs.duet3d.com/User_manual/Reference/Gcodes; GCodes/GCodes2.cpp, 3.6: G10 and M568 share SetOrReportOffsets, M144 S1 switches
+# the bed to its active temperature. A code that the firmware does not know runs a macro of that name where there is one.
+# fmt: off
+COMMANDS = {
+    "G10": Command("temperatures (S, R) or offsets of a tool, else firmware retraction", moves="filament", heats="nozzle",
+                   heats_with="SR"),
+    "M98": Command("run a macro", heats="any"),
+    "M144": Command("bed to its standby temperature, or its active one", heats="any"),
+    "M290": Command("baby step"),
+    "M291": Command("ask a person", waits="person", answer_s=PERSON_S),
+    "M292": Command("answer a question"),
+    "M409": Command("report the object model"),
+    "M552": Command("network"),
+    "M556": Command("axis skew"),
+    "M557": Command("grid of the bed probe"),
+    "M558": Command("kind and speed of the probe"),
+    "M561": Command("bed transform off"),
+    "M564": Command("limits on or off, moves before homing"),
+    "M566": Command("jerk"),
+    "M568": Command("temperatures and state of a tool", heats="nozzle", repeatable=True),
+    "M569": Command("motor drivers"),
+    "M579": Command("scale of the axes", changes=True),
+    "M584": Command("drivers of the axes"),
+    "M703": Command("settings of a filament, a macro", heats="any"),
+    "M906": Command("current of the motors"),
+    "M913": Command("share of the motors' current"),
+    "M915": Command("stall detection"),
+}
+# fmt: on
 
 DIALECT = Dialect(
     firmware="RepRapFirmware",
@@ -35,6 +66,7 @@ DIALECT = Dialect(
     endstop_word="H",
     statements=frozenset({"IF", "ELIF", "ELSE", "WHILE", "BREAK", "CONTINUE", "ABORT", "ECHO", "VAR", "GLOBAL", "SET", "SKIP"}),
     wait_for_person=('M291 P"{text}" R"calibrate" S3 X1 Y1 Z1',),
+    commands=COMMANDS,
 )
 
 

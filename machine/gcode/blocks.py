@@ -1,20 +1,21 @@
 """Blocks: what a G-code block of a machine may name, and why it cannot be written, before there is a program."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from machine.firmware import dialect_of
 from machine.firmware.dialect import Dialect
+from machine.gcode.commands import COMMANDS, Heat, command_named, heat_in, homes
 from machine.gcode.placeholders import fill_block, placeholders, resume_placeholders
 from machine.gcode.words import FLAG, MACRO, PAREN
 from mdp.pose import level
-from profiles.errors import ProfileError
+from profiles.errors import MoveError, ProfileError
 from profiles.machine import Blocks, Machine
 from profiles.places import shipped_of_dialect
 from profiles.profile import Profile
 
 RESUME, START = "resume", "start"
 MOST_QUOTED = 3
-HEATING = ("M104", "M109", "M140", "M190")
 OTHER_WORD = {"S": "P", "P": "S"}  # what a temperature stands behind in the other kind of firmware
 WITH_E = {"G76", "M66", "M67", "M68"}  # the commands of CNC programs that use an E
 EXPRESSION = frozenset("#[<%")  # of CNC programs, which are not read here
@@ -75,6 +76,34 @@ def filled_start(profile: Profile) -> list[str]:
     return [text for line in lines if (text := line.partition(";")[0].strip())]
 
 
+@dataclass(frozen=True)
+class ColdBlock:
+    """Of a block's lines those that are sent to a machine that is to stay cold, and those that are left out because they run a
+    macro, a file or a cycle of the machine's own, or are not known. Lines that plainly heat are in neither."""
+
+    lines: tuple[str, ...]
+    left_out: tuple[str, ...]
+
+
+def cold_block(lines: Sequence[str], dialect: Dialect) -> ColdBlock:
+    """The filled-in lines of a block that homes, without what heats or waits for heat.
+
+    Raises MoveError where a line that may heat is one that homes, or stands before it: without it the machine may not be homed
+    as it must be. A block without homing is one as a whole, but for a firmware that is homed by hand.
+    """
+    heats = [heat_in(line, dialect) for line in lines]
+    homing = [index for index, line in enumerate(lines) if homes(line, dialect)]
+    last = homing[-1] if homing else -1 if dialect.homed_before else len(lines)
+    for index, (line, heat) in enumerate(zip(lines, heats, strict=True)):
+        if (heat is Heat.UNSURE and index <= last) or (heat is Heat.HEATS and index in homing):
+            raise MoveError(
+                f"machine.gcode.start: {line!r} may heat ({heat.value}), and the machine is not homed before it: a machine that "
+                "is to stay cold cannot be homed by this block"
+            )
+    kept = tuple(line for line, heat in zip(lines, heats, strict=True) if heat is Heat.COLD)
+    return ColdBlock(kept, tuple(line for line, heat in zip(lines, heats, strict=True) if heat is Heat.UNSURE))
+
+
 def refused_lines(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
     """The filled-in lines of a block that are not in the firmware's words."""
     for line in lines:
@@ -91,6 +120,7 @@ def _is_known(text: str, dialect: Dialect) -> bool:
     words = FLAG.findall(text)
     named = [f"{letter}{float(number):g}" for letter, number in words if letter in "GM" and number]
     letters = {letter for letter, _ in words}
-    if dialect.lacks & {*named} or (named and named[0] in HEATING and letters == {"M", OTHER_WORD[dialect.value_word]}):
+    heats = named and command_named(named[0], COMMANDS).heats not in ("", "any")
+    if dialect.lacks & {*named} or (heats and letters == {"M", OTHER_WORD[dialect.value_word]}):
         return False
     return dialect.bare_words or (all(number for _, number in words) and ("E" not in letters or bool(WITH_E & {*named})))

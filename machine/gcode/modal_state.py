@@ -6,13 +6,9 @@ Positions are those of the program (what M114 tells), rotary axes unwrapped; Non
 from dataclasses import dataclass, field
 from math import inf
 
+from machine.gcode.commands import EVERY, PATHS, command_named
 from machine.gcode.modes import COMMANDS, E_AXIS, Axes, Modes
 from machine.gcode.words import Word, read_letters, read_number, read_values, read_words, split_command
-
-MOVES = frozenset({"G0", "G1", "G2", "G3"})
-SETTINGS = (
-    "M200", "M201", "M203", "M204", "M205", "M207", "M220", "M221", "SET_VELOCITY_LIMIT", "M900", "M572", "SET_PRESSURE_ADVANCE",
-)  # fmt: skip
 
 Coordinates = tuple[float | None, ...]  # X Y Z tilt turn E
 
@@ -50,7 +46,7 @@ class ModalState:
         if text[:3] == "G1 ":  # nearly every line
             return self._move(text[2:])
         name, rest = split_command(text)
-        if name in MOVES:
+        if name in PATHS:
             return self._move(rest)
         action = ACTIONS.get(name)
         if action is not None:
@@ -58,7 +54,7 @@ class ModalState:
         if name and name in (self.axes.follow_on, self.axes.follow_off):
             self.settings["follow"] = name
             return True
-        if name in SETTINGS:
+        if command_named(name).modal:
             self.settings[name + "".join(sorted(letter for letter, _ in read_words(rest)))] = command
         elif name.startswith("HOME_"):
             for letter in name[5:]:
@@ -81,7 +77,7 @@ class ModalState:
     def names_filament(self, command: str) -> bool:
         """Whether a command is a move that has a word for filament."""
         name, rest = split_command(command.upper())
-        return name in MOVES and any(self.axes.words.get(letter) == E_AXIS for letter, _ in read_words(rest))
+        return name in PATHS and any(self.axes.words.get(letter) == E_AXIS for letter, _ in read_words(rest))
 
     def _move(self, rest: str) -> bool:
         at, words = self.at, read_words(rest)
@@ -120,7 +116,7 @@ class ModalState:
     def _heat(self, name: str, rest: str) -> bool:
         words = dict(read_words(rest))
         target = words.get("S", words.get("R"))
-        if target is not None and name in ("M140", "M190"):
+        if target is not None and EVERY[name].heats == "bed":
             self.bed_c = target
         elif target is not None:
             self.nozzle_c = target
@@ -160,7 +156,7 @@ class ModalState:
 
 ACTIONS = (
     dict.fromkeys(COMMANDS, ModalState._mode)
-    | dict.fromkeys(("M104", "M109", "M140", "M190", "M568"), ModalState._heat)
+    | {name: ModalState._heat for name, command in EVERY.items() if command.heats in ("nozzle", "bed")}
     | dict.fromkeys(("M106", "M107"), ModalState._blow)
     | {
         "G28": ModalState._home,

@@ -6,20 +6,14 @@ place they were sent to, to a thousandth, and the filament with it.
 
 from collections.abc import Mapping, Sequence
 
-from machine.gcode.modal_state import MOVES, SETTINGS, ModalState
+from machine.gcode.commands import command_in
+from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import E_AXIS
-from machine.link.protocol.framing import name_of
 from machine.link.status import PrinterStatus
 
 SAME = 0.01  # mm or deg: what program and firmware round
 DISTINCT = 0.004  # two places nearer to each other cannot be told apart by thousandths
 SEVERAL = 3  # coordinates that are not 0 and agree: a printer that has restarted stands at 0 0 0
-# Done twice in a row they leave what they leave when done once.
-REPEATABLE = frozenset({
-    "G4", "G20", "G21", "G90", "G91", "M73", "M82", "M83", "M104", "M105", "M106", "M107", "M109", "M114", "M116", "M117", "M140",
-    "M155", "M190", "M400", "M486", "M568", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_DISPLAY_TEXT",
-    "SET_PRINT_STATS_INFO", *SETTINGS,
-})  # fmt: skip
 
 
 def line_was_done(command: str, before: Sequence[float | None], after: ModalState, status: PrinterStatus) -> bool | None:
@@ -41,9 +35,9 @@ def line_was_done(command: str, before: Sequence[float | None], after: ModalStat
     for chosen in ([letter for letter in letters if letter != "E"], letters):  # some firmwares count filament in their own way
         if _greatest_difference(start, end, chosen) >= DISTINCT:
             return _reached_end(reported, start, end, chosen)
-    repeatable = name_of(command) in REPEATABLE or (
-        name_of(command) in MOVES and not (after.modes.relative or after.modes.filament_relative)
-    )
+    row = command_in(command)
+    absolute = not (after.modes.relative or after.modes.filament_relative)
+    repeatable = row.repeatable or row.modal or (row.moves == "path" and absolute)
     return False if repeatable and _greatest_difference(reported, end, letters) <= SAME else None
 
 

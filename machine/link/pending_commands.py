@@ -10,24 +10,17 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from threading import Event as Flag
 
-from machine.firmware import dialects
+from machine.gcode.commands import command_in
 from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import Axes
 from machine.gcode.words import read_words, split_command
-from machine.link.protocol.framing import LINE_LIMIT, REFUSED, command_of, name_of
+from machine.link.protocol.framing import LINE_LIMIT, command_of
 from profiles.errors import LocalProtocolError
 
 MOST_AT_ONCE = 16  # requests taken in a turn: what asks without end must not hold up the print
 AWAY = ("pausing", "paused")
 # Marlin takes 10 to 999 per cent. Beyond 300 the planner starves, beyond 200 the extruder slips.
 FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
-# Commands that would make the rest of the program mean something else.
-CHANGES = {
-    "G20", "G21", "G90", "G91", "G92", "G93", "G94", "M82", "M83", "G53", "G54", "M206", "M500", "M501", "M502", "T0", "T1",
-    *(word for dialect in dialects().values() for word in (dialect.follow_on, dialect.follow_off) if word),
-}  # fmt: skip
-MOTORS = {"M17", "M18", "M84", "M85"}
-MOVES = {"G0", "G1", "G2", "G3", "G5", "G10", "G11", "G12", "G27", "G29", "G30", "G60", "G61", "M600", "M701", "M702"}
 
 
 class Command(Enum):
@@ -131,7 +124,7 @@ class PendingCommands:
         while self.lines:
             command = self.lines.popleft()
             yield command
-            if name_of(command.upper()) not in MOVES:
+            if not command_in(command).moves:
                 modal.take(command)
 
     def end_pause(self) -> None:
@@ -187,16 +180,14 @@ def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
         return str(error)
     if not command:
         return "there is no command in it"
-    name = name_of(command.upper())
-    if name in REFUSED:
-        return f"{name} {REFUSED[name]}"
-    if name in ("G28", "G34", "MANUAL_STEPPER") or name.startswith("HOME"):
-        return f"{name} homes or turns an axis: the tip may stand inside the print"
-    if name in MOTORS:
+    name, row = split_command(command.upper())[0], command_in(command)
+    if row.homes or row.moves == "table" or row.probes:
+        return f"{name} homes, probes or turns an axis: the tip may stand inside the print"
+    if row.motors:
         return f"{name} lets the motors go: the print would lose its place"
-    if name in CHANGES or re.fullmatch(r"T\d+", name):
+    if row.changes:
         return f"{name} changes what the rest of the program means"
-    if name in MOVES and not (paused and _filament_only(command, axes)):
+    if row.moves and not (paused and _filament_only(command, axes)):
         return f"{name} moves the machine: during a pause filament alone may move, else nothing"
     return None
 
@@ -204,4 +195,4 @@ def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
 def _filament_only(command: str, axes: Axes) -> bool:
     """Whether a move has no word of an axis."""
     words = set(re.findall(r"[A-Z]", command.upper()[2:]))
-    return name_of(command.upper()) in ("G0", "G1") and "E" in words and words <= {"E", "F"}
+    return split_command(command.upper())[0] in ("G0", "G1") and "E" in words and words <= {"E", "F"}

@@ -1,4 +1,4 @@
-"""Leaving a printer safely: moves stopped, heaters and fan off, the tip lifted; the emergency stop; and the guard that sees to it."""
+"""Leaving a printer safely: moves stopped, heaters off, the tip lifted; the emergency stop; the guard that sees to all of it."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress

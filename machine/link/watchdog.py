@@ -8,6 +8,7 @@ this one speaks only where the firmware's is missing or does not see the fault.
 from dataclasses import dataclass, field
 from math import inf
 
+from machine.gcode.commands import command_named
 from machine.link.pending_commands import Command, PendingCommand
 from machine.link.protocol import events
 from machine.link.protocol.framing import name_of
@@ -31,13 +32,6 @@ OVER_LIMIT_C = 15.0
 OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
 WARNINGS = 20  # remembered of the printer's own words that show a program it does not understand
 WARNS = ("nknown command", "too long extrusion")
-# What displays or names parts: the print is none the worse without it, so nothing is said. Marlin has M73 and M486 only where it
-# was built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS (Configuration_adv.h), which it is not unless somebody asks for them.
-SHOWS = {"M73", "M117", "M118", "M300", "M486"}
-SHOWING = ("EXCLUDE_OBJECT", "SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT")
-# What tunes: a firmware that does not know it is asked once, too, but it is said.
-TUNES = {"M201", "M203", "M204", "M205", "M413", "M572", "M593", "M900"}
-TUNING = ("SET_PRESSURE_ADVANCE", "SET_VELOCITY_LIMIT")
 COLD = ("cold extrusion prevented", "not driven because its heater")  # Marlin, RepRapFirmware; Klipper's is an error
 ASKS = {"pause": Command.PAUSE, "resume": Command.RESUME, "cancel": Command.CANCEL}
 SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prompt_button", "prompt_show", "prompt_end"}
@@ -128,7 +122,9 @@ class PrinterReports:
             self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
         elif unknown := events.unknown_command(event):
             self.unknown.add(unknown)
-            if not _shows(unknown):
+            # Marlin has M73 and M486 only where it was built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS
+            # (Configuration_adv.h), which it is not unless somebody asks for them.
+            if not command_named(unknown).shows:
                 self._warn(f"Unknown command: {unknown}")
         elif isinstance(event, events.Echo):
             self._read_echo(event.text)
@@ -141,7 +137,7 @@ class PrinterReports:
         if not self.unknown:
             return False
         name = name_of(command)
-        return name in self.unknown and (_shows(name) or name in TUNES or name.startswith(TUNING))
+        return name in self.unknown and (command_named(name).shows or command_named(name).tunes)
 
     @property
     def warnings(self) -> list[str]:
@@ -166,8 +162,3 @@ class PrinterReports:
     def _warn(self, text: str) -> None:
         if text in self._warned or len(self._warned) < WARNINGS:
             self._warned[text] = self._warned.get(text, 0) + 1
-
-
-def _shows(name: str) -> bool:
-    """Whether a command only displays or names something."""
-    return name in SHOWS or name.startswith(SHOWING)

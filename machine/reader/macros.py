@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 from math import inf
 
-from machine.firmware.klipper import OPTIONAL
+from machine.firmware.klipper import COMMANDS
 from machine.gcode.words import read_number, read_values
 from machine.reader.motion import flush
 from machine.reader.state import Reader
@@ -115,7 +115,7 @@ MACROS: dict[str, Callable[[Reader, Values], None]] = {
     "SET_HEATER_TEMPERATURE": _heat,
     "TEMPERATURE_WAIT": _wait,
     "TURN_OFF_HEATERS": _off,
-    "SET_VELOCITY_LIMIT": _limit,
     "PAUSE": _pause,
-    **dict.fromkeys(("SET_PRESSURE_ADVANCE", "EXCLUDE_OBJECT", *OPTIONAL), lambda reader, values: None),
+    **{name: lambda reader, values: None for name, command in COMMANDS.items() if command.shows or command.tunes},
+    "SET_VELOCITY_LIMIT": _limit,
 }

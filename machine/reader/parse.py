@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 
+from machine.gcode.commands import PATHS
 from machine.gcode.lines import Lines
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, PAREN, quote, read_words, unframe
 from machine.reader.codes import dispatch
@@ -17,8 +18,7 @@ from profiles.errors import GcodeError
 from profiles.machine import Machine
 
 LONGEST_LINE = 2000
-MOTION = ("G0", "G1", "G2", "G3")
-PLACED = (*MOTION, "G4", "G10", "G28", "G92")
+PLACED = (*PATHS, "G4", "G10", "G28", "G92")
 
 
 def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
@@ -111,7 +111,7 @@ def _irregular(reader: Reader, code: str, text: str) -> None:
         words = (
             [(letter, float(value or 0.0)) for letter, value in FLAG.findall(code[head.end() :])] if FLAGS.fullmatch(code) else []
         )
-        if name in (*MOTION, "G92"):
+        if name in (*PATHS, "G92"):
             raise GcodeError(f"line {reader.number}: {quote(text)} has a word without a number")
         dispatch(reader, name, words)
     elif MACRO.fullmatch(code) and text.isprintable():

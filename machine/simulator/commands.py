@@ -16,7 +16,6 @@ CAPABILITIES = (
 )
 THERE = ("PRINT_JOB", "SOFTWARE_POWER", "HOST_ACTION_COMMANDS", "ARCS")  # beside those that the build decides
 ENDSTOP_MM = 0.01
-TEXTS = ("M117", "M118")  # what follows them are no words
 WITHOUT_EFFECT = ("M17", "M73", "M117", "M486", "M572", "M665", "M876", "M900", "T0")
 
 

@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterator
 from math import inf
 
 from machine.firmware import dialect_of
+from machine.gcode.commands import PATHS, TEXTS
 from machine.gcode.words import read_values, read_words, split_command
 from machine.simulator.board import Board, BuildOptions, Work
-from machine.simulator.commands import COMMANDS, TEXTS
+from machine.simulator.commands import COMMANDS
 from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.macros import command_of
 from machine.simulator.motion_commands import move
@@ -24,7 +25,6 @@ UNREAD_LINES = 20
 CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
 EARLY = ("M108", "M112", "M410")
 IDLE_S = 1.0  # Marlin's NO_TIMEOUTS: `wait` is said so often
-MOVES = ("G0", "G1", "G2", "G3")
 MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_IDLE
 
 
@@ -268,7 +268,7 @@ class SimulatedFirmware:
             if answer is None or isinstance(answer, str):
                 self._finish(label, answer)
                 return
-            self._work, self._waits = answer, name not in MOVES
+            self._work, self._waits = answer, name not in PATHS
         wake_s = next(self._work, None)
         if wake_s is None:
             self._work = None

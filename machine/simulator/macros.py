@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterator
 from math import hypot
 
-from machine.firmware.klipper import OPTIONAL, PROBING, stepper_name
+from machine.firmware.klipper import COMMANDS, PROBING, stepper_name
 from machine.gcode.words import read_number
 from machine.simulator.board import Board, Work, wait_for_moves
 from machine.simulator.commands import heat, heat_and_wait
@@ -108,5 +108,5 @@ MACROS: dict[str, Callable[[Board, Values], Work]] = {
     "SET_HEATER_TEMPERATURE": _heat,
     "TEMPERATURE_WAIT": _wait,
     "TURN_OFF_HEATERS": _off,
-    **dict.fromkeys(("SET_VELOCITY_LIMIT", "SET_PRESSURE_ADVANCE", "EXCLUDE_OBJECT", *OPTIONAL), lambda board, values: None),
+    **{name: lambda board, values: None for name, command in COMMANDS.items() if command.shows or command.tunes},
 }

@@ -198,6 +198,18 @@ def test_a_start_block_that_cannot_be_filled_in_is_told_and_nothing_moves(monkey
     assert not printer.record.happened("homed XYZAC")
 
 
+@pytest.mark.parametrize("heat", ["M109 S210", "m109s210", "M0109 S210", "M104 I1\nM190 R60", "M141 S40\nM191 S40"])
+def test_homing_by_hand_heats_nothing_and_does_not_wait(heat: str, monkeypatch: MonkeyPatch) -> None:
+    gcode = PROFILE.machine.gcode.model_copy(update={"start": f"{heat}\nG28"})
+    heated = PROFILE.model_copy(update={"machine": PROFILE.machine.model_copy(update={"gcode": gcode})})
+    monkeypatch.setattr(f"{__name__}.PROFILE", heated)
+    printer = VirtualPrinter(PROFILE.machine)
+    ended = in_hand(Steps(), printer, monkeypatch, HOME, HandCommand(HandDoes.LET_GO, keep_heat=True))
+    assert (ended["sentence"], targets_c(printer)) == ("let go of; no heater is on", (0.0, 0.0))
+    assert printer.record.happened("homed XYZAC")
+    assert printer.record.unknown == 0
+
+
 def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyPatch) -> None:
     class Terminated(Steps):
         def take(self, *ignored: object, **told: object) -> None:
@@ -219,9 +231,11 @@ def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyP
 
 def test_an_emergency_stop_counts_while_the_heaters_are_switched_off() -> None:
     printer = VirtualPrinter(PROFILE.machine)
-    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"), session_at(printer) as session:
-        session.greet()
-        session.order(StopError)
+    session = session_at(printer)
+    session.greet()
+    session.order(StopError)
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"), session:
+        pass
     assert printer.record.happened("M112")
 
 

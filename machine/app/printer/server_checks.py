@@ -4,7 +4,8 @@ from collections.abc import Iterable
 
 from machine.app.pipeline.programs import refuse_errors
 from machine.app.printer.compatibility import check_printer, check_program, refuse
-from machine.firmware.klipper import OPTIONAL, stepper_name
+from machine.firmware.klipper import stepper_name
+from machine.gcode.commands import command_named
 from machine.gcode.words import macro_name
 from machine.link.identification import Answer, Kind
 from machine.network.address import ServerAddress, is_server_address
@@ -85,7 +86,7 @@ def lacking_macros(greeting: ServerIdentity, lines: Iterable[str]) -> list[str]:
     if greeting.commands is None:
         return []
     called = dict.fromkeys(name for line in lines if (name := macro_name(line)))
-    return [name for name in called if name not in greeting.commands and name not in OPTIONAL]
+    return [name for name in called if name not in greeting.commands and not command_named(name).shows]
 
 
 def _block_lines(machine: Machine) -> list[str]:

@@ -9,20 +9,19 @@ from dataclasses import dataclass
 from math import inf
 
 from machine.firmware import dialect_of
-from machine.gcode.modal_state import MOVES, Coordinates, ModalState
+from machine.gcode.commands import command_in
+from machine.gcode.modal_state import Coordinates, ModalState
 from machine.gcode.pen import number
 from machine.link.exchange import Exchange
 from machine.link.pause.park_moves import fill_commands, heat_commands, plan_park
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import PendingCommands
-from machine.link.protocol.framing import name_of
 from machine.link.watchdog import PrinterReports
 from profiles.profile import Profile
 
 AWAKE_S = 60.0  # half of the shortest idle time, Marlin's DEFAULT_STEPPER_TIMEOUT_SEC
 COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP and Klipper's min_extrude_temp
 NEAR_C = 10.0  # a print that is to be colder than that shows that its firmware allows it
-NOZZLE_HEAT = ("M104", "M109", "M568", "SET_HEATER_TEMPERATURE")
 
 
 @dataclass
@@ -98,8 +97,8 @@ class Pause:
         """The person's commands; why one of them was not sent, "" when all were: a firmware ends the print at cold filament."""
         refused = ""
         for command in self.pending.next_lines(self.modal):
-            name = name_of(command.upper())
-            if name in MOVES:
+            row = command_in(command)
+            if row.moves == "path":
                 self.exchange.send("M105")
                 self.exchange.settle()  # whatever heats is waited for
                 if self._is_cold():
@@ -107,7 +106,7 @@ class Pause:
                     refused = f"not sent: {command[:40]!r}: the nozzle has only {nozzle_c:.0f} deg C: heat it first (M109)"
                     continue
             self.exchange.send(command)
-            self.off = self.off and name not in NOZZLE_HEAT
+            self.off = self.off and row.heats not in ("nozzle", "named")
         return refused
 
     def _is_cold(self) -> bool:

@@ -5,20 +5,13 @@ from collections.abc import Sequence
 
 from machine.firmware.line import FRAME_CHARACTERS
 from machine.firmware.marlin import DIALECT
+from machine.gcode.commands import command_in
 from machine.gcode.words import PAUSE_REMARK
 from profiles.errors import LocalProtocolError
 
 LINE_LIMIT = DIALECT.longest_line
 FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers refuses it with the one it wants
 _is_plain_move = re.compile(r"G[01](?: [A-Z]-?[0-9.]+)+").fullmatch
-REFUSED = {
-    "M0": "waits for a person at the printer's own buttons",
-    "M1": "waits for a person at the printer's own buttons",
-    "M108": "is an order of the sender",
-    "M110": "would break the line numbers",
-    "M112": "is an order of the sender",
-    "M410": "is an order of the sender",
-}
 
 
 def checksum(body: bytes) -> int:
@@ -73,7 +66,7 @@ def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
             raise LocalProtocolError(f"{_called(source)} holds the character {bad!r}: only printable ASCII can be sent")
     if "*" in command:
         raise LocalProtocolError(f"{_called(source)} ({command[:40]!r}) holds a '*': checksums are added by the sender")
-    if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
+    if command[0] in "Mm" and (reason := command_in(command).refused):
         raise LocalProtocolError(f"{_called(source)} holds {name_of(command)}, which {reason}: remove it from the program")
     if len(command) > limit - FRAME_CHARACTERS:
         raise LocalProtocolError(

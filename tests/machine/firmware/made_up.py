@@ -1,5 +1,6 @@
 """A firmware that exists only here: written as docs/gcode.md tells how to add one."""
 
+from machine.firmware.command import Command
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
@@ -23,6 +24,10 @@ MADE_UP = Firmware(
             follow_on="M430",
             follow_off="M431",
             wait_for_person=("M118 {text}", "M1"),
+            commands={
+                "M430": Command("follow the table", changes=True),
+                "M431": Command("do not follow the table", changes=True),
+            },
         )
     },
     line=LineRules(places_plain=2, last_number=9_900, reports_rotary_axes=True),

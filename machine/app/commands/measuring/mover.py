@@ -3,6 +3,7 @@
 from contextlib import suppress
 
 from machine.app.printer.command_session import CommandSession
+from machine.app.terminal.progress import say
 from machine.calibration.program import cold_start, turn_lines
 from machine.gcode.pen import Pen
 from machine.link.shutdown import lift_tip
@@ -23,8 +24,10 @@ class PrinterMover:
         self._top: float | None = None  # the greatest height it has been sent to; None: it has not been homed
 
     def start(self) -> None:
-        """Home as the profile's start block does, without heat."""
-        for line in cold_start(self._pen):
+        """Home as the profile's start block does, without heat; what is left out for that is said. Raises UserError."""
+        for line in list(cold_start(self._pen)):
+            if line.startswith("; left out"):
+                say(f"start block: {line.removeprefix('; ')}")
             self._session.command(line)
 
     def turn(self, pose: Pose) -> None:

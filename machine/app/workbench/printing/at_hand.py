@@ -20,8 +20,10 @@ from machine.app.terminal.interrupts import calling
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
-from machine.firmware import dialect_of
-from machine.gcode.blocks import filled_start
+from machine.firmware import Dialect, dialect_of
+from machine.gcode.blocks import cold_block, filled_start
+from machine.gcode.commands import homes
+from machine.gcode.words import read_letters, split_command
 from machine.kinematics.table import machine_points
 from machine.link.pending_commands import Command
 from machine.link.port import open_port
@@ -36,7 +38,6 @@ LEVEL_DEG = 0.05  # M114 reports hundredths
 MOST_JOG_MM = 100.0
 JOG_MM_S = {"X": 50.0, "Y": 50.0, "Z": 10.0}
 LET_GO = "let go of; the heaters are off"
-HEATS = ("M104", "M109", "M140", "M190")
 
 
 def by_hand(order: HandOrder, person: AtPage, checks: Checks) -> State:
@@ -166,7 +167,7 @@ class Hand:
         self._session.command("M114")
         check_level(machine, self._at(), homing=command.does == HandDoes.HOME)
         if command.does == HandDoes.HOME:
-            return homing_lines(filled_start(self._profile))
+            return homing_lines(filled_start(self._profile), dialect_of(machine))
         target_mm = jog_target_mm(machine, self._at(), command.axis, command.by_mm)
         return ["G21", "G90", f"G1 {command.axis}{target_mm:.3f} F{JOG_MM_S[command.axis] * 60.0:g}"]
 
@@ -188,16 +189,18 @@ def _has_just_begun(machine: Machine, at: dict[str, float]) -> bool:
     return all(letter in at and abs(at[letter] - home) < LEVEL_DEG for letter, home in believed)
 
 
-def homing_lines(start: list[str]) -> list[str]:
-    """How a start block homes: its lines up to the last G28, without those that heat, and what calls the table level right after
-    it. Raises MoveError where it homes nothing."""
-    words = [line.upper().split() for line in start]
-    last = max((k for k, (code, *_) in enumerate(words) if code == "G28"), default=-1)
+def homing_lines(start: list[str], dialect: Dialect) -> list[str]:
+    """How a start block homes: its lines up to the last that does, without those that heat, and what calls the table level right
+    after it. Raises MoveError where it homes nothing, or not without what may heat."""
+    last = max((index for index, line in enumerate(start) if homes(line, dialect)), default=-1)
     if last < 0:
         raise MoveError("the start block of this machine homes nothing (G28): home it at the machine")
-    while last + 1 < len(words) and words[last + 1][0] == "G92" and not any(word.startswith("E") for word in words[last + 1]):
+    for line in start[last + 1 :]:
+        name, rest = split_command(line.upper())
+        if name != "G92" or "E" in read_letters(rest):
+            break
         last += 1
-    return [line for line, (code, *_) in zip(start[: last + 1], words, strict=False) if code not in HEATS]
+    return list(cold_block(start[: last + 1], dialect).lines)
 
 
 def jog_target_mm(machine: Machine, at: dict[str, float], axis: str, by_mm: float) -> float:

@@ -13,13 +13,14 @@ from machine.app.workbench.printing.at_hand import by_hand, check_level, homing_
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import HandCommand, HandDoes, HandOrder
+from machine.firmware import dialect_of
 from machine.gcode.blocks import filled_start
 from machine.link.pending_commands import Command
 from profiles.errors import MoveError
 from profiles.profile import load
 
 PROFILE = load()
-MACHINE = PROFILE.machine
+MACHINE, FRACTAL = PROFILE.machine, load(machine="fractal5pro")
 
 
 def wait_until(condition: Callable[[], object]) -> None:
@@ -100,10 +101,10 @@ def test_nothing_is_homed_or_moved_over_a_table_that_is_tilted_or_of_which_nothi
 
 
 def test_homing_is_what_the_start_block_does_without_its_heat() -> None:
-    assert homing_lines(filled_start(PROFILE)) == ["G21", "G90", "M83", "G28 X Y Z", "G92 A0 C0"]
-    assert homing_lines(filled_start(load(machine="fractal5pro")))[-2:] == ["home_ab", "G28"]
+    assert homing_lines(filled_start(PROFILE), dialect_of(MACHINE)) == ["G21", "G90", "M83", "G28 X Y Z", "G92 A0 C0"]
+    assert homing_lines(filled_start(FRACTAL), dialect_of(FRACTAL.machine))[-2:] == ["home_ab", "G28"]
     with pytest.raises(MoveError, match="homes nothing"):
-        homing_lines(["M104 S200"])
+        homing_lines(["M104 S200"], dialect_of(MACHINE))
 
 
 @pytest.mark.parametrize(("axis", "by_mm"), [("Z", -100.0), ("A", 1.0), ("X", 1000.0), ("X", float("nan"))])
