@@ -147,6 +147,8 @@ COMMANDS: dict[str, Command] = {
     # files and macros: whatever they hold
     "M24": Command("start a file of the printer's own", heats="any"),
     "M32": Command("start a file of the printer's own", heats="any"),
+    "M25": Command("pause that file"),
+    "M27": Command("report where that file is"),
     # ends of a program
     "M2": Command("end of the program"),
     "M30": Command("end of the program (CNC), delete a file (Marlin)"),

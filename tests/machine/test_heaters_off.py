@@ -153,8 +153,8 @@ def test_an_error_at_any_step_leaves_the_heaters_off(loop: Loop, monkeypatch: Mo
     assert targets_c(printer) == (0.0, 0.0)
     hot = []
     for step in range(1, whole.count + 1):
-        runs = [(error(), (step,)) for error in (ERRORS[step % 5], ERRORS[(step + 2) % 5])]
-        for error, at in (*runs, (KeyboardInterrupt(), (step, step + 1))):  # the last: again while the heaters are switched off
+        again = (step, step + 1)  # the second one while the heaters are being switched off
+        for error, at in ((ERRORS[step % len(ERRORS)](), (step,)), (KeyboardInterrupt(), again)):
             printer = VirtualPrinter(PROFILE.machine)
             with suppress(type(error), PrinterError):
                 loop(Steps(error, at), printer, monkeypatch)

@@ -107,16 +107,12 @@ class _Console:
             if session.exchange.greeted:
                 unknown = session.unknown[:]
                 heated = session.heated()
-                session.keep_heat = bool(heated) and self._stays_on(heated, ask=typed and not code)
+                session.keep_heat = self._leave_heaters or (typed and not code and bool(heated) and not _agreed(heated))
         if heated:
             say(f"{'left on' if session.keep_heat else 'switched off'}: {heated}")
         if unknown and not typed:
             raise PrinterError(f"the printer did not know {', '.join(repr(line) for line in unknown[:5])}")
         return code
-
-    def _stays_on(self, heated: str, ask: bool) -> bool:
-        """Whether heaters that are on are to be left on."""
-        return self._leave_heaters or (ask and not _agreed(f"{heated}: switch off? [Y/n] "))
 
     def _piped(self) -> None:
         """Every line of a pipe, one after the other."""
@@ -228,10 +224,10 @@ class _Console:
         return word == "/quit"
 
 
-def _agreed(question: str) -> bool:
-    """Anything but a plain no agrees."""
+def _agreed(heated: str) -> bool:
+    """Whether heaters that are on are to be switched off: anything but a plain no agrees."""
     try:
-        return not input(question).strip().lower().startswith("n")
+        return not input(f"{heated}: switch off? [Y/n] ").strip().lower().startswith("n")
     except (EOFError, KeyboardInterrupt):
         return True
 

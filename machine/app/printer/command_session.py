@@ -101,6 +101,7 @@ class CommandSession:
         """Heaters off; True when the printer's own report shows it. A command under way is broken off."""
         if not self._idle():
             return HeaterGuard(self.exchange, lambda: True, self._check_stop).switch_off() is not Heaters.UNPROVED
+        self.heat = Temperature()  # an older report proves nothing
         self.command("M105")
         if not shows_off(self.heat):
             for command in ("M104 S0", "M140 S0", "M105"):

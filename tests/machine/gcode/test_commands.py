@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from machine.app.printer.settings_queries import QUESTIONS
 from machine.app.workbench.printing.at_hand import homing_lines
 from machine.calibration.program import calibration_lines, calibration_pen, cold_start, plan_touches
 from machine.firmware import Dialect, dialect_of, dialects
@@ -139,6 +140,13 @@ def test_a_macro_before_the_machine_is_homed_is_refused_and_one_after_it_is_left
     assert (block.lines, block.left_out) == (("G28", "G92 E0"), ("LINE_PURGE",))
     said = list(cold_start(calibration_pen(with_start(KLIPPER, "home_ab\nG28\nLINE_PURGE"))))
     assert said[0] == "; left out, for it may heat: LINE_PURGE"
+
+
+@pytest.mark.parametrize("dialect", ["marlin", "reprapfirmware"])
+def test_asking_a_printer_for_its_settings_neither_heats_nor_moves_it(dialect: str) -> None:
+    questions = QUESTIONS[dialects()[dialect].firmware]
+    assert {heat_in(question, dialects()[dialect]) for question in questions} == {Heat.COLD}
+    assert not any(command_in(question).moves for question in questions)
 
 
 def test_a_line_that_homes_and_heats_at_once_is_refused() -> None:

@@ -59,7 +59,7 @@ def by_hand(order: HandOrder, person: AtPage, checks: Checks) -> State:
 
 
 class Hand:
-    """A session at a printer that is greeted."""
+    """A session at a printer that a person heats and moves."""
 
     def __init__(self, order: HandOrder, session: CommandSession, checks: Checks) -> None:
         self._profile, self._session, self._tell = order.profile, session, checks.reporter.tell
