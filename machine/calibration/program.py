@@ -127,7 +127,7 @@ def turn_lines(pose: Pose, pen: Pen) -> Iterator[str]:
 
 
 def _fill(block: str, pen: Pen) -> list[str]:
-    return fill_block(block, BLOCKS[0], pen.values, pen.dialect.longest_line)
+    return fill_block(block, BLOCKS[0], pen.values, pen.dialect)
 
 
 def unsure_signs(machine: Machine) -> tuple[str, ...]:

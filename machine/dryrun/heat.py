@@ -6,6 +6,8 @@ from math import pi
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
+from machine.gcode.line_text import to_ascii
+from machine.gcode.words import quote
 from machine.reader.levels import fan_shares, temperatures
 from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats
@@ -32,6 +34,7 @@ def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Findin
         *_flow(program, profile),
         *_profile(program, profile),
         *_unknown_commands(program),
+        *_replaced_texts(program),
     ]
 
 
@@ -189,6 +192,14 @@ def _unknown_commands(program: ParsedProgram) -> list[Finding]:
         Finding("warning", "ignored", line, 0, 0, f"{code} is not known to the dry run and was ignored{_times(count)}")
         for code, (line, count) in program.ignored.items()
     ]
+
+
+def _replaced_texts(program: ParsedProgram) -> Iterator[Finding]:
+    """Texts for the display with characters that a serial line does not carry, told once."""
+    if program.replaced:
+        line, command = program.replaced[0]
+        message = f"{quote(command)} is sent as {quote(to_ascii(command))}: a serial line carries ASCII only"
+        yield Finding("warning", "text", line, 0, 0, f"{message}{_times(len(program.replaced))}")
 
 
 def _times(count: int) -> str:

@@ -99,7 +99,7 @@ def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:
 
     A further block of the same line (an arc's) has no bytes.
     """
-    texts = (line.partition(";")[0].strip() for line in lines)
+    texts = (line if is_plain_move(line) else read_line(line).command for line in lines)
     letters = np.array([0, *(len(text) for text in texts)], dtype=np.float64)
     digits = np.minimum(np.floor(np.log10(np.cumsum(letters > 0) + GREETING)) + 1, NUMBER_DIGITS)
     sizes = np.where(letters > 0, letters + USUAL_FRAME_BYTES + digits, 0.0)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from machine.firmware import dialect_of
 from machine.firmware.dialect import Dialect
 from machine.gcode.commands import COMMANDS, Heat, command_named, heat_in, homes
+from machine.gcode.line_text import read_line
 from machine.gcode.placeholders import fill_block, placeholders, resume_placeholders
-from machine.gcode.words import FLAG, MACRO, PAREN
+from machine.gcode.words import FLAG, MACRO
 from mdp.pose import level
 from profiles.errors import MoveError, ProfileError
 from profiles.machine import Blocks, Machine
@@ -33,7 +34,7 @@ def block_problems(profile: Profile, *blocks: str) -> list[str]:
     for block in blocks or tuple(Blocks.model_fields):
         try:
             lines = fill_block(
-                getattr(machine.gcode, block), f"machine.gcode.{block}", _values(profile, block), dialect.longest_line
+                getattr(machine.gcode, block), f"machine.gcode.{block}", _values(profile, block), dialect
             )
             refused[block] = list(refused_lines(lines, dialect))
         except ProfileError as error:
@@ -72,8 +73,8 @@ def _values(profile: Profile, block: str) -> dict[str, object]:
 def filled_start(profile: Profile) -> list[str]:
     """The lines of the start block with its placeholders filled in, comments left out. Raises ProfileError."""
     machine = profile.machine
-    lines = fill_block(machine.gcode.start, START, _values(profile, START), dialect_of(machine).longest_line)
-    return [text for line in lines if (text := line.partition(";")[0].strip())]
+    lines = fill_block(machine.gcode.start, START, _values(profile, START), dialect_of(machine))
+    return [command for line in lines if (command := read_line(line).command)]
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def cold_block(lines: Sequence[str], dialect: Dialect) -> ColdBlock:
 def refused_lines(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
     """The filled-in lines of a block that are not in the firmware's words."""
     for line in lines:
-        text = PAREN.sub(" ", line.partition(";")[0]).strip().upper()
+        text = read_line(line).command.upper()
         if text and text.split()[0] not in dialect.statements and not _is_known(text, dialect):
             yield line
 

@@ -17,12 +17,13 @@ from enum import Enum
 from machine.firmware import FIRMWARES
 from machine.firmware.command import EEPROM_S, HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command
 from machine.firmware.dialect import Dialect
-from machine.gcode.words import MACRO, PAREN, read_letters, read_number, read_values, read_words, split_command
+from machine.gcode.line_text import MESSAGES, read_line
+from machine.gcode.words import MACRO, read_letters, read_number, read_values, read_words, split_command
+from profiles.errors import GcodeError
 
 NEXT_COMMAND = re.compile(r"(?=[GM] *[0-9])")
 TOOL, HOME = "T", "HOME_"  # rows of T0, T1, ... and of macros such as HOME_AB
 TOOLS, HOMES = re.compile(r"T-?\d+"), re.compile(r"HOME_[A-DU-Z]+")
-TEXTS = ("M117", "M118")  # what follows them are no words
 AT_BUTTONS, SENDERS = "waits for a person at the printer's own buttons", "is an order of the sender"
 
 # fmt: off
@@ -195,20 +196,23 @@ class Heat(Enum):
 
 def heat_in(line: str, dialect: Dialect) -> Heat:
     """What a line does with heat, in any spelling: m104s200, several commands in a line, a macro's KEY=VALUE."""
-    found = {_heat(name, rest, dialect) for name, rest in _commands(line, dialect)}
+    found = {_heat(name, rest, dialect) for name, rest in _commands(line)}
     return next((heat for heat in (Heat.UNSURE, Heat.HEATS) if heat in found), Heat.COLD)
 
 
 def homes(line: str, dialect: Dialect) -> bool:
     """Whether a line homes axes."""
-    return any(command_named(name, commands_of(dialect)).homes for name, _ in _commands(line, dialect))
+    return any(command_named(name, commands_of(dialect)).homes for name, _ in _commands(line))
 
 
-def _commands(line: str, dialect: Dialect) -> list[tuple[str, str]]:
-    """Name and rest of every command in a line; a text that is shown is none."""
-    text = line.partition(";")[0]
-    text = (text if dialect.bare_words else PAREN.sub(" ", text)).strip().upper()
-    if not text or split_command(text)[0] in TEXTS:
+def _commands(line: str) -> list[tuple[str, str]]:
+    """Name and rest of every command in a line; a text that is shown is none. A line that firmwares read differently is one command
+    that nothing is known of."""
+    try:
+        text = read_line(line).command.upper()
+    except GcodeError:
+        return [(line.strip().upper(), "")]
+    if not text or split_command(text)[0] in MESSAGES:
         return []
     parts = [text] if MACRO.fullmatch(text) else NEXT_COMMAND.split(text)
     return [split_command(part.strip()) for part in parts if part.strip()]

@@ -3,13 +3,15 @@
 import re
 from collections.abc import Mapping, Sequence
 
+from machine.firmware.dialect import Dialect
 from machine.firmware.klipper import stepper_name
 from machine.firmware.line import FRAME_CHARACTERS
+from machine.gcode.line_text import plain_line, read_line
 from machine.planning.moves import BeginPart
 from machine.quantities import duration, filament_g
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
-from profiles.errors import ProfileError
+from profiles.errors import GcodeError, ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -69,15 +71,20 @@ def _axes(machine: Machine) -> dict[str, object]:
     }
 
 
-def fill_block(block: str, name: str, values: Mapping[str, object], longest: int) -> list[str]:
+def fill_block(block: str, name: str, values: Mapping[str, object], dialect: Dialect) -> list[str]:
     """The block's lines with {placeholders} replaced, empty lines left out.
 
-    Raises ProfileError for an unknown placeholder and for a command too long for the firmware.
+    A firmware on a serial line gets them without remarks in parentheses, whose words it would execute. Raises ProfileError for an
+    unknown placeholder, for a line whose text firmwares read differently and for a command too long for the firmware.
     """
-    lines = []
+    lines, longest = [], dialect.longest_line
     for line in block.splitlines():
         text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).strip()
-        command = text.partition(";")[0].strip()
+        try:
+            command = read_line(text).command
+            text = plain_line(text) if dialect.serial else text
+        except GcodeError as error:
+            raise ProfileError(f"{name}: {error}") from None
         if len(command) + FRAME_CHARACTERS > longest:
             raise ProfileError(
                 f"{name}: the line {command[:40]!r}... has {len(command)} characters, "

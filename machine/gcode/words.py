@@ -1,11 +1,9 @@
-"""Words: one line of G-code taken apart into frame, command, words of letter and number, KEY=VALUE of a macro.
+"""Words: a command of G-code taken apart into words of letter and number, or a macro into KEY=VALUE.
 
 The dry run's reader, the host and the simulated printer all read with these. Letters are capitals: callers make them so.
 """
 
 import re
-
-from profiles.errors import GcodeError
 
 Word = tuple[str, float]
 
@@ -17,7 +15,6 @@ WORD = re.compile(rf"([A-Z]) *({NUMBER})")
 FLAGS = re.compile(rf"[GM] *[0-9]+(?:\.[0-9]+)? *(?:[A-Z] *(?:{NUMBER} *)?)*")
 FLAG = re.compile(rf"([A-Z]) *({NUMBER})?")
 MACRO = re.compile(r"(?![A-Z][-+.0-9])[A-Z_][A-Z0-9_]+(?: .*)?")
-PAREN = re.compile(r"\([^)]*\)")
 COMMAND = re.compile(r"([GMTSPR]) *0*([0-9]{1,9}(?:\.[0-9]{1,6})?)")  # S P R: Marlin's real-time orders, S000
 VALUE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*) *= *(\"[^\"]*\"|\S*)")
 _number = re.compile(NUMBER).fullmatch
@@ -55,26 +52,6 @@ def split_command(text: str) -> tuple[str, str]:
         return f"{head[1]}{head[2]}", text[head.end() :]
     name, _, rest = text.partition(" ")
     return name, rest
-
-
-def macro_name(line: str) -> str:
-    """The macro that a line of a program calls, in capitals; "" where it has none."""
-    if line[1:2].isdigit():  # nearly every line
-        return ""
-    command = line.partition(";")[0].strip().upper()
-    return command.partition(" ")[0] if MACRO.fullmatch(command) else ""
-
-
-def unframe(number: int, code: str) -> str:
-    """A line without its N number and checksum; GcodeError when the checksum does not fit."""
-    body, star, given = code.partition("*")
-    if star:
-        total = 0
-        for byte in body.encode("utf-8", "replace"):
-            total ^= byte
-        if given.strip() != str(total):
-            raise GcodeError(f"line {number}: {quote(code)} has checksum {given.strip()[:8]!r}, its characters give {total}")
-    return re.sub(r"^N *[0-9]+ *", "", body.strip())
 
 
 def quote(text: str) -> str:

@@ -124,12 +124,12 @@ def _last_strokes(program: MachineProgram) -> set[int]:
 
 def _block(name: str, pen: Pen, **values: object) -> list[str]:
     """The lines of one of the profile's blocks."""
-    return fill_block(getattr(pen.machine.gcode, name), f"machine.gcode.{name}", pen.values | values, pen.dialect.longest_line)
+    return fill_block(getattr(pen.machine.gcode, name), f"machine.gcode.{name}", pen.values | values, pen.dialect)
 
 
 def _dialect_line(word: str, pen: Pen, **values: object) -> list[str]:
     """A line of the dialect with its placeholders filled; nothing where the firmware has no such word."""
-    return fill_block(word, "dialect", pen.values | values, pen.dialect.longest_line)
+    return fill_block(word, "dialect", pen.values | values, pen.dialect)
 
 
 def _start(profile: Profile, parts: list[BeginPart], pen: Pen) -> Iterator[str]:

@@ -149,7 +149,7 @@ class PendingCommands:
         why = line_refusal(text, self.axes, state == "paused", self.limit)
         self.message = "" if why is None else f"not sent: {text.strip()[:40]!r}: {why}"
         if why is None:
-            self.lines.append(text.partition(";")[0].strip())
+            self.lines.append(command_of(text, "the command", self.limit))
 
     def _override(self, command: Command, value: float) -> None:
         feed = command is Command.FEED

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from machine.gcode.landmarks import begins_layer, begun_part
+from machine.gcode.line_text import read_line
 from machine.gcode.words import read_words, split_command
 from machine.link.protocol.events import Temperature
 from machine.link.protocol.framing import LINE_LIMIT
@@ -86,7 +87,7 @@ class ProgramPosition:
 
     def read_comment(self, line: str) -> bool:
         """Take note of what a line says behind its `;`; whether a layer begins there."""
-        comment = line.partition(";")[2].strip()
+        comment = read_line(line).comment.strip() if ";" in line else ""
         if not comment:
             return False
         if begins := begins_layer(comment):

@@ -10,6 +10,8 @@ from io import BytesIO
 from itertools import accumulate
 from typing import BinaryIO
 
+from machine.gcode.line_text import plain_line
+
 LONGEST_NAME = 80  # RepRapFirmware keeps 120 characters of a whole path
 SUFFIX = ".gcode"
 TAKEN = (".gcode", ".gco", ".g")  # OctoPrint takes no others for programs
@@ -18,10 +20,14 @@ Sent = Callable[[int], None]  # told how many bytes have gone
 
 
 class GcodeUpload:
-    """A program under the name it will have there. The lines are those that were dry-run, so nothing else can be printed."""
+    """A program under the name it will have there.
+
+    Its lines are those that were dry-run, with the text that the dry run has read: without remarks in parentheses, which the
+    server or its firmware would execute. Raises GcodeError for a line that the dry run refuses, too.
+    """
 
     def __init__(self, name: str, lines: Iterable[str]) -> None:
-        encoded = [f"{line}\n".encode() for line in lines]
+        encoded = [f"{plain_line(line)}\n".encode() for line in lines]
         self.name = server_name(name)
         self.content = b"".join(encoded)
         self._ends = list(accumulate(map(len, encoded)))

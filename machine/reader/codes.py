@@ -200,4 +200,8 @@ ACTIONS: tuple[tuple[Action, str], ...] = (
     (_wait, "M116"),
     (_probe, "G29 G32 G34"),
 )
+# What may stand behind a command besides words with numbers: of G codes only these take letters alone, of M codes those that set
+# what the dry run counts with take none; firmwares differ in what they make of the rest.
+BARE_WORDS = frozenset("G28 G29 G32 G34".split())
+VALUED = frozenset("M82 M83 M104 M109 M140 M190 M200 M204 M207 M220 M221 M568".split())
 CODES: dict[str, Action] = {code: action for action, codes in ACTIONS for code in codes.split()}

@@ -5,8 +5,9 @@ from collections.abc import Iterable
 
 from machine.gcode.commands import PATHS
 from machine.gcode.lines import Lines
-from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, PAREN, quote, read_words, unframe
-from machine.reader.codes import dispatch
+from machine.gcode.line_text import FREE_TEXT, read_line, to_ascii
+from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, quote, read_words
+from machine.reader.codes import BARE_WORDS, VALUED, dispatch
 from machine.reader.macros import macro
 from machine.reader.motion import flush
 from machine.reader.parsed import ParsedProgram
@@ -18,6 +19,8 @@ from profiles.errors import GcodeError
 from profiles.machine import Machine
 
 LONGEST_LINE = 2000
+SECOND = re.compile(r"[GM] *[0-9]+")  # a second command of a line
+STRING = re.compile(r'"[^"]*"')
 PLACED = (*PATHS, "G4", "G10", "G28", "G92")
 
 
@@ -44,29 +47,26 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
 
 def _line(reader: Reader, line: str) -> None:
     """Any line: its comment, then its command."""
-    code, _, said = line.partition(";")
-    if "(" in code and len(line) <= LONGEST_LINE and code.count("(") > code.count(")"):
-        code, _, said = PAREN.sub(" ", line).partition(";")  # the ; stands inside a comment in parentheses
-    if len(code) > LONGEST_LINE:
+    if len(line) > LONGEST_LINE and len(line.partition(";")[0]) > LONGEST_LINE:
         raise GcodeError(
             f"line {reader.number} is {len(line)} characters long: a G-code line has at most {LONGEST_LINE} before its comment"
         )
-    if said:
-        remark(reader, said)
-    code = code.strip()
-    if code and not reader.ended:
-        _command(reader, code)
+    if reader.ended:
+        remark(reader, line.partition(";")[2])
+        return
+    try:
+        command, comment = read_line(line)
+    except GcodeError as error:
+        raise GcodeError(f"line {reader.number}: {error}") from None
+    if comment:
+        remark(reader, comment)
+    if command:
+        _command(reader, command)
 
 
 def _command(reader: Reader, text: str) -> None:
-    """One line without its ; comment."""
+    """One command, as it is sent."""
     code = text.upper()
-    if "(" in code:
-        code = PAREN.sub(" ", code).strip()
-    if code.startswith("N"):
-        code = unframe(reader.number, code)
-    if not code or code == "%":
-        return
     if BLOCK.fullmatch(code):
         _block(reader, read_words(code), text)
     else:
@@ -75,6 +75,9 @@ def _command(reader: Reader, text: str) -> None:
 
 def _block(reader: Reader, words: Words, text: str) -> None:
     """Letters and numbers: one command, or as CNC firmwares have it several, their words shared, the one that moves last."""
+    if reader.dialect.serial:
+        _one_command(reader, words, text)
+        return
     named = [_name(letter, value) for letter, value in words if letter in "GMT"]
     others = [word for word in words if word[0] not in "GMT"]
     if not named:
@@ -87,7 +90,7 @@ def _block(reader: Reader, words: Words, text: str) -> None:
         return
     if words[0][0] not in "GMT":
         raise GcodeError(f"line {reader.number}: {quote(text)} begins with no command: G, M or T is expected")
-    if (words[0][0] == "M" and reader.dialect.serial) or len(named) == 1:
+    if len(named) == 1:
         dispatch(reader, named[0], words[1:])
         return
     placed = [name for name in named if name in PLACED]
@@ -103,24 +106,49 @@ def _block(reader: Reader, words: Words, text: str) -> None:
         dispatch(reader, name, [])
 
 
+def _one_command(reader: Reader, words: Words, text: str) -> None:
+    """Letters and numbers for a firmware on a serial line, which wants a command in front and one command in a line: Marlin and
+    Klipper take a second one for a parameter, RepRapFirmware does it."""
+    (letter, value), *others = words
+    if letter not in "GMT":
+        raise GcodeError(f"line {reader.number}: {quote(text)} begins with no command: G, M or T is expected")
+    second = next((_name(*word) for word in others if word[0] in "GM"), None)
+    if second is not None:
+        raise GcodeError(f"line {reader.number}: {quote(text)} holds two commands, {_name(letter, value)} and {second}: write one a line")
+    dispatch(reader, _name(letter, value), others)
+
+
 def _irregular(reader: Reader, code: str, text: str) -> None:
-    """Lines whose words are not all letter and number: axis names alone, texts, macros."""
+    """Commands whose words are not all letter and number: axis names alone, texts, macros."""
+    if to_ascii(text) != text:
+        reader.replaced.append((reader.number, text))
     head = re.match(r"([GM]) *([0-9]{1,6}(?:\.[0-9]{1,6})?)(?![0-9])", code)
     if head and (head[1] == "M" or FLAGS.fullmatch(code)):
-        name = _name(head[1], float(head[2]))
-        words = (
-            [(letter, float(value or 0.0)) for letter, value in FLAG.findall(code[head.end() :])] if FLAGS.fullmatch(code) else []
-        )
-        if name in (*PATHS, "G92"):
+        name, rest = _name(head[1], float(head[2])), code[head.end() :]
+        if head[1] == "G" and name not in BARE_WORDS:
             raise GcodeError(f"line {reader.number}: {quote(text)} has a word without a number")
+        if name in VALUED:
+            raise GcodeError(f"line {reader.number}: {quote(text)}: behind {name} only letters with a number are allowed")
+        if reader.dialect.serial and name not in FREE_TEXT:
+            _check_alone(reader, name, rest, text)
+        words = [(letter, float(value or 0.0)) for letter, value in FLAG.findall(rest)] if FLAGS.fullmatch(code) else []
         dispatch(reader, name, words)
     elif MACRO.fullmatch(code) and text.isprintable():
+        name, _, rest = code.partition(" ")
+        if reader.dialect.serial and not reader.dialect.macros and name not in reader.dialect.statements:
+            _check_alone(reader, name, rest, text)
         if not macro(reader, code):
-            reader.own(code.split()[0])
+            reader.own(name)
     elif re.match(r"O *[0-9<]|#|IF *\[|WHILE *\[", code):
         raise GcodeError(f"line {reader.number}: {quote(text)}: parameters and O words are not supported, only plain G-code is")
     else:
         raise GcodeError(f"line {reader.number}: {quote(text)} cannot be read as G-code")
+
+
+def _check_alone(reader: Reader, name: str, rest: str, text: str) -> None:
+    """Refuse a second command behind the words and texts of a first one, which RepRapFirmware would do."""
+    if second := SECOND.search(STRING.sub("", rest)):
+        raise GcodeError(f"line {reader.number}: {quote(text)} holds two commands, {name} and {second[0]}: write one a line")
 
 
 def _name(letter: str, value: float) -> str:

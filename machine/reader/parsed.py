@@ -66,9 +66,9 @@ class ParsedProgram:
     line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row
     before where G28 or G92 set a position. e_mm: filament pushed by the move. feed: F in
     units per minute. kind: MoveKind. remark: which of remarks holds for the row. types: the ;TYPE: names. layers: number of layer
-    changes. parts: numbers of the parts in order. unsupported: the places that no
-    support could be given. announced: how many parts `;PART:1 of 3` tells, 0 where none does; part_totals: what comments tell of
-    the parts' beads.
+    changes. parts: numbers of the parts in order. replaced: line number and command of every text with characters that a serial
+    line does not carry. unsupported: the places that no support could be given. announced: how many parts `;PART:1 of 3` tells, 0
+    where none does; part_totals: what comments tell of the parts' beads.
     """
 
     line: Indices32
@@ -82,6 +82,7 @@ class ParsedProgram:
     types: tuple[str, ...]
     events: tuple[Event, ...]
     ignored: dict[str, tuple[int, int]]
+    replaced: tuple[tuple[int, str], ...]
     layers: int
     parts: tuple[int, ...]
     unsupported: tuple[Unheld, ...]

@@ -122,7 +122,7 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
         end -= 1
     if end - begin < 5 or end - begin >= LONGEST or text[begin] != 71 or (text[begin + 1] != 48 and text[begin + 1] != 49):
         return -1
-    at, count = begin + 2, 0
+    at, count, named = begin + 2, 0, 0
     while at < end:
         if count == len(words) or at + 2 >= end or text[at] != 32:
             return -1
@@ -150,8 +150,9 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
         for _ in range(behind):
             divisor *= 10.0
         value = whole / divisor
-        if axis == F and (negative or value <= 0.0):
+        if (axis == F and (negative or value <= 0.0)) or named >> axis & 1:  # firmwares do not agree on a word given twice
             return -1
+        named |= 1 << axis
         words[count, 0], words[count, 1] = axis, -value if negative else value
         count += 1
     return count

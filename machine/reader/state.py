@@ -61,6 +61,7 @@ class Reader:
     taken: int = 0  # rows that were here before
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
+    replaced: list[tuple[int, str]] = field(default_factory=list)  # lines whose text is shown otherwise than written
     unsupported: list[Unheld] = field(default_factory=list)
 
     def row(self, before: list[float], feed: float) -> None:

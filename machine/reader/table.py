@@ -120,7 +120,7 @@ class Table:
             **{name: column[:count] for name, column in self._columns.items()},
             start=(self._starts if len(self._starts) else self._places)[:count], end=self._places[1 : count + 1],
             remarks=Remarks(*told[:3].astype(np.int32), *told[3:]), types=tuple(reader.types),
-            events=tuple(self._events), ignored=reader.ignored,
+            events=tuple(self._events), ignored=reader.ignored, replaced=tuple(reader.replaced),
             layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
             announced=reader.announced, part_totals=tuple(reader.part_totals),
         )  # fmt: skip

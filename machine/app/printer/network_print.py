@@ -14,6 +14,7 @@ from machine.app.printer.server_checks import check_free
 from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import reporting, say
 from machine.dryrun.timeline import Timeline, UnknownTimeline
+from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.progress import ProgramPosition, Progress, last_known
 from machine.network.follow import End, OnStatus, follow_print
@@ -204,7 +205,7 @@ class ServerProgress(ReportedProgress):
         for text in self._lines[self.line : line]:
             self._position.read_comment(text)
             if text[:1] in "Mm":
-                self._position.read_m73(text.partition(";")[0], self.elapsed_s)
+                self._position.read_m73(read_line(text).command, self.elapsed_s)
         self.line = max(self.line, line)
 
 

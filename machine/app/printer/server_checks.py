@@ -6,7 +6,7 @@ from machine.app.pipeline.programs import refuse_errors
 from machine.app.printer.compatibility import check_printer, check_program, refuse
 from machine.firmware.klipper import stepper_name
 from machine.gcode.commands import command_named
-from machine.gcode.words import macro_name
+from machine.gcode.line_text import macro_name
 from machine.link.identification import Answer, Kind
 from machine.network.address import ServerAddress, is_server_address
 from machine.network.server import ACTIVE, JobStatus, Phase, ServerIdentity

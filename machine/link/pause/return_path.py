@@ -55,10 +55,10 @@ def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequ
     values = resume_placeholders(machine, way.at_mm, way.start, height)
     named = "machine.gcode.resume"
     if machine.gcode.resume:
-        homing = fill_block(machine.gcode.resume, named, values, dialect.longest_line)
+        homing = fill_block(machine.gcode.resume, named, values, dialect)
     else:
         rise = f"G0 Z{{clear_z_mm}} F{60.0 * machine.z.speed_mm_s:.0f}"
-        homing = fill_block("\n".join((*dialect.stands, *heat, rise, "G28 X Y")), named, values, dialect.longest_line)
+        homing = fill_block("\n".join((*dialect.stands, *heat, rise, "G28 X Y")), named, values, dialect)
     raised = replace(way, at_mm=np.array([*way.at_mm[:2], height]))
     after = heat if machine.gcode.resume else ()
     return ["G21", "G90", *homing, *after, *return_moves(profile, printed, raised)]

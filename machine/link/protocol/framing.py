@@ -1,17 +1,18 @@
 """Framing: a command becomes `N<number> <command>*<checksum>`; what may not be sent is refused."""
 
-import re
 from collections.abc import Sequence
 
+from machine.firmware import dialects
 from machine.firmware.line import FRAME_CHARACTERS
 from machine.firmware.marlin import DIALECT
 from machine.gcode.commands import command_in
+from machine.gcode.line_text import is_plain_move, read_line, to_ascii
 from machine.gcode.words import PAUSE_REMARK
-from profiles.errors import LocalProtocolError
+from profiles.errors import GcodeError, LocalProtocolError
 
 LINE_LIMIT = DIALECT.longest_line
 FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers refuses it with the one it wants
-_is_plain_move = re.compile(r"G[01](?: [A-Z]-?[0-9.]+)+").fullmatch
+PAUSES = frozenset(word for dialect in dialects().values() for word in (dialect.pause, dialect.filament_change))
 
 
 def checksum(body: bytes) -> int:
@@ -47,26 +48,31 @@ def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
 
 
 def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
-    """The command in a line of a program, without comment and blanks; "" when there is none.
+    """The command in a line of a program as it is sent, which is the one that the dry run has read; "" when there is none.
 
-    A command with a PAUSE_REMARK is the sender's own affair and counts as none.
-    source: the line's number in the program, or what it is called, for messages. Raises LocalProtocolError for a character
-    outside printable ASCII, for a `*`, and for commands that only the sender itself may give.
+    A pause with a PAUSE_REMARK is the sender's own affair and counts as none. source: the line's number in the program, or what it
+    is called, for messages. Raises LocalProtocolError for a line whose text firmwares read differently, for a character outside
+    printable ASCII except in a text that is shown, for a `*` or a backslash, for a command that is too long, and for commands that only the sender
+    itself may give.
     """
-    if _is_plain_move(line) and len(line) <= limit - FRAME_CHARACTERS:  # nearly every line
+    if is_plain_move(line) and len(line) <= limit - FRAME_CHARACTERS:  # nearly every line
         return line
-    command, _, remark = line.partition(";")
-    command = command.strip()
-    if not command or f";{remark}".startswith(PAUSE_REMARK):
+    if line[:1] == ";":
         return ""
+    try:
+        command, comment = read_line(line)
+    except GcodeError as error:
+        raise LocalProtocolError(f"{_called(source)}: {error}") from None
+    if not command or (f";{comment}".startswith(PAUSE_REMARK) and command in PAUSES):
+        return ""
+    command = to_ascii(command)
     if not (command.isascii() and command.isprintable()):
-        command = command.replace("\t", " ")
-        bad = next((c for c in command if not (c.isascii() and c.isprintable())), None)
-        if bad is not None:
-            raise LocalProtocolError(f"{_called(source)} holds the character {bad!r}: only printable ASCII can be sent")
-    if "*" in command:
-        raise LocalProtocolError(f"{_called(source)} ({command[:40]!r}) holds a '*': checksums are added by the sender")
-    if command[0] in "Mm" and (reason := command_in(command).refused):
+        bad = next(c for c in command if not (c.isascii() and c.isprintable()))
+        raise LocalProtocolError(f"{_called(source)} holds the character {bad!r}: only printable ASCII can be sent")
+    if "*" in command or "\\" in command:
+        why = "holds a '*': checksums are added by the sender" if "*" in command else "holds a '\\', which spoils the line's checksum"
+        raise LocalProtocolError(f"{_called(source)} ({command[:40]!r}) {why}")
+    if command[0] == "M" and (reason := command_in(command).refused):
         raise LocalProtocolError(f"{_called(source)} holds {name_of(command)}, which {reason}: remove it from the program")
     if len(command) > limit - FRAME_CHARACTERS:
         raise LocalProtocolError(

@@ -123,7 +123,7 @@ class TestFirmwares:
     [
         ("G93", "marlin", "line 2: G93 is not supported: Marlin has no inverse time feed"),
         ("G93\nG1 X1", "linuxcnc", "line 3: after G93 every move needs its own F"),
-        ("G1 X1 G2 X2", "linuxcnc", "line 2: .* holds two motions, G1 and G2"),
+        ("G1 X1 G2 Y2", "linuxcnc", "line 2: .* holds two motions, G1 and G2"),
         ("G10 L2 P1 X0", "linuxcnc", "line 2: G10 L2 is not supported"),
         ("#1=5", "linuxcnc", "line 2: '#1=5': parameters and O words are not supported"),
         ("o100 sub", "linuxcnc", "line 2: .*parameters and O words"),

@@ -48,8 +48,9 @@ def test_words_need_no_blanks_and_may_be_small() -> None:
     assert _ends("g1x1y-.5f300(to the left)z+2 ; done") == [[1, -0.5, 2, 0, 0, 0]]
 
 
-def test_a_bare_coordinate_repeats_the_last_motion() -> None:
-    assert [row[0] for row in _ends("G1 X1\nX2\n Y1")] == [1, 2, 2]
+def test_a_bare_coordinate_repeats_the_last_motion_where_the_firmware_does() -> None:
+    parsed = parse_gcode(["G1 X1 F60", "X2", " Y1"], load(machine="linuxcnc_xyzac").machine)
+    assert parsed.end[:, 0].tolist() == [1, 2, 2]
 
 
 def test_line_numbers_and_checksums_are_checked_and_dropped() -> None:

@@ -20,7 +20,7 @@ NUMBERS = st.one_of(
 )
 WORDS = st.tuples(st.sampled_from("XYZACE"), NUMBERS).map("".join)
 FEEDS = st.one_of(st.just([]), st.sampled_from([["F1200"], ["F0.5"], ["F90000"]]))
-MOVES = st.tuples(st.sampled_from(["G0", "G1"]), st.lists(WORDS, min_size=1, max_size=6), FEEDS).map(
+MOVES = st.tuples(st.sampled_from(["G0", "G1"]), st.lists(WORDS, min_size=1, max_size=6, unique_by=lambda w: w[0]), FEEDS).map(
     lambda move: " ".join([move[0], *move[1], *move[2]])
 )
 OTHERS = st.sampled_from(
@@ -59,6 +59,7 @@ def test_every_dialect_reads_g0_as_fast_as_it_does(machine: str) -> None:
         ("G1 X1 Q2", "line 3: word Q2 of a move is not known: this machine has X Y Z A C E F"),
         ("G1 X1.2.3", "line 3: 'G1 X1.2.3' cannot be read as G-code"),
         ("G1 X1234567890123", "line 3: 'G1 X1234567890123' cannot be read as G-code"),
+        ("G1 X1 Y2 X3", "line 3: 'G1 X1 Y2 X3' has the word X twice: firmwares do not agree which one counts"),
         ("G1 X--1", "line 3: 'G1 X--1' cannot be read as G-code"),
     ],
 )

@@ -1,0 +1,180 @@
+"""Line text: a line of G-code taken apart into the command that is sent and its comment.
+
+This is the one reading of a line. The dry run parses the command, the sender sends it, and a file for a server or a card holds it,
+so all three have the same text. Firmwares differ in what they skip, and a command avoids all of that:
+
+* Remarks in parentheses: CNC firmwares skip them. Marlin (gcode/parser.cpp) and RepRapFirmware (StringParser.cpp, FFF mode) execute
+  the words inside; Klipper (klippy/gcode.py) fails on them.
+* Small letters and blanks inside words: Marlin ignores small letters unless built with GCODE_CASE_INSENSITIVE.
+* `G01` and `G28 XY`: Klipper does not know the first, and homes every axis at the second.
+* An axis named twice: Marlin and Klipper take the last value, RepRapFirmware the first, LinuxCNC stops.
+* `X1E2`: RepRapFirmware may read an exponent, the others the words X1 and E2.
+* Line numbers of the file's own: Marlin skips one number only, and the sender adds its own.
+* A `;` between quotes: text for RepRapFirmware, the beginning of a comment for Marlin and OctoPrint.
+* A backslash: Marlin (queue.cpp, process_stream_char) drops it, so that the checksum does not fit any more.
+"""
+
+import re
+import unicodedata
+from typing import NamedTuple
+
+from machine.firmware import dialects
+from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, WORD, quote
+from profiles.errors import GcodeError
+
+is_plain_move = re.compile(r"G[01](?: [A-Z]-?[0-9.]+)+").fullmatch  # nearly every line; it is its own command
+
+PIECE = re.compile(r'"[^"]*"|\([^()]*\)|;.*|[^"();]+|["()]', re.DOTALL)
+FRAME = re.compile(r"[Nn] *[0-9]+ *")
+UNNUMBERED = re.compile(r"[Nn] *[GMTgmt] *[0-9]")
+CHECKED = re.compile(r"([^;]*)\*([^*;]*)(;.*)?", re.DOTALL)
+HEAD = re.compile(r"([GMTgmt]) *0*([0-9]{1,6})(?:\.([0-9]{0,6}))?(?![0-9.])")
+# Commands whose rest is a text, parentheses included: messages, expressions of RepRapFirmware, names of files on a card.
+MESSAGES = frozenset({"M117", "M118"})
+STATEMENTS = frozenset().union(*(dialect.statements for dialect in dialects().values()))
+FREE_TEXT = MESSAGES | STATEMENTS | {"M23", "M28", "M30", "M32", "M33", "M928"}
+# Commands with a text that is only shown: a character in it that cannot be sent may be replaced.
+SHOWN = MESSAGES | {"M0", "M1", "M291", "M486", "RESPOND", "SET_DISPLAY_TEXT"}
+SHOWN |= {"EXCLUDE_OBJECT_DEFINE", "EXCLUDE_OBJECT_START", "EXCLUDE_OBJECT_END", "EXCLUDE_OBJECT"}
+UNREADABLE = frozenset({"G0", "G1", "G2", "G3", "G92"})  # with other words than letters with numbers: refused as they are written
+UNSENDABLE = str.maketrans({"\\": "/", "*": "x"})  # printable, but a backslash or a star in a line spoils its checksum
+LETTERS = str.maketrans({
+    "ß": "ss", "æ": "ae", "Æ": "AE", "œ": "oe", "Œ": "OE", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D", "°": " deg ",
+    "–": "-", "—": "-", "‘": "'", "’": "'", "“": "'", "”": "'", "„": "'", "×": "x", "·": "-", "€": "EUR",
+})  # fmt: skip
+
+
+class LineText(NamedTuple):
+    """command: as it is sent, "" where the line has none; comment: what follows its `;`."""
+
+    command: str
+    comment: str
+
+
+def read_line(line: str) -> LineText:
+    """Take a line apart, with or without its line end. Raises GcodeError, which does not name the line, where firmwares would not
+    agree about its text: parentheses or quotes without their partner, an axis named twice, a checksum that does not fit.
+
+    A command of words comes out in capitals, one blank before each word; a text or a macro stays as it is written.
+    """
+    text = line.strip()
+    if text[:1] in ("", ";"):
+        return LineText("", text[1:])
+    if text[0] in "Nn" and (framed := FRAME.match(text)):
+        text = _unframe(text, framed.end())
+    elif UNNUMBERED.match(text):
+        raise GcodeError(f"{quote(text)} begins with an N without a number, which RepRapFirmware skips: remove it")
+    name = command_name(text)
+    if '"' in text or "(" in text or ")" in text:
+        code, comment = _without_remarks(text, name)
+    else:
+        code, _, comment = text.partition(";")
+    code = code.replace("\t", " ").strip()
+    return LineText("" if code == "%" else _canonical(code, name), comment)
+
+
+def command_name(text: str) -> str:
+    """What a command is called: "G1" of "g01 x5", "M117" of "M117 50 %", of a macro its first word in capitals."""
+    head = HEAD.match(text)
+    if head:
+        fraction = (head[3] or "").rstrip("0")
+        return f"{head[1].upper()}{head[2]}{'.' if fraction else ''}{fraction}"
+    return re.split(r"[\s;(]", text, maxsplit=1)[0].upper()
+
+
+def macro_name(line: str) -> str:
+    """The macro that a line of a program calls, in capitals; "" where it has none."""
+    if line[1:2].isdigit():  # nearly every line
+        return ""
+    try:
+        command = read_line(line).command.upper()
+    except GcodeError:
+        return ""
+    return command.partition(" ")[0] if MACRO.fullmatch(command) else ""
+
+
+def plain_line(line: str) -> str:
+    """A line as every firmware of a printer reads it as we do, for a file that is not sent command by command.
+
+    It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line().
+    """
+    if is_plain_move(line) or line[:1] == ";":
+        return line
+    command, comment = read_line(line)
+    if line.partition(";")[0].strip(" \t\r") == command:
+        return line
+    indent = line[: len(line) - len(line.lstrip(" \t"))]  # RepRapFirmware's blocks of statements are told by it
+    return indent + (f"{command} ;{comment}".strip() if comment else command)
+
+
+def to_ascii(command: str) -> str:
+    """A command whose text is only shown, in printable ASCII: letters lose their accents, what has no likeness becomes `?`."""
+    if (command.isascii() and command.isprintable()) or command_name(command) not in SHOWN:
+        return command
+    plain = unicodedata.normalize("NFKD", command.translate(LETTERS))
+    kept = "".join(c for c in plain if not unicodedata.combining(c))
+    return re.sub(" {2,}", " ", "".join(c if c.isascii() and c.isprintable() else "?" for c in kept)).strip()
+
+
+def _unframe(text: str, begin: int) -> str:
+    """A line without number and checksum."""
+    checked = CHECKED.fullmatch(text)
+    if checked is None:
+        return text[begin:]
+    body, given, comment = checked.groups()
+    total = 0
+    for byte in body.encode("utf-8", "replace"):
+        total ^= byte
+    if given.strip() != str(total):
+        raise GcodeError(f"{quote(text)} has checksum {given.strip()[:8]!r}, its characters give {total}")
+    return body[begin:] + (comment or "")
+
+
+def _without_remarks(text: str, name: str) -> tuple[str, str]:
+    """Code without remarks in parentheses, and the comment. What stands between quotes, in a free text, or in a macro right behind
+    a letter (NAME=cube_(1)), is no remark."""
+    code, comment = "", ""
+    free, macro, shown = name in FREE_TEXT, MACRO.fullmatch(name) is not None, name in SHOWN
+    for piece in PIECE.findall(text):
+        if piece[0] == ";":
+            comment = piece[1:]
+            break
+        if piece[0] == '"' and len(piece) > 1 and ";" in piece:
+            if not shown:
+                raise GcodeError(f"{quote(text)} has a ';' between quotes, where some firmwares begin a comment: remove it")
+            code += piece.replace(";", ",")
+        elif piece[0] == "(" and len(piece) > 1 and not free and (not macro or code[-1:].isspace()):
+            code += " "
+        elif piece == '"' and name in MESSAGES:
+            code += "'"
+        elif piece == '"' or (piece in "()" and not (free or macro)):
+            sign = "quote" if piece == '"' else "parenthesis"
+            raise GcodeError(f"{quote(text)} has a {sign} without its partner, or one inside another: remove it")
+        else:
+            code += piece
+    return code, comment
+
+
+def _canonical(code: str, name: str) -> str:
+    """The one way of writing a command of letters and numbers; of other commands the name at most."""
+    head = HEAD.match(code)
+    if name in FREE_TEXT and head:
+        rest = code[head.end() :].strip()
+        return f"{name} {rest.translate(UNSENDABLE) if name in MESSAGES else rest}".strip()
+    words = code.upper()
+    if BLOCK.fullmatch(words):
+        return _joined(code, WORD.findall(words))
+    if name == "G28" and FLAGS.fullmatch(words):
+        return _joined(code, FLAG.findall(words))
+    if head and head[1] in "Gg" and name not in UNREADABLE:
+        return words
+    shown = code.translate(UNSENDABLE) if name in SHOWN else code
+    return f"{name}{shown[head.end() :]}" if head and head[1] in "Mm" else shown
+
+
+def _joined(code: str, words: list[tuple[str, str]]) -> str:
+    letters = [letter for letter, _ in words if letter not in "GM"]
+    if len(letters) > len(set(letters)):
+        twice = next(letter for letter in letters if letters.count(letter) > 1)
+        raise GcodeError(f"{quote(code)} has the word {twice} twice: firmwares do not agree which one counts")
+    return " ".join(f"{command_name(letter + number) if letter in 'GMT' else letter + number.lstrip('+')}" for letter, number in words)
