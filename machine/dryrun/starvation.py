@@ -17,6 +17,7 @@ from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.motion import deltas, standstills
 from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
+from machine.gcode.line_text import is_plain_move, read_line
 from machine.planning.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 from machine.reader.parsed import Indices32, ParsedProgram
 from mdp.kernels.arrays import floats

@@ -33,9 +33,7 @@ def block_problems(profile: Profile, *blocks: str) -> list[str]:
     problems, refused = [], {}
     for block in blocks or tuple(Blocks.model_fields):
         try:
-            lines = fill_block(
-                getattr(machine.gcode, block), f"machine.gcode.{block}", _values(profile, block), dialect
-            )
+            lines = fill_block(getattr(machine.gcode, block), f"machine.gcode.{block}", _values(profile, block), dialect)
             refused[block] = list(refused_lines(lines, dialect))
         except ProfileError as error:
             problems.append(str(error))

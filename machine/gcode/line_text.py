@@ -1,16 +1,17 @@
 """Line text: a line of G-code taken apart into the command that is sent and its comment.
 
-This is the one reading of a line. The dry run parses the command, the sender sends it, and a file for a server or a card holds it,
-so all three have the same text. Firmwares differ in what they skip, and a command avoids all of that:
+This is the one reading of a line. The dry run parses the command, the sender sends it, and a file for a server or a card holds
+it, so all three have the same text. Firmwares differ in what they make of a line, and a command avoids all of that:
 
-* Remarks in parentheses: CNC firmwares skip them. Marlin (gcode/parser.cpp) and RepRapFirmware (StringParser.cpp, FFF mode) execute
-  the words inside; Klipper (klippy/gcode.py) fails on them.
+* Remarks in parentheses: CNC firmwares skip them. Marlin (gcode/parser.cpp) and RepRapFirmware (StringParser.cpp, FFF mode)
+  execute the words inside; Klipper (klippy/gcode.py) fails on them.
 * Small letters and blanks inside words: Marlin ignores small letters unless built with GCODE_CASE_INSENSITIVE.
 * `G01` and `G28 XY`: Klipper does not know the first, and homes every axis at the second.
 * An axis named twice: Marlin and Klipper take the last value, RepRapFirmware the first, LinuxCNC stops.
 * `X1E2`: RepRapFirmware may read an exponent, the others the words X1 and E2.
 * Line numbers of the file's own: Marlin skips one number only, and the sender adds its own.
 * A `;` between quotes: text for RepRapFirmware, the beginning of a comment for Marlin and OctoPrint.
+* A backspace deletes what stands before it in Marlin, the character 127 the whole line in RepRapFirmware.
 * A backslash: Marlin (queue.cpp, process_stream_char) drops it, so that the checksum does not fit any more.
 """
 
@@ -38,10 +39,12 @@ SHOWN = MESSAGES | {"M0", "M1", "M291", "M486", "RESPOND", "SET_DISPLAY_TEXT"}
 SHOWN |= {"EXCLUDE_OBJECT_DEFINE", "EXCLUDE_OBJECT_START", "EXCLUDE_OBJECT_END", "EXCLUDE_OBJECT"}
 UNREADABLE = frozenset({"G0", "G1", "G2", "G3", "G92"})  # with other words than letters with numbers: refused as they are written
 UNSENDABLE = str.maketrans({"\\": "/", "*": "x"})  # printable, but a backslash or a star in a line spoils its checksum
-LETTERS = str.maketrans({
-    "ß": "ss", "æ": "ae", "Æ": "AE", "œ": "oe", "Œ": "OE", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D", "°": " deg ",
-    "–": "-", "—": "-", "‘": "'", "’": "'", "“": "'", "”": "'", "„": "'", "×": "x", "·": "-", "€": "EUR",
-})  # fmt: skip
+CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+SIGNS = " .,:'+-%/"
+LETTERS = {
+    "ß": "ss", "æ": "ae", "Æ": "AE", "œ": "oe", "Œ": "OE", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D",
+    "°": " deg ", "–": "-", "—": "-", "‘": "'", "’": "'", "“": "'", "”": "'", "„": "'", "×": "x", "·": "-", "€": "EUR",
+}  # fmt: skip
 
 
 class LineText(NamedTuple):
@@ -70,6 +73,10 @@ def read_line(line: str) -> LineText:
     else:
         code, _, comment = text.partition(";")
     code = code.replace("\t", " ").strip()
+    if control := CONTROL.search(code):
+        if name not in SHOWN:
+            raise GcodeError(f"{quote(code)} cannot be read as G-code: it holds the character {control[0]!r}")
+        code = CONTROL.sub("?", code)
     return LineText("" if code == "%" else _canonical(code, name), comment)
 
 
@@ -98,10 +105,15 @@ def plain_line(line: str) -> str:
 
     It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line().
     """
-    if is_plain_move(line) or line[:1] == ";":
+    if is_plain_move(line):
+        return line
+    line = line.rstrip("\r\n")
+    clean = CONTROL.search(line.replace("\t", " ")) is None
+    if clean and line[:1] == ";":
         return line
     command, comment = read_line(line)
-    if line.partition(";")[0].strip(" \t\r") == command:
+    comment = CONTROL.sub("?", comment)
+    if clean and line.partition(";")[0].strip(" \t") == command:
         return line
     indent = line[: len(line) - len(line.lstrip(" \t"))]  # RepRapFirmware's blocks of statements are told by it
     return indent + (f"{command} ;{comment}".strip() if comment else command)
@@ -111,9 +123,13 @@ def to_ascii(command: str) -> str:
     """A command whose text is only shown, in printable ASCII: letters lose their accents, what has no likeness becomes `?`."""
     if (command.isascii() and command.isprintable()) or command_name(command) not in SHOWN:
         return command
-    plain = unicodedata.normalize("NFKD", command.translate(LETTERS))
-    kept = "".join(c for c in plain if not unicodedata.combining(c))
-    return re.sub(" {2,}", " ", "".join(c if c.isascii() and c.isprintable() else "?" for c in kept)).strip()
+    plain = "".join(c if c.isascii() and c.isprintable() else _likeness(c) for c in command)
+    return re.sub(" {2,}", " ", plain).strip()
+
+
+def _likeness(letter: str) -> str:
+    plain = LETTERS.get(letter) or "".join(c for c in unicodedata.normalize("NFKD", letter) if not unicodedata.combining(c))
+    return plain if all(c.isascii() and (c.isalnum() or c in SIGNS) for c in plain) else "?"
 
 
 def _unframe(text: str, begin: int) -> str:
@@ -131,8 +147,9 @@ def _unframe(text: str, begin: int) -> str:
 
 
 def _without_remarks(text: str, name: str) -> tuple[str, str]:
-    """Code without remarks in parentheses, and the comment. What stands between quotes, in a free text, or in a macro right behind
-    a letter (NAME=cube_(1)), is no remark."""
+    """Code without remarks in parentheses, and the comment. Parentheses between quotes, in a free text, or in a macro right
+    behind a letter (NAME=cube_(1)) are no remarks.
+    """
     code, comment = "", ""
     free, macro, shown = name in FREE_TEXT, MACRO.fullmatch(name) is not None, name in SHOWN
     for piece in PIECE.findall(text):
@@ -177,4 +194,6 @@ def _joined(code: str, words: list[tuple[str, str]]) -> str:
     if len(letters) > len(set(letters)):
         twice = next(letter for letter in letters if letters.count(letter) > 1)
         raise GcodeError(f"{quote(code)} has the word {twice} twice: firmwares do not agree which one counts")
-    return " ".join(f"{command_name(letter + number) if letter in 'GMT' else letter + number.lstrip('+')}" for letter, number in words)
+    return " ".join(
+        f"{command_name(letter + number) if letter in 'GMT' else letter + number.lstrip('+')}" for letter, number in words
+    )

@@ -79,7 +79,8 @@ def fill_block(block: str, name: str, values: Mapping[str, object], dialect: Dia
     """
     lines, longest = [], dialect.longest_line
     for line in block.splitlines():
-        text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).strip()
+        text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).rstrip()
+        text = text if dialect.statements else text.strip()  # RepRapFirmware tells by the indent what an `if` holds
         try:
             command = read_line(text).command
             text = plain_line(text) if dialect.serial else text

@@ -202,6 +202,6 @@ ACTIONS: tuple[tuple[Action, str], ...] = (
 )
 # What may stand behind a command besides words with numbers: of G codes only these take letters alone, of M codes those that set
 # what the dry run counts with take none; firmwares differ in what they make of the rest.
-BARE_WORDS = frozenset("G28 G29 G32 G34".split())
-VALUED = frozenset("M82 M83 M104 M109 M140 M190 M200 M204 M207 M220 M221 M568".split())
+BARE_WORDS = frozenset({"G28", "G29", "G32", "G34"})
+VALUED = frozenset({"M82", "M83", "M104", "M109", "M140", "M190", "M200", "M204", "M207", "M220", "M221", "M568"})
 CODES: dict[str, Action] = {code: action for action, codes in ACTIONS for code in codes.split()}

@@ -5,12 +5,13 @@ from collections.abc import Callable
 from math import inf
 
 from machine.firmware.klipper import COMMANDS
-from machine.gcode.words import read_number, read_values
+from machine.gcode.words import quote, read_number, read_values
 from machine.reader.motion import flush
 from machine.reader.state import Reader
 from profiles.errors import GcodeError
 
 Values = dict[str, str]
+KEYS = re.compile(r"(?: +[A-Z_][A-Z0-9_]*=(?:\"[^\"]*\"|[^\s\"'#()\\]*))* *").fullmatch  # a # begins a comment for Klipper
 
 
 def macro(reader: Reader, code: str) -> bool:
@@ -23,6 +24,8 @@ def macro(reader: Reader, code: str) -> bool:
             return False
         _home(reader, homed[1])
         return True
+    if name in VALUED and not KEYS(f" {rest}"):
+        raise GcodeError(f"line {reader.number}: {quote(code)}: behind {name} only KEY=VALUE is allowed")
     if reader.turning and name != "MANUAL_STEPPER":
         flush(reader)
     action(reader, read_values(rest))
@@ -110,6 +113,7 @@ def _pause(reader: Reader, values: Values) -> None:
     reader.note("M0", 0.0, "")
 
 
+VALUED = frozenset({"MANUAL_STEPPER", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_VELOCITY_LIMIT"})
 MACROS: dict[str, Callable[[Reader, Values], None]] = {
     "MANUAL_STEPPER": _turn,
     "SET_HEATER_TEMPERATURE": _heat,

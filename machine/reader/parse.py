@@ -4,8 +4,9 @@ import re
 from collections.abc import Iterable
 
 from machine.gcode.commands import PATHS
+from machine.gcode.line_text import FREE_TEXT, command_name, read_line, to_ascii
 from machine.gcode.lines import Lines
-from machine.gcode.line_text import FREE_TEXT, read_line, to_ascii
+from machine.gcode.modes import COMMANDS
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, quote, read_words
 from machine.reader.codes import BARE_WORDS, VALUED, dispatch
 from machine.reader.macros import macro
@@ -19,6 +20,7 @@ from profiles.errors import GcodeError
 from profiles.machine import Machine
 
 LONGEST_LINE = 2000
+CONDITIONS = ("IF", "ELIF", "ELSE", "WHILE")
 SECOND = re.compile(r"[GM] *[0-9]+")  # a second command of a line
 STRING = re.compile(r'"[^"]*"')
 PLACED = (*PATHS, "G4", "G10", "G28", "G92")
@@ -61,7 +63,21 @@ def _line(reader: Reader, line: str) -> None:
     if comment:
         remark(reader, comment)
     if command:
+        if reader.dialect.statements:
+            _check_condition(reader, line, command)
         _command(reader, command)
+
+
+def _check_condition(reader: Reader, line: str, command: str) -> None:
+    """Refuse a move or a mode below `if`, `else` or `while`: only the firmware knows whether it is done, and how often."""
+    spread, name = line.expandtabs(4), command_name(command)
+    indent = len(spread) - len(spread.lstrip())
+    if reader.condition is not None and indent <= reader.condition:
+        reader.condition = None
+    if reader.condition is not None and name in (*MOTION, *COMMANDS, "G10", "G11", "G92"):
+        raise GcodeError(f"line {reader.number}: {quote(command)} depends on a condition: write moves and modes outside of it")
+    if name in CONDITIONS and reader.condition is None:
+        reader.condition = indent
 
 
 def _command(reader: Reader, text: str) -> None:
@@ -114,7 +130,9 @@ def _one_command(reader: Reader, words: Words, text: str) -> None:
         raise GcodeError(f"line {reader.number}: {quote(text)} begins with no command: G, M or T is expected")
     second = next((_name(*word) for word in others if word[0] in "GM"), None)
     if second is not None:
-        raise GcodeError(f"line {reader.number}: {quote(text)} holds two commands, {_name(letter, value)} and {second}: write one a line")
+        raise GcodeError(
+            f"line {reader.number}: {quote(text)} holds two commands, {_name(letter, value)} and {second}: write one a line"
+        )
     dispatch(reader, _name(letter, value), others)
 
 

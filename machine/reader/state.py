@@ -52,6 +52,7 @@ class Reader:
     width: float = 0.0
     height: float = 0.0
     number: int = 0
+    condition: int | None = None  # how far the condition is indented on which the lines below it depend (RepRapFirmware)
     turning: list[tuple[int, float, float]] = field(default_factory=list)
     types: dict[str, int] = field(default_factory=lambda: {"": 0})
     parts: list[int] = field(default_factory=list)

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator
 from math import inf
 
 from machine.firmware import dialect_of
-from machine.gcode.commands import PATHS, TEXTS
+from machine.gcode.commands import PATHS
+from machine.gcode.line_text import MESSAGES
 from machine.gcode.words import read_values, read_words, split_command
 from machine.simulator.board import Board, BuildOptions, Work
 from machine.simulator.commands import COMMANDS
@@ -294,7 +295,7 @@ class SimulatedFirmware:
                 self.board.unknown += 1
                 self._said.append(self._rules.unknown.format(text))
             return None
-        answer = command(self.board, {} if name in TEXTS else dict(read_words(rest)), name + rest)
+        answer = command(self.board, {} if name in MESSAGES else dict(read_words(rest)), name + rest)
         if self.board.number is not None:
             self._receiver.last, self.board.number = self.board.number, None
         return answer

@@ -50,10 +50,10 @@ def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
 def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
     """The command in a line of a program as it is sent, which is the one that the dry run has read; "" when there is none.
 
-    A pause with a PAUSE_REMARK is the sender's own affair and counts as none. source: the line's number in the program, or what it
-    is called, for messages. Raises LocalProtocolError for a line whose text firmwares read differently, for a character outside
-    printable ASCII except in a text that is shown, for a `*` or a backslash, for a command that is too long, and for commands that only the sender
-    itself may give.
+    A pause with a PAUSE_REMARK is the sender's own affair and counts as none. source: the line's number in the program, or what
+    it is called, for messages. Raises LocalProtocolError for a line that firmwares read differently, for a character outside
+    printable ASCII except in a text that is shown, for a `*` or a backslash, for a command that is too long, and for commands
+    that only the sender itself may give.
     """
     if is_plain_move(line) and len(line) <= limit - FRAME_CHARACTERS:  # nearly every line
         return line
@@ -70,7 +70,11 @@ def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
         bad = next(c for c in command if not (c.isascii() and c.isprintable()))
         raise LocalProtocolError(f"{_called(source)} holds the character {bad!r}: only printable ASCII can be sent")
     if "*" in command or "\\" in command:
-        why = "holds a '*': checksums are added by the sender" if "*" in command else "holds a '\\', which spoils the line's checksum"
+        why = (
+            "holds a '*': checksums are added by the sender"
+            if "*" in command
+            else "holds a '\\', which spoils the line's checksum"
+        )
         raise LocalProtocolError(f"{_called(source)} ({command[:40]!r}) {why}")
     if command[0] == "M" and (reason := command_in(command).refused):
         raise LocalProtocolError(f"{_called(source)} holds {name_of(command)}, which {reason}: remove it from the program")

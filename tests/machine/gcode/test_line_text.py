@@ -12,7 +12,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from machine.firmware import dialect_of, dialects
 from machine.gcode.line_text import plain_line, read_line, to_ascii
+from machine.gcode.placeholders import fill_block
 from machine.link.protocol.framing import command_of, frame
 from machine.network.gcode_upload import GcodeUpload
 from machine.reader.parse import parse_gcode
@@ -75,7 +77,10 @@ def marlin_receives(data: bytes) -> Read:
 
 def octoprint(line: str) -> Read:
     """What OctoPrint sends of a file's line to a Marlin: cut at a `;` that no backslash hides."""
-    return marlin(re.sub(r"\\(.)", r"\1", re.split(r"(?<!\\);", line, maxsplit=1)[0].strip()))
+    kept = re.sub(r"\\(.)", r"\1", re.split(r"(?<!\\);", line, maxsplit=1)[0].strip())
+    while "\x08" in kept:  # each erases a character, as process_stream_char does
+        kept = re.sub("[^\x08]?\x08", "", kept, count=1)
+    return marlin(kept)
 
 
 def klipper(line: str) -> Read:
@@ -97,13 +102,16 @@ def klipper(line: str) -> Read:
 
 
 def reprapfirmware(line: str) -> list[Read]:
-    """StringParser: parentheses are no comments, a G or M outside quotes begins another command, the first of two words counts."""
+    """StringParser: parentheses are no comments, a G or M outside quotes begins a command, the first of two words counts."""
     kept, quoted = "", False
     for c in line.strip():
         quoted ^= c == '"'
+        if c == "\x7f":
+            return []
         if c == ";" and not quoted:
-            break
+            kept += "\n"
         kept += c
+    kept = kept.partition("\n")[0]
     kept = re.sub(r"^[Nn][0-9]* *", "", kept)
     done: list[Read] = []
     while kept:
@@ -124,7 +132,7 @@ def reprapfirmware(line: str) -> list[Read]:
 
 
 class Playing:
-    """Where a machine stands: X Y Z tilt turn and the filament, by the commands that move it. carried: G91 goes for E while it lasts."""
+    """Where a machine stands: X Y Z tilt turn and the filament, by the commands that move it."""
 
     def __init__(self, machine: Machine) -> None:
         self.letters = "".join(("XYZ", machine.tilt.letter, machine.turn.letter, "E"))
@@ -169,7 +177,9 @@ class Playing:
         for axis, letter in enumerate(self.letters):
             if letter in words:
                 value = words[letter] * (1.0 if axis in (3, 4) else self.unit)
-                steps = self.relative if axis < 5 else self.filament_relative or (self.relative and self.filament_mode == "carried")
+                steps = (
+                    self.relative if axis < 5 else self.filament_relative or (self.relative and self.filament_mode == "carried")
+                )
                 self.at[axis] = self.at[axis] + value if steps else value - (self.zero if axis == 5 else 0.0)
         self.moves.append((number, list(self.at)))
 
@@ -201,13 +211,15 @@ def sent(lines: list[str]) -> list[tuple[int, bytes]]:
 
 
 SCRAPS = (
-    "G1", "G0", "G1 ", "g1", "G 1", "G01", "G1.0", "G2 I5", "G90", "G91", "G92 ", "G28 ", "G20", "G21", "M82", "M83", "M117 ", "M118 ",
-    "M106 S255", "M104 S2", "M84 ", "T0", "X10", "X 10", "Y-5.5", "x1e2", "Z+2", "E1", "F300", "A30", "C 4", "X", "XY", "X1.5.2", "Y.5",
-    "(then Y50 Z2)", "(", ")", "((a) X3)", ";", ";LAYER_CHANGE", ";PAUSE:x", '"', '"a (b)"', '"a;b"', "N3 ", "N", "*98", "\\", "\\;",
-    "\t", " ", "  ", "%", "/", "{", "#", "=", ",", ".", "-", "+", "ä", "\xff", "\u2028", "half", "PAUSE ", "START X5 Y6", "MSG=", "'",
+    "G1", "G0", "G1 ", "g1", "G 1", "G01", "G1.0", "G2 I5", "G90", "G91", "G92 ", "G28 ", "G20", "G21", "M82", "M83", "M117 ",
+    "M118 ", "M106 S255", "M104 S2", "M84 ", "T0", "X10", "X 10", "Y-5.5", "x1e2", "Z+2", "E1", "F300", "A30", "C 4", "X", "XY",
+    "X1.5.2", "Y.5", "(then Y50 Z2)", "(", ")", "((a) X3)", ";", ";LAYER_CHANGE", ";PAUSE:x", '"', '"a (b)"', '"a;b"', "N3 ", "N",
+    "*98", "\\", "\\;", "\t", " ", "  ", "%", "/", "{", "#", "=", ",", ".", "-", "+", "ä", "\xff", "\u2028",
+    "\x08\x08\x08\x08\x08", "\x7f", "\uff1b", "half", "PAUSE ", "START X5 Y6", "MSG=", "'",
 )  # fmt: skip
 USUAL = (
-    "G1 X10 Y-5.5 E1 F300", "G1 X 10 Y5", "G0 Z2 A30", "G2 I5 E.5", "G92 X3 E0", "G28 X Y", "G91", "G90", "M83", "M104 S2", "M117 a b", "G20",
+    "G1 X10 Y-5.5 E1 F300", "G1 X 10 Y5", "G0 Z2 A30", "G2 I5 E.5", "G92 X3 E0", "G28 X Y", "G91", "G90", "M83", "M104 S2",
+    "M117 a b", "G20",
 )  # fmt: skip
 PROBE = "G1 X7 Z1 E1 F600"  # tells by its end which modes hold
 
@@ -258,6 +270,8 @@ def test_marlin_moves_by_what_is_sent_as_the_dry_run_does(lines: list[str]) -> N
 @example(["G1 X5\\; Y10"])
 @example(["G1 X10 (smile ;) Y5"])
 @example(["G1 X1e2"])
+@example(["M117 \x08\x08\x08\x08\x08G1 X50"])
+@example(["G1 X5 ;a\x7f"])
 @example(["G28 XY", "G1 X5"])
 @example(["M83 ä", PROBE, PROBE])
 @example(["NG01 X5"])
@@ -341,7 +355,29 @@ def test_an_uploaded_line_stays_as_it_is_where_every_firmware_reads_it_alike() -
 @pytest.mark.parametrize(("text", "plain"), [
     ("M117 Düse heizt auf 60°C", "M117 Duse heizt auf 60 deg C"),
     ("RESPOND MSG=\"größer – 字\"", 'RESPOND MSG="grosser - ?"'),
+    ("M117 \uff1b\uff0a\uff3c\x08", "M117 ????"),
     ('M98 P"ü.g"', 'M98 P"ü.g"'),
 ])  # fmt: skip
 def test_letters_of_a_shown_text_lose_their_accents(text: str, plain: str) -> None:
     assert to_ascii(text) == plain
+
+
+MOVE = "MANUAL_STEPPER STEPPER=stepper_a"
+
+
+@pytest.mark.parametrize("rest", ["# MOVE=5", "MOVE = 5", "MOVE=(5)", "'MOVE=5'", "MOVE=5 SYNC"])
+def test_a_macro_that_klipper_reads_otherwise_is_refused(rest: str) -> None:
+    with pytest.raises(GcodeError, match=r"line 1: .MANUAL_STEPPER .*: behind MANUAL_STEPPER only KEY=VALUE is allowed"):
+        parse_gcode([f"{MOVE} {rest}"], MACHINES["klipper"])
+
+
+def test_a_move_below_a_condition_is_refused_and_homing_is_not() -> None:
+    assert len(parse_gcode(["if !move.axes[0].homed", "  G28", "G1 X5"], MACHINES["reprapfirmware"]).line) == 1
+    with pytest.raises(GcodeError, match="line 3: 'G1 X5' depends on a condition: write moves and modes outside of it"):
+        parse_gcode(["while iterations < 5", "  M400", "  G1 X5"], MACHINES["reprapfirmware"])
+
+
+def test_a_start_block_is_written_without_remarks_and_with_its_indents() -> None:
+    block = "G28 (home, then G1 Y50)\n(only words)\nif true\n  M400 ; (wait)\n"
+    assert fill_block(block, "start", {}, dialect_of(MACHINES["reprapfirmware"])) == ["G28", "if true", "  M400 ; (wait)"]
+    assert fill_block("(MSG, hello)\nG28 (home)", "start", {}, dialects()["linuxcnc"]) == ["(MSG, hello)", "G28 (home)"]

@@ -4,8 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from machine.dryrun.dryrun import dry_run
+from machine.link.protocol.framing import command_of
+from machine.network.gcode_upload import GcodeUpload
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import GcodeError
+from profiles.profile import load
 
 
 def test_a_gcode_file_is_read_line_by_line_as_often_as_wanted(tmp_path: Path) -> None:
@@ -22,3 +26,20 @@ def test_a_gcode_file_that_cannot_be_read_is_one_sentence(tmp_path: Path, conten
         list(GcodeFile(tmp_path / "p"))
     with pytest.raises(GcodeError, match=words):
         GcodeFile(tmp_path / "p").lines()
+
+
+def test_old_letters_in_comments_and_texts_are_printed_and_told_once(tmp_path: Path) -> None:
+    wanted = ["G28 ; Größe", "M117 Düse heiß", "M117 Düse kühl", "G1 X5 F60"]
+    (tmp_path / "p").write_bytes("\n".join(wanted).encode("cp1252"))
+    lines = GcodeFile(tmp_path / "p").lines()
+    assert list(lines) == wanted
+    assert [command_of(line, 1) for line in lines] == ["G28", "M117 Duse heiss", "M117 Duse kuhl", "G1 X5 F60"]
+    assert GcodeUpload("p.gcode", lines).content.decode("utf-8").splitlines() == wanted
+    told = [(finding.line, finding.message) for finding in dry_run(lines, load()).findings if finding.code == "text"]
+    assert told == [(2, "'M117 Düse heiß' is sent as 'M117 Duse heiss': a serial line carries ASCII only, 2 times")]
+
+
+def test_an_old_letter_in_a_move_is_refused_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "p").write_bytes(b"G28\nG1 X\xff\n")
+    with pytest.raises(GcodeError, match="line 2: 'G1 Xÿ' cannot be read as G-code"):
+        dry_run(GcodeFile(tmp_path / "p").lines(), load())

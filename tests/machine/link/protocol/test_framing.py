@@ -36,6 +36,8 @@ def test_the_longest_framed_line_is_what_marlin_keeps() -> None:
 
 @pytest.mark.parametrize(("line", "command"), [
     ("G1 X1 ; out\n", "G1 X1"), ("  G28  ", "G28"), (";only", ""), ("\n", ""), ("G1\tX1", "G1 X1"), ("M98 Pö;", None),
+    ("M117 ö;", "M117 o"), ("N1 G28", "G28"), ("M 112", None), ("G1 X5 ;PAUSE:x", "G1 X5"), ("M0 ;PAUSE:x", ""),
+    ("M82\\", None), ("G1 X5 (Y2)", "G1 X5"),
     ("M98 Pa*b", None), ("M112", None), ("m110 N5", None), ("M1080", "M1080"), ("M117 " + "x" * 90, None),
 ])  # fmt: skip
 def test_a_line_of_a_program_becomes_a_command_or_is_refused(line: str, command: str | None) -> None:
