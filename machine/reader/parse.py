@@ -74,7 +74,7 @@ def _check_condition(reader: Reader, line: str, command: str) -> None:
     indent = len(spread) - len(spread.lstrip())
     if reader.condition is not None and indent <= reader.condition:
         reader.condition = None
-    if reader.condition is not None and name in (*MOTION, *COMMANDS, "G10", "G11", "G92"):
+    if reader.condition is not None and name in (*PATHS, *COMMANDS, "G10", "G11", "G92"):
         raise GcodeError(f"line {reader.number}: {quote(command)} depends on a condition: write moves and modes outside of it")
     if name in CONDITIONS and reader.condition is None:
         reader.condition = indent
