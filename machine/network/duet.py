@@ -101,6 +101,11 @@ class Duet(PrintServer):
             message=words or (f"it is {state}" if phase is Phase.OFFLINE else ""),
         )
 
+    def file_in_print(self) -> str:
+        """From the object model: job.file.fileName is not among its frequently changing values."""
+        path = self._model("job.file.fileName")
+        return path.removeprefix(FOLDER) if isinstance(path, str) else ""
+
     def _since_start(self, phase: Phase, before: Phase | None) -> Phase:
         """The phase, with idle after a print as its end: a cancelled one was paused before. before: what it was last, as it was
         asked."""

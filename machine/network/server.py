@@ -91,6 +91,10 @@ class PrintServer(ABC):
         """Where its camera gives a picture; "": it has none, or does not tell."""
         return ""
 
+    def file_in_print(self) -> str:
+        """The file that it prints now, by the name that upload() returns; "" where it does not tell."""
+        return self.status().file
+
     @abstractmethod
     def has(self, file: str) -> bool:
         """Whether it holds a file of this name."""

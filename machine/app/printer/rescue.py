@@ -1,6 +1,6 @@
-"""Rescue: a printer whose sender has died: its heaters switched off, or stopped at once, by whoever opens its port next.
+"""Rescue: a printer whose sender has died has its heaters switched off, or is stopped at once, on a connection of its own.
 
-A print server goes on printing by itself, as it does when a person leaves it: it is only asked what it does, or stopped.
+A print server goes on printing by itself: it is only asked what it does, unless a person wants it stopped or cancelled.
 """
 
 from machine.link.medium import SERIAL
@@ -8,11 +8,12 @@ from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from machine.network.address import is_server_address
 from machine.network.follow import UNCONFIRMED
-from machine.network.gcode_upload import server_name
 from machine.network.server import ACTIVE
 from machine.network.servers import open_server
-from profiles.errors import PortError, UserError
+from profiles.errors import PortError, ServerError, UserError
 
+CANCEL_THERE = "if it is to be cancelled, do that on the server's own page"
+ROUNDED_S = 1.0  # servers tell whole seconds
 STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 
@@ -46,15 +47,26 @@ def _stop_server(address: str) -> str:
     return STOPPED.format(server=address)
 
 
-def cancel_on_server(address: str, file: str) -> bool:
-    """Cancel the print of a file on a server that nobody follows any more; whether nothing of it is printed. Raises UserError."""
+def cancel_on_server(address: str, file: str, away_s: float) -> bool:
+    """Cancel a print that nobody follows any more, if it certainly is the one that was left.
+
+    file: its name on the server; away_s: how long ago it was last seen printing. Returns False when nothing is printed there.
+    Raises ServerError, and cancels nothing, when the server is unreachable or what it prints may be somebody else's.
+    """
     with open_server(address) as server:
         server.greet()
         status = server.status()
-        ours = status.file in ("", file, server_name(file))
-        if ours and status.phase in ACTIVE:
-            server.cancel()
-        return ours
+        if status.phase not in ACTIVE:
+            return False
+        printed = status.file or server.file_in_print()
+        if not printed:
+            raise ServerError(f"{address} does not say which file it prints, it may not be {file}: {CANCEL_THERE}")
+        if printed != file:
+            raise ServerError(f"{address} prints {printed} now, not {file}")
+        if (status.elapsed_s or 0.0) + ROUNDED_S < away_s:  # begun after the one that was left was last seen
+            raise ServerError(f"{address} may have begun to print {file} again since: {CANCEL_THERE}")
+        server.cancel()
+        return True
 
 
 def _look_at_server(address: str) -> str:

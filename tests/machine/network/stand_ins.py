@@ -313,6 +313,8 @@ class DuetStandIn(Handler):
             return [{"heaters": [1]}]
         if key == "heat":
             return {"bedHeaters": [0]}
+        if key == "job.file.fileName":
+            return f"0:/gcodes/{job.file}" if job.file else None
         job.look()
         states = {"printing": "processing", "paused": "paused"}
         status = "halted" if job.halted else states.get(job.state, "idle")

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from machine.app.printer.rescue import rescue
+from machine.app.printer.rescue import cancel_on_server, rescue
 from machine.link.pending_commands import Command, Control
 from machine.network import duet, follow, http
 from machine.network.credentials import VARIABLE, servers_file
@@ -150,6 +150,34 @@ def test_a_stop_for_which_the_key_cannot_be_read_is_told_as_not_confirmed() -> N
     servers_file().chmod(0o600)
     sentence = rescue("octoprint:printer", 115200, emergency=True)
     assert sentence.startswith("emergency stop: octoprint:printer did not confirm it: cut the power (file of servers ")
+
+
+@every_kind
+@pytest.mark.parametrize(
+    ("printed", "file", "away_s", "reason"),
+    [
+        ("box.gcode", "box.gcode", 10.0, None),
+        ("vase.gcode", "box.gcode", 10.0, "prints vase.gcode now, not box.gcode"),
+        ("my_box.gcode", "my box.gcode", 10.0, "prints my_box.gcode now, not my box.gcode"),
+        ("", "box.gcode", 10.0, "does not say which file it prints, it may not be box.gcode"),
+        ("box.gcode", "box.gcode", 60.0, "may have begun to print box.gcode again since"),
+    ],
+)
+def test_only_the_print_that_was_left_is_cancelled(kind: str, printed: str, file: str, away_s: float, reason: str | None) -> None:
+    with stand_in(kind) as (job, address):  # which has been printing for 12 s
+        job.files[printed] = UPLOAD.content
+        job.steps = 10_000
+        job.start(printed)
+        with pytest.raises(ServerError, match=reason) if reason else contextlib.nullcontext():
+            assert cancel_on_server(address, file, away_s)
+        assert job.state == ("printing" if reason else "cancelled")
+
+
+@every_kind
+def test_where_nothing_is_printed_any_more_nothing_is_cancelled(kind: str) -> None:
+    with stand_in(kind) as (job, address):
+        assert not cancel_on_server(address, "box.gcode", 10.0)
+        assert job.state == "idle"
 
 
 @every_kind

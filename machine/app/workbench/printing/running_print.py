@@ -4,6 +4,7 @@ import asyncio
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from time import time
 
 from machine.app.crash import bug_in_words
 from machine.app.printer.rescue import cancel_on_server, rescue
@@ -13,6 +14,7 @@ from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
 from machine.app.workbench.work.processes import Process, end_process, start_process
 from machine.app.workbench.work.worker import frame, read_frame
 from machine.link.pending_commands import Command
+from machine.network.gcode_upload import server_name
 from profiles.errors import PrinterError, UserError
 
 COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
@@ -142,18 +144,20 @@ class RunningPrint:
 
     async def _order_anew(self) -> None:
         """Give the stop or the cancel on a connection of its own."""
-        port, sentence = self._order.printing.port, self.state["sentence"]
+        port = self._order.printing.port
         if self._emergency:
             outcome = await asyncio.to_thread(rescue, port, 0, True)
             self._become(phase="over", end="failed", sentence=outcome)
             return
+        name, away_s = self.state["name"], time() - self.state["progress"]["heat_s"]
+        file = name if isinstance(self._order, FollowOrder) else server_name(name)
         try:
-            cancelled = await asyncio.to_thread(cancel_on_server, port, self.state["name"])
+            cancelled = await asyncio.to_thread(cancel_on_server, port, file, away_s)
         except UserError as error:
-            self._become(phase="over", end="left", sentence=f"{sentence}; it was not cancelled: {error}")
+            self._become(phase="over", end="left", sentence=f"{name} was not cancelled: {error}")
             return
-        stopped = {"end": "stopped", "sentence": "the print was stopped"} if cancelled else {}
-        self._become(phase="over", **stopped)
+        sentence = "the print was stopped" if cancelled else f"there was nothing to cancel: {port} prints nothing any more"
+        self._become(phase="over", end="stopped", sentence=sentence)
 
     async def _end_without_process(self) -> None:
         """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked; a print

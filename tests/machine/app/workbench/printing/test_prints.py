@@ -183,9 +183,10 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
 
 # A print's process that is left and does nothing any more of what it hears.
 LEAVES = """
-import pickle, struct, sys
+import pickle, struct, sys, time
 length = struct.Struct(sys.argv[1])
-message = {"phase": "printing", "server": True, "progress": {"state": "printing"}, "end": "left", "sentence": "it goes on"}
+progress = {"state": "printing", "heat_s": time.time()}
+message = {"phase": "printing", "server": True, "progress": progress, "end": "left", "sentence": "it goes on"}
 message["stop_given"] = False
 for phase in ("printing", "over"):
     text = pickle.dumps(message | {"phase": phase})
