@@ -157,9 +157,11 @@ def _two_parts(profile: Profile) -> Decomposition:
 
 def _read_orders(orders: "Queue[str]") -> None:
     """Pass on what is to be compiled; whoever asked is gone when nothing more can be read."""
-    for line in sys.stdin:
-        orders.put(line.strip())
-    os._exit(0)
+    try:
+        for line in sys.stdin:
+            orders.put(line.strip())
+    finally:
+        os._exit(0)
 
 
 def _answer(text: str) -> None:

@@ -123,7 +123,7 @@ class Prints(Observable):
         try:
             await begun.run()
         except Exception as error:  # noqa: BLE001 - the print is told to be over, whatever it was
-            begun.fail(error)
+            await begun.fail(error)
 
     def stop_at_once(self, number: object) -> None:
         """The one that was named, all when none was or there never was such a one: in doubt everything stops. One that is over

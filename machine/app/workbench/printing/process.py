@@ -8,9 +8,7 @@ alone, which ends it in that same way.
 """
 
 import sys
-from contextlib import suppress
 from threading import Thread
-from typing import BinaryIO
 
 from machine.app.crash import bug_in_words
 from machine.app.terminal.plain import said_to
@@ -21,7 +19,7 @@ from machine.app.workbench.printing.at_server import follow_on_server, print_on_
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import FollowOrder, HandOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.printing.reporter import StateReporter
-from machine.app.workbench.work.worker import read_frames, take_pipes
+from machine.app.workbench.work.worker import listen, read_frames, take_pipes
 from machine.network.address import is_server_address
 from profiles.errors import UserError
 
@@ -29,10 +27,12 @@ from profiles.errors import UserError
 def main() -> None:
     """Print what the server orders, once."""
     asked, answers = take_pipes()
-    order: Order = next(read_frames(asked))
+    order: Order | None = next(read_frames(asked), None)
+    if order is None:  # the server has died before it had said what to print
+        return
     reporter = StateReporter(answers, first_state(order))
     person, checks = AtPage(reporter), Checks(reporter)
-    Thread(target=_listen, args=(asked, person), daemon=True).start()
+    Thread(target=listen, args=(asked, lambda words: person.hear(*words), person.leave), daemon=True).start()
     with said_to(checks.hear):
         end = carry_out(order, person, checks)
     reporter.tell(phase="over", stop_given=person.has_stopped(), **end)
@@ -58,14 +58,6 @@ def carry_out(order: Order, person: AtPage, checks: Checks) -> State:
         return {"end": "failed", "sentence": "ended at once: whether the heaters are off is not known, look at the printer"}
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file; the stream has left the printer safe
         return {"end": "failed", "sentence": bug_in_words(error, sys.argv)}
-
-
-def _listen(asked: BinaryIO, person: AtPage) -> None:
-    """In a thread: what the server says; when it is gone, the print is left."""
-    with suppress(OSError):
-        for words in read_frames(asked):
-            person.hear(*words)
-    person.leave()
 
 
 if __name__ == "__main__":

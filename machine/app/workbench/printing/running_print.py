@@ -82,10 +82,13 @@ class RunningPrint:
         self._begun = True
         self.say((BEGIN,))
 
-    def fail(self, error: Exception) -> None:
-        """It could not be printed at all, by a fault of this program."""
+    async def fail(self, error: Exception) -> None:
+        """A fault of this program: nobody hears the print's process any more, so it ends, and the printer is made safe."""
         self._kill()
-        self._become(phase="over", end="failed", sentence=f"{bug_in_words(error, sys.argv)}; look at the printer")
+        if self._process is not None:
+            await self._process.wait()
+        await self._end_without_process()
+        self._become(sentence=f"{bug_in_words(error, sys.argv)}; {self.state['sentence']}")
 
     def cancel(self) -> None:
         """End it, heaters off; before it has begun at once. What has opened a journal to go on with takes it away itself."""

@@ -9,8 +9,7 @@ import signal
 import struct
 import sys
 from asyncio import StreamReader
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any, BinaryIO
@@ -26,9 +25,14 @@ def frame(value: Any) -> bytes:
 
 
 def read_frames(pipe: BinaryIO) -> Iterator[Any]:
-    """The values that come through a pipe, until it ends."""
+    """The values that come through a pipe, until it ends; a frame that is cut off is its end, too. Raises what pickle raises for
+    a frame that is whole but cannot be read."""
     while len(head := pipe.read(LENGTH.size)) == LENGTH.size:
-        yield pickle.loads(pipe.read(*LENGTH.unpack(head)))
+        (length,) = LENGTH.unpack(head)
+        content = pipe.read(length)
+        if len(content) < length:
+            return
+        yield pickle.loads(content)
 
 
 async def read_frame(stream: StreamReader) -> Any:
@@ -51,7 +55,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent speaks, and ends this process
     asked, answers = take_pipes()
     waiting: SimpleQueue[Any] = SimpleQueue()
-    Thread(target=_listen, args=(asked, waiting), daemon=True).start()
+    Thread(target=listen, args=(asked, waiting.put, _end_group), daemon=True).start()
     from machine.app.workbench.work.tasks import TASKS
 
     while True:
@@ -76,11 +80,22 @@ def _answer(answers: BinaryIO, value: Any) -> None:
     answers.flush()
 
 
-def _listen(asked: BinaryIO, waiting: "SimpleQueue[Any]") -> None:
-    """In a thread: take what the parent asks; when it is gone, end this process and all that it has started."""
-    with suppress(OSError):
-        for task in read_frames(asked):
-            waiting.put(task)
+def listen(pipe: BinaryIO, take: Callable[[Any], None], end: Callable[[], None]) -> None:
+    """Hand each value that comes through a pipe to take(); call end() when no more can come, however the other side has ended.
+
+    Nobody can speak to this process any more then, so end() is called after a frame that cannot be read, too.
+    """
+    try:
+        for value in read_frames(pipe):
+            take(value)
+    except OSError:
+        pass
+    finally:
+        end()
+
+
+def _end_group() -> None:
+    """End this process and all that it has started."""
     if hasattr(os, "killpg"):
         os.killpg(0, signal.SIGKILL)  # it leads a group of its own
     os._exit(1)

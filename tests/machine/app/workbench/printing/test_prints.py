@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -11,6 +12,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -30,7 +32,7 @@ from machine.app.workbench.printing.order import FollowOrder, Order, PrintOrder,
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
-from machine.app.workbench.work.worker import LENGTH
+from machine.app.workbench.work.worker import LENGTH, frame, listen
 from machine.dryrun.timeline import UnknownTimeline
 from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
@@ -101,6 +103,21 @@ def hang_up(prints: Prints, current: RunningPrint) -> None:
     current._process.stdin.close()
 
 
+def break_off(prints: Prints, current: RunningPrint) -> None:
+    """The server dies in the middle of a frame."""
+    assert current._process is not None
+    assert current._process.stdin is not None
+    current._process.stdin.write(frame((Command.PAUSE,))[:-1])
+    current._process.stdin.close()
+
+
+def cannot_be_heard(prints: Prints, current: RunningPrint) -> None:
+    """A fault of the program: what the process says cannot be read."""
+    assert current._process is not None
+    assert current._process.stdout is not None
+    current._process.stdout.feed_data(LENGTH.pack(1) + b"?")
+
+
 def freeze(prints: Prints, current: RunningPrint) -> None:
     """Its process does nothing any more, also not what it is told; then a person presses the emergency stop."""
     assert current._process is not None
@@ -115,6 +132,8 @@ DIED = "the process that printed has ended before the print was done"
     (kill, f"{DIED}; the printer reports its heaters off"),
     (freeze, f"{DIED}; emergency stop: the printer has halted"),
     (hang_up, "the print was stopped"),
+    (break_off, "the print was stopped"),
+    (cannot_be_heard, f"a bug in tiltprint: .*; {DIED}; the printer reports its heaters off"),
 ])  # fmt: skip
 def test_whoever_dies_the_heaters_go_off(
     end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
@@ -123,7 +142,7 @@ def test_whoever_dies_the_heaters_go_off(
     with SimulatedPrinter(PROFILE.machine, speed=20.0) as printer:
         state = print_until(printer.path, heats, end)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
-    assert state["sentence"] == expected
+    assert re.fullmatch(expected, state["sentence"])
     assert Path(state["journal"]).is_file()
 
 
@@ -369,6 +388,15 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
         assert current.until(lambda state: state.get("end"))["sentence"].startswith(stopped.format(address))
         assert job.halted
         assert current.person.has_stopped()
+
+
+def test_a_print_whose_server_dies_at_any_byte_of_a_command_is_left() -> None:
+    pause = frame((Command.PAUSE,))
+    for sent in range(len(pause)):
+        person = AtPage(Heard())  # type: ignore[arg-type]
+        listen(BytesIO(pause[:sent]), lambda words, person=person: person.hear(*words), person.leave)  # type: ignore[misc]
+        assert person.gone()
+        assert not person.agrees()
 
 
 def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
