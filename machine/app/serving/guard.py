@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")
+DEFAULT_PORTS = {"http": 80, "https": 443}
 HEADERS = {
     "cache-control": "no-store",
     "x-content-type-options": "nosniff",
@@ -40,21 +41,32 @@ def method_of(scope: "Scope") -> str:
     return "WEBSOCKET" if scope["type"] == "websocket" else scope["method"]
 
 
+def own_hosts(names: Iterable[str], port: int, scheme: str = "http") -> tuple[str, ...]:
+    """What the header Host of a request to a server may be. Browsers leave out the default port of a scheme (RFC 9110, 4.2.3).
+
+    >>> own_hosts(["localhost"], 8123), own_hosts(["localhost"], 80)
+    (('localhost:8123',), ('localhost:80', 'localhost'))
+    """
+    names = tuple(names)
+    return (*(f"{name}:{port}" for name in names), *(names if port == DEFAULT_PORTS[scheme] else ()))
+
+
 def is_foreign(headers: Headers, method: str, own: Collection[str], scheme: str = "http") -> bool:
     """Whether a request goes to a name that is not the server's own, or comes from a page that is not.
 
-    own: names with the port, in small letters; scheme: of the server's pages.
+    own: as own_hosts() gives them, in small letters; scheme: of the server's pages.
     """
     headers = list(headers)
     hosts, origins = values_of(headers, b"host"), values_of(headers, b"origin")
     if len(hosts) != 1 or hosts[0].lower() not in own:
         return True
-    return bool(origins or method not in SAFE) and origins != [f"{scheme}://{hosts[0].lower()}"]
+    origin = f"{scheme}://{hosts[0].lower().removesuffix(f':{DEFAULT_PORTS[scheme]}')}"  # it names no default port either
+    return bool(origins or method not in SAFE) and origins != [origin]
 
 
 def refusal(headers: Headers, method: str, path: str, token: str, port: int) -> tuple[int, str] | None:
     """Status and sentence for a request that gets no answer, None for one that does. method: WEBSOCKET for a websocket."""
-    if is_foreign(headers, method, [f"{name}:{port}" for name in NAMES]):
+    if is_foreign(headers, method, own_hosts(NAMES, port)):
         return 403, FOREIGN
     first = path.removeprefix("/").partition("/")[0]
     if not secrets.compare_digest(first.encode(), token.encode()) or LONG_NUMBER.search(path):

@@ -4,6 +4,7 @@ import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
+from machine.app.serving.guard import own_hosts
 from machine.app.workbench.access.addresses import host_names, network_addresses
 from profiles.errors import OutputError, reason
 
@@ -30,10 +31,8 @@ class Lan:
         return "http" if self.certificate is None else "https"
 
     def hosts(self, port: int) -> tuple[str, ...]:
-        """What a browser may call the server at a port; the port that a scheme has of itself is left out there."""
-        own = {"http": 80, "https": 443}[self.scheme] == port
-        names = (*self.addresses, *self.names)
-        return (*(f"{name}:{port}" for name in names), *(names if own else ()))
+        """What a browser may call the server at a port."""
+        return own_hosts((*self.addresses, *self.names), port, self.scheme)
 
     def urls(self, port: int) -> tuple[str, ...]:
         """What a person types."""

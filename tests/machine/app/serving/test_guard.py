@@ -2,16 +2,22 @@
 
 import pytest
 
-from machine.app.serving.guard import refusal
+from machine.app.serving.guard import is_foreign, own_hosts, refusal
 
 PORT, TOKEN = 8123, "secret"
 OWN = "http://127.0.0.1:8123"
 
 
-def status(host: str | None = "127.0.0.1:8123", origin: str | None = None, method: str = "GET", path: str = "/secret/") -> int:
+def status(
+    host: str | None = "127.0.0.1:8123",
+    origin: str | None = None,
+    method: str = "GET",
+    path: str = "/secret/",
+    port: int = PORT,
+) -> int:
     """What is answered, 200 where the request is let through."""
     headers = [(name, value.encode()) for name, value in ((b"host", host), (b"Origin", origin)) if value is not None]
-    refused = refusal(headers, method, path, TOKEN, PORT)
+    refused = refusal(headers, method, path, TOKEN, port)
     return 200 if refused is None else refused[0]
 
 
@@ -23,6 +29,22 @@ def test_this_computer_is_answered(host: str) -> None:
 @pytest.mark.parametrize("host", ["evil.example:8123", "127.0.0.1", "127.0.0.1:80", "127.0.0.1:8123.evil.example", "", None])
 def test_another_name_is_refused(host: str | None) -> None:
     assert status(host) == 403
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "127.0.0.1:80"])
+def test_browsers_leave_out_the_port_80(host: str) -> None:
+    origin = f"http://{host.removesuffix(':80')}"
+    assert status(host, port=80) == status(host, origin, "WEBSOCKET", port=80) == 200
+    assert status(host, "http://evil.example", port=80) == 403
+    assert status(host, f"http://{host.removesuffix(':80')}:8123", port=80) == 403
+    assert status("evil.example", port=80) == 403
+
+
+def test_the_port_443_is_left_out_of_https_alone() -> None:
+    headers = [(b"host", b"192.168.0.2"), (b"origin", b"https://192.168.0.2")]
+    assert not is_foreign(headers, "POST", own_hosts(["192.168.0.2"], 443, "https"), "https")
+    assert is_foreign(headers, "POST", own_hosts(["192.168.0.2"], 443, "http"), "http")
+    assert is_foreign(headers, "POST", own_hosts(["192.168.0.2"], 80, "https"), "https")
 
 
 @pytest.mark.parametrize("method", ["GET", "POST", "WEBSOCKET"])
