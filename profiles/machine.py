@@ -7,10 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from profiles.axes import STANDING, LinearAxis, RotaryAxis
-from profiles.dialects import FOLLOWS_TABLE
 from profiles.frozen import Frozen, Vector
 from profiles.wording import keys, nearest
 
+# The firmwares' dialects of G-code that a profile may name, which machine/firmware/ writes -> whether its firmware can keep the
+# tip on the workpiece while the table turns (TCP).
+FOLLOWS_TABLE = {
+    "marlin": True,
+    "reprapfirmware": False,
+    "klipper": False,
+    "klipper_steppers": False,
+    "linuxcnc": True,
+    "grblhal": True,
+}
 if TYPE_CHECKING:
     DialectName = str
 else:

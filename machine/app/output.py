@@ -3,7 +3,6 @@
 import json
 import os
 import sys
-import tempfile
 from collections.abc import Iterable
 from os.path import exists, isdir, isfile, islink  # pathlib's raise for a name that is too long
 from pathlib import Path
@@ -12,6 +11,7 @@ from unicodedata import normalize
 
 from machine.app.requests import STDOUT, Outputs
 from profiles.errors import OutputError, reason
+from profiles.files import PRIVATE, SHARED, write_whole
 
 LONGEST_NAME = 150  # bytes
 
@@ -104,7 +104,7 @@ def write_bytes(path: Path, content: bytes, private: bool = False) -> None:
         if _is_device(path):
             path.write_bytes(content)
         else:
-            _replace(path.resolve(), content, 0o600 if private else 0o666 & ~_umask())
+            write_whole(path.resolve(), content, PRIVATE if private else SHARED)
     except OSError as error:
         raise _not_written(path, error) from None
 
@@ -152,23 +152,3 @@ def _write_text(path: Path, text: str, private: bool = False) -> None:
 def _is_device(path: Path) -> bool:
     """Whether a name stands for a device or a pipe (/dev/null, /dev/stdout), which must not be replaced by a file."""
     return exists(path) and not isfile(path) and not isdir(path)
-
-
-def _replace(path: Path, content: bytes, mode: int) -> None:
-    """Write beside the target, then rename, so that no half-written file is ever seen."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".tiltprint-")
-    beside = Path(name)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        beside.chmod(mode)
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    current = os.umask(0)
-    os.umask(current)
-    return current

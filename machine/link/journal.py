@@ -12,10 +12,8 @@ loses what was not yet on the disk; `computer_ran_on` tells whether that can hav
 The file is locked as long as its print runs; the system releases the lock when the program dies, however it does.
 """
 
-import errno
 import json
 import os
-import sys
 import threading
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -35,13 +33,7 @@ from machine.link.incomplete_mark import (
     write_at,
 )
 from profiles.errors import JournalError, OutputError, reason
-
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-if sys.platform == "win32":
-    import msvcrt
+from profiles.files import lock
 
 FORMAT = 3  # in 2 a full disk ended the journal without a trace, in 1 the newest record might lack a change of height
 PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
@@ -52,7 +44,6 @@ BLOCK_BYTES = 4096  # a disk writes a block whole or leaves it damaged, but its 
 SLOTS = 3  # one on its way to the disk, one being written, one safe
 LONGEST_BYTES = 1_000_000  # of the heading, which holds the resolved profile
 BEYOND_MM = 1e9  # and deg: no machine has such a place, and no filament such a length
-LOCKED_BYTE = 1 << 30  # on Windows, where nobody else can read what is locked: far behind the end, which LockFileEx allows
 PRIVATE = 0o600  # what a person prints concerns nobody else
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")  # of Linux
 
@@ -280,19 +271,6 @@ def is_being_printed(path: Path) -> bool:
             return not lock(file.fileno(), shared=True)
     except OSError:
         return False
-
-
-def lock(descriptor: int, shared: bool = False) -> bool:
-    """Lock an open file until it is closed; False when another process holds it. shared: with others who only look."""
-    try:
-        if sys.platform == "win32":
-            os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        elif fcntl is not None:
-            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-    except OSError as error:
-        return error.errno not in (errno.EAGAIN, errno.EACCES)
-    return True
 
 
 def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from profiles.errors import BatchError
+from profiles.files import SHARED, write_whole
+from profiles.files import lock as locked
 
 NO_TEXT = "surrogateescape"  # names of files may be no text
 
@@ -24,25 +26,11 @@ def writing_alone(folder: Path, lock: str) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / lock).open("w") as file:
-            try:
-                _lock(file.fileno())
-            except (BlockingIOError, PermissionError):
-                raise BatchError(f"folder {folder}: another run writes into it; wait for it or take another") from None
+            if not locked(file.fileno()):
+                raise BatchError(f"folder {folder}: another run writes into it; wait for it or take another")
             yield
     except OSError as error:
         raise BatchError(f"folder {folder}: cannot be written ({error})") from None
-
-
-def _lock(descriptor: int) -> None:
-    """Raises OSError where another process holds the file; given back when it is closed."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        import msvcrt
-
-        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
-    else:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
@@ -72,11 +60,10 @@ def read_rows(path: Path, kind: type[Row]) -> list[Row]:
 
 def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
     """A whole table, written beside and renamed."""
-    beside = path.with_name(f"{path.name}.new")
     header = io.StringIO()
     csv.writer(header, lineterminator="\n").writerow(_columns(kind))
-    beside.write_text(header.getvalue() + "".join(map(_line, rows)), encoding="utf-8", errors=NO_TEXT, newline="")
-    beside.replace(path)
+    text = header.getvalue() + "".join(map(_line, rows))
+    write_whole(path, text.encode("utf-8", NO_TEXT), SHARED)
 
 
 def append_row(path: Path, row: Any) -> None:

@@ -23,6 +23,7 @@ from mdp.learning.collection.index import FAILED, INDEX, LOCK, Row, Search, read
 from mdp.learning.collection.models import model_files, name_of
 from mdp.learning.collection.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
+from profiles.files import SHARED, write_whole
 from profiles.profile import DEFAULTS
 
 MOST_WIDE = 1000  # as search.beam_width allows
@@ -107,16 +108,10 @@ def _run(options: argparse.Namespace, settings: Settings, files: dict[Search, Pa
                 reason = f"{FAILED}{result}".splitlines()[0]
                 result = Result(Row(search.id, search.orientation, search.terms, settings.in_words, excluded=reason))
             if result.record:
-                _write(options.out / search.file, result.record)
+                write_whole(options.out / search.file, result.record, SHARED)
             append_row(options.out / INDEX, result.row)
             rows[search] = result.row
             progress.show(f"{search.file.removesuffix('.npz')}: {result.row.in_words}", result.row.excluded.startswith(FAILED))
-
-
-def _write(path: Path, content: bytes) -> None:
-    beside = path.with_suffix(".part")
-    beside.write_bytes(content)
-    beside.replace(path)
 
 
 def _report(out: Path, rows: Sequence[Row]) -> None:

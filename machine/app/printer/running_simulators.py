@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from machine.link.journal import lock
 from machine.link.port import SerialDevice
+from profiles.files import lock
 from profiles.folders import state_folder
 
 

@@ -3,7 +3,6 @@
 The graph is written node by node, so what a search runs is what stands here, and torch's exporter is not needed.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from onnx import TensorProto, helper, numpy_helper
 from mdp.learning.labels import SMALLEST_RANGE, Singles
 from mdp.ranking.network import INPUT, OUTPUT
 from profiles.errors import LearningError
+from profiles.files import SHARED, write_whole
 
 OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of the last years
 
@@ -84,10 +84,8 @@ def export(layers: Sequence[Layer], columns: Sequence[str], metadata: Mapping[st
 
 
 def write(file: Path, content: bytes) -> None:
-    """Write a ranker beside its file and rename it; LearningError where that cannot be done."""
-    beside = file.with_name(f"{file.name}.new")
+    """Write a ranker whole or not at all; LearningError where that cannot be done."""
     try:
-        beside.write_bytes(content)
-        os.replace(beside, file)
+        write_whole(file, content, SHARED)
     except OSError as error:
         raise LearningError(f"ranker {file}: cannot be written ({error.strerror})") from None

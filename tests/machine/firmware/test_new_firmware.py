@@ -15,7 +15,7 @@ from machine.link.stream import print_lines
 from machine.reader.parsed import MoveKind
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.virtual import PATH, VirtualPrinter
-from profiles.dialects import FOLLOWS_TABLE
+from profiles.machine import FOLLOWS_TABLE
 from profiles.profile import Profile
 from tests.machine.firmware.made_up import MADE_UP
 from tests.machine.hand import printed, text

@@ -19,9 +19,9 @@ from typing import Any
 from machine.app.output import plain_name
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
-from machine.app.workbench.work.received import lock_folder
 from mdp.plans.writing import plan_text
 from profiles.errors import PlanError, reason
+from profiles.files import LOCK, lock_folder, whole_file, write_whole
 from profiles.folders import state_folder
 from profiles.frozen import Vector
 from profiles.places import KINDS
@@ -71,7 +71,7 @@ def new_folder() -> Path:
 
 def write_work(folder: Path, bench: Bench) -> None:
     """Keep what lies on a bench with a model. Raises OSError, then what was kept before is there still."""
-    model, given, names = bench.model, bench.given, {RECORD, PLAN}
+    model, given, names = bench.model, bench.given, {RECORD, PLAN, LOCK}
     assert model is not None
     copies: dict[str, str] = {}
     for kind in KINDS:
@@ -93,8 +93,8 @@ def write_work(folder: Path, bench: Bench) -> None:
         "copies": bench.copies,
     }
     if bench.planned:
-        _write(folder / PLAN, plan_text(plan_of_bench(bench, PLAN)))
-    _write(folder / RECORD, json.dumps(record))
+        write_whole(folder / PLAN, plan_text(plan_of_bench(bench, PLAN)).encode())
+    write_whole(folder / RECORD, json.dumps(record).encode())
     names |= {str(record["model"]), *copies.values()}
     for file in folder.iterdir():
         if file.name not in names:
@@ -106,16 +106,9 @@ def _copied(file: Path, folder: Path, role: str) -> str:
     status = file.stat()
     name = f"{role}-{status.st_mtime_ns:x}-{status.st_size:x}-{plain_name(file.name)}"
     if not (folder / name).exists():
-        half = folder / f"{name}.half"
-        shutil.copyfile(file, half)
-        os.replace(half, folder / name)
+        with file.open("rb") as source, whole_file(folder / name) as copy:
+            shutil.copyfileobj(source, copy)
     return name
-
-
-def _write(file: Path, text: str) -> None:
-    half = file.with_name(f"{file.name}.half")
-    half.write_text(text, encoding="utf-8")
-    os.replace(half, file)
 
 
 def read_work(folder: Path) -> KeptWork:

@@ -9,11 +9,9 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
+from weakref import finalize
 
-try:
-    import fcntl
-except ImportError:  # without locks nothing is known of other programs, and nothing of theirs removed
-    fcntl = None  # type: ignore[assignment]
+from profiles.files import LOCK, lock_folder, remove_locked
 
 PREFIX = "tiltprint-edit-"
 FOUND = "found"  # file in a folder that was left, as old as the knowledge of that
@@ -27,14 +25,10 @@ class Received:
     """A folder that is locked as long as its program lives, and in it one for each file."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix=PREFIX)
+        self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
         self._lock = lock_folder(self.path)
         self._numbers = itertools.count(1)
-
-    @property
-    def path(self) -> Path:
-        """The folder."""
-        return Path(self._folder.name)
+        self._at_exit = finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
     def new_file(self, name: str) -> Path:
         """A place for a file that a page calls so."""
@@ -45,7 +39,14 @@ class Received:
 
     def remove(self) -> None:
         """Remove the folder with all files."""
-        self._folder.cleanup()
+        if self._lock is not None:
+            remove_locked(self.path, self._lock)
+            self._lock = None
+        self._at_exit()
+
+    def leave(self) -> None:
+        """Leave the files to the next start of the program, which finds them as if this one had been killed."""
+        self._at_exit.detach()
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -61,16 +62,15 @@ def tidy_left() -> tuple[Path, ...]:
     left = []
     for folder in sorted(Path(tempfile.gettempdir()).glob(f"{PREFIX}*")):
         with suppress(OSError):
-            lock = None if _is_begun(folder) else lock_folder(folder)
+            # without locks nothing is known of other programs, so nothing of theirs is removed
+            lock = None if _is_begun(folder) else lock_folder(folder, surely=True)
             if lock is None:
                 continue
-            try:
-                if _is_done_with(folder):
-                    shutil.rmtree(folder)
-                else:
-                    left.append(folder)
-            finally:
+            if _is_done_with(folder):
+                remove_locked(folder, lock)
+            else:
                 os.close(lock)
+                left.append(folder)
     return tuple(left)
 
 
@@ -81,7 +81,7 @@ def files_in(*folders: Path) -> list[Path]:
 
 
 def _is_begun(folder: Path) -> bool:
-    return time.time() - folder.stat().st_mtime < BEGUN_S and not any(folder.iterdir())
+    return time.time() - folder.stat().st_mtime < BEGUN_S and all(path.name == LOCK for path in folder.iterdir())
 
 
 def _is_done_with(folder: Path) -> bool:
@@ -91,18 +91,3 @@ def _is_done_with(folder: Path) -> bool:
     if not marker.exists():
         marker.touch()
     return time.time() - marker.stat().st_mtime > KEPT_S
-
-
-def lock_folder(folder: Path) -> int | None:
-    """Lock a folder of this user's for this process; None when another process holds it, or where there are no such locks."""
-    if fcntl is None:
-        return None
-    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    try:
-        if os.fstat(opened).st_uid == os.geteuid():
-            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return opened
-    except OSError:
-        pass  # locked, or a disk without locks
-    os.close(opened)
-    return None

@@ -1,0 +1,104 @@
+"""Files: written whole or not at all, and locked for one process at a time, on every system that Python runs on."""
+
+import errno
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+if sys.platform == "win32":
+    import msvcrt
+
+LOCKED_BYTE = 1 << 30  # on Windows, where nobody else can read what is locked: far behind the end, which LockFileEx allows
+LOCK = ".lock"  # the file in a folder that is locked for it, where a folder cannot be opened
+PRIVATE, SHARED = 0o600, 0o666  # modes: for this user alone, for all whom the umask does not exclude
+
+
+@contextmanager
+def whole_file(path: Path, mode: int = PRIVATE) -> Iterator[BinaryIO]:
+    """A binary file that gets its name only when the block ends without an error: a half-written one is never seen.
+
+    Each writer has a temporary file of its own, in the same folder. mode: less what the umask takes away. Raises OSError.
+    """
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".tiltprint-")
+    beside = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            yield file
+        beside.chmod(mode & ~_umask())
+        beside.replace(path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def write_whole(path: Path, content: bytes, mode: int = PRIVATE) -> None:
+    """Write a file whole or not at all. Raises OSError, then what was there before is there still."""
+    with whole_file(path, mode) as file:
+        file.write(content)
+
+
+def _umask() -> int:
+    current = os.umask(0)
+    os.umask(current)
+    return current
+
+
+def lock(descriptor: int, shared: bool = False) -> bool:
+    """Lock an open file until it is closed; False when another process holds it. shared: with others who only read.
+
+    Where the system or the disk has no locks nothing is known of other processes: True.
+    """
+    return _try_lock(descriptor, shared) is not False
+
+
+def _try_lock(descriptor: int, shared: bool) -> bool | None:
+    """Whether it could be locked; None where there are no locks."""
+    try:
+        if sys.platform == "win32":
+            os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        elif fcntl is not None:
+            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        else:
+            return None
+    except OSError as error:
+        return False if error.errno in (errno.EAGAIN, errno.EACCES) else None
+    return True
+
+
+def lock_folder(folder: Path, surely: bool = False) -> int | None:
+    """Lock a folder of this user's until its descriptor is closed; None when another process holds it, or when it is somebody else's.
+
+    surely: None also where there are no locks, so that nothing is known of other processes. Raises OSError.
+    """
+    if hasattr(os, "O_DIRECTORY"):
+        opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    else:  # Windows opens no folder, and keeps each user's own apart itself
+        opened = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
+    own = not hasattr(os, "geteuid") or os.fstat(opened).st_uid == os.geteuid()
+    locked = _try_lock(opened, False) if own else False
+    if locked or (locked is None and not surely):
+        return opened
+    os.close(opened)
+    return None
+
+
+def remove_locked(folder: Path, descriptor: int) -> None:
+    """Remove a folder that lock_folder() has locked, as far as possible; the lock goes last. Windows removes no open file."""
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        elif path.name != LOCK:
+            with suppress(OSError):
+                path.unlink()
+    os.close(descriptor)
+    shutil.rmtree(folder, ignore_errors=True)
