@@ -35,7 +35,7 @@ class SessionBase(Observable):
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
     gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; stopped: what became
     of work that was stopped last; quick, long, hand: its tasks in the pools; received: the files of its pages; followers: called
-    after every change of the bench; endings: as the session closes, its files still there.
+    after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -46,7 +46,6 @@ class SessionBase(Observable):
         self.busy = self.stopped = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
-        self.endings: list[Callable[[], None]] = []
         self.received = Received()
         self._files = count(1)
         self._tasks: set[asyncio.Task[None]] = set()
@@ -60,18 +59,6 @@ class SessionBase(Observable):
     def problem(self) -> str:
         """What could not be done last, whoever wanted it; "": all could."""
         return next(reversed(self.problems.values()), "")
-
-    def close(self) -> None:
-        """End all work; its files go, and its pages are told."""
-        self.closed = True
-        for end in self.endings:
-            end()
-        for task in self._tasks:
-            task.cancel()
-        for tasks in (self.quick, self.long, self.hand):
-            tasks.close()
-        self.received.remove()
-        self.notify()
 
     def new_file(self) -> Path:
         """A place for what a task makes, which goes with the session at the latest."""
@@ -92,6 +79,7 @@ class SessionBase(Observable):
         task = asyncio.create_task(attempt())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(lambda _: work.close())  # of one that was cancelled before it began
         return task
 
     def refuse(self, error: Exception) -> str:

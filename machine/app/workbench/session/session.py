@@ -37,6 +37,7 @@ from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
 from machine.app.workbench.work.kept_work import KeptWork
+from machine.app.workbench.work.received import files_in
 from machine.app.workbench.work.models import Resting, Unscaled
 from machine.app.workbench.work.worker_pool import WorkerPools
 from machine.planning.stops import parse_stops
@@ -99,6 +100,22 @@ class Session(SessionBase):
         self.benches: tuple[OpenBench, ...] = ()
         self.unscaled: OfUnknownUnit | None = None
 
+    async def close(self) -> str:
+        """End all work, tell the pages, and keep the last change. Then the files that pages have sent go; where the change could
+        not be kept they stay, and a sentence says why and where, else ""."""
+        self.closed = True
+        for task in self._tasks:
+            task.cancel()
+        for tasks in (self.quick, self.long, self.hand):
+            tasks.close()
+        self.notify()
+        trouble = await self.keeping.finish()
+        if not trouble or not files_in(self.received.path):
+            self.received.remove()
+            return f"the work on a bench could not be kept: {trouble}" if trouble else ""
+        self.received.leave()
+        return f"the work on a bench could not be kept: {trouble}; the files of its pages stay in {self.received.path} for a day"
+
     def warm(self) -> None:
         """Load the program's heavy parts while nobody waits."""
         for tasks in (self.quick, self.hand, self.long):
@@ -150,7 +167,7 @@ class Session(SessionBase):
     async def open_kept(self, work: KeptWork) -> None:
         """Put kept work on the bench again, and go on keeping it where it was. Raises UserError, then it stays as it is there."""
         word = f"open the work of {strftime('%H:%M', localtime(work.written_s))}"
-        with self.keeping.opening(work.folder):
+        async with self.keeping.opening(work.folder):
             await self.take_given(word, lambda given: work.given)
             path = locate(work.name) if work.model is None else self.received.new_file(work.name)
             if work.model is not None:

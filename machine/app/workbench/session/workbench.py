@@ -1,5 +1,6 @@
 """Workbench: the sessions of one run of the program by number, each with its own bench and its own pages."""
 
+import asyncio
 from collections.abc import Callable
 
 from machine.app.workbench.bench.bench import History, Step, emptied
@@ -18,6 +19,7 @@ class Workbench:
         self.sessions: dict[int, Session] = {}
         self.pools = WorkerPools()
         self._make = make
+        self._closing: dict[int, asyncio.Task[str]] = {}
         self._last = 0
 
     def open(self, like: Session | None = None) -> int:
@@ -34,18 +36,26 @@ class Workbench:
         self._list_again()
         return self._last
 
-    def close(self, number: int) -> None:
-        """End a session and its work."""
+    async def close(self, number: int) -> str:
+        """End a session and its work; a sentence where its last change could not be kept, else "". To cancel the waiting does not
+        cancel the keeping."""
+        self._begin_to_close(number)
+        return await asyncio.shield(self._closing[number]) if number in self._closing else ""
+
+    async def close_all(self) -> list[str]:
+        """End all of them, and all processes; a sentence for each whose last change could not be kept."""
+        for number in list(self.sessions):
+            self._begin_to_close(number)
+        await asyncio.sleep(0)  # all of them have ended their work
+        self.pools.end()
+        return [trouble for trouble in await asyncio.gather(*self._closing.values()) if trouble]
+
+    def _begin_to_close(self, number: int) -> None:
         session = self.sessions.pop(number, None)
         if session is not None:
-            session.close()
+            self._closing[number] = closing = asyncio.create_task(session.close())
+            closing.add_done_callback(lambda _: self._closing.pop(number))
             self._list_again()
-
-    def close_all(self) -> None:
-        """End all of them, and all processes."""
-        for number in list(self.sessions):
-            self.close(number)
-        self.pools.end()
 
     def _list_again(self) -> None:
         benches = tuple(_described(number, session) for number, session in self.sessions.items())

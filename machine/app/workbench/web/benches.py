@@ -4,6 +4,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 
+from machine.app.terminal.progress import say
 from machine.app.workbench.bench.page_words import page_words
 from machine.app.workbench.bench.values import is_small_number
 from machine.app.workbench.session.workbench import Workbench
@@ -27,7 +28,9 @@ def bench_routes(workbench: Workbench) -> list[Route]:
         return JSONResponse({"number": number})
 
     async def closed(request: Request) -> Response:
-        workbench.close(request.path_params["number"])
+        trouble = await workbench.close(request.path_params["number"])
+        if trouble:  # its page is gone
+            say(trouble)
         return JSONResponse({})
 
     return [

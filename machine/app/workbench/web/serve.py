@@ -29,6 +29,7 @@ from machine.app.workbench.work.received import files_in, tidy_left
 from machine.app.workbench.work.worker_pool import WorkerPools
 
 GRACE_S = 1  # for answers under way when it ends, and for its processes
+KEEP_S = 20.0  # for the work on all benches to be kept, which takes less than a second unless a model is huge or a disk slow
 SWITCH_S = 0.0005  # between threads: usual are 5 ms, and a stop is waited for several times
 MOST_SENT = 1 << 20  # bytes of one message of a page; files come by another way
 
@@ -122,9 +123,10 @@ async def _serve(
             await answering
     finally:
         prints.close()
-        with suppress(TimeoutError):  # what hangs there ends with the program
-            async with asyncio.timeout(2.0 * GRACE_S):
-                await sessions.run(_close(workbench))
+        with suppress(TimeoutError):  # what hangs there ends with the program, and no file is deleted that is still read
+            async with asyncio.timeout(KEEP_S):
+                for trouble in await sessions.run(_close(workbench)):
+                    say(trouble)
         await hear_the_ends(GRACE_S)
         await sessions.end(GRACE_S)
 
@@ -148,9 +150,11 @@ def _server(app: ASGIApp, lan: Lan | None = None) -> Server:
     return Server(settings)
 
 
-async def _close(workbench: Workbench) -> None:
-    workbench.close_all()
+async def _close(workbench: Workbench) -> list[str]:
+    """End all benches, each with its last change kept; a sentence for each of which it is not."""
+    not_kept = await workbench.close_all()
     await hear_the_ends(GRACE_S)
+    return not_kept
 
 
 def keep_stops_quick() -> None:

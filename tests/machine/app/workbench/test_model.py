@@ -80,7 +80,7 @@ def test_a_closed_bench_leaves_no_model_and_no_file(tmp_path: Path) -> None:
         assert snapshot(session)["overhang_mm2"] == pytest.approx(300.0)
         left = weakref.ref(the_model(session)), session.received.path
         assert the_model(session).mesh_file.is_file()
-        session.close()
+        await session.close()
         return left
 
     left, folder = read(close, tmp_path / "tee.stl")

@@ -75,7 +75,7 @@ def scope(path: str) -> dict[str, Any]:
 
 
 async def _close(workbench: Workbench) -> None:
-    workbench.close_all()
+    await workbench.close_all()
 
 
 def test_an_application_hears_and_answers_from_the_other_loop_and_is_cancelled_with_its_request(sessions: SessionsThread) -> None:

@@ -169,7 +169,7 @@ def test_a_search_that_waits_for_the_processes_of_other_benches_says_so() -> Non
                 await asyncio.sleep(0)
                 session.finding.stop()
         await asyncio.sleep(0)
-        session.close()
+        await session.close()
         await asyncio.gather(*session._tasks, return_exceptions=True)
         return texts[0], texts[1]
 
@@ -188,7 +188,7 @@ def test_planes_are_tried_on_their_own_bench_whoever_had_the_process_in_between(
         benches = bench(tee()), bench(box(20.0, 20.0, 20.0))
         tried = [await sessions[k].readiness.ask("try_cuts", benches[k], (LEVEL,), 0) for k in (0, 1, 0)]
         for session in sessions:
-            session.close()
+            await session.close()
         return tried
 
     first, of_box, again = run(work(), pools.hand)
