@@ -1,8 +1,10 @@
 """Commands: all that a page may ask of the prints, by name: whose each is, and what does it."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from machine.app.requests import PrintRequest
 from machine.app.workbench.bench.values import Asked, is_number
@@ -18,20 +20,37 @@ from profiles.errors import JournalError, PrinterError
 LONGEST_PORT = 300  # letters
 
 
+Work = Coroutine[Any, Any, None]
+
+
 @dataclass(frozen=True)
 class PageOfPrints:
-    """A page that asks: its name, its bench, and the prints."""
+    """A page that asks: its name, its bench, the prints, and on_bench, which calls a function in the event loop of the benches.
+
+    The prints have an event loop of their own, so the session is read by on_bench alone: what is read at two moments from here
+    may be of two benches.
+    """
 
     name: str
     session: Session
     prints: Prints
+    on_bench: Callable[[Callable[[], Order]], Awaitable[Order]]
 
 
-Command = Callable[[PageOfPrints, Asked], None]  # raises UserError for what cannot be done
+# Returns work that is still to be awaited where the bench must be asked; raises UserError for what cannot be done, as that does.
+Command = Callable[[PageOfPrints, Asked], Work | None]
 
 
-def _begin(order: Callable[[Session, Asked], Order]) -> Command:
-    return lambda page, asked: page.prints.begin(page.name, order(page.session, asked))
+def _begin(order: Callable[[Asked], Order]) -> Command:
+    return lambda page, asked: page.prints.begin(page.name, order(asked))
+
+
+def _begin_from_bench(order: Callable[[Session, Asked], Order]) -> Command:
+    async def command(page: PageOfPrints, asked: Asked) -> None:
+        page.prints.begin(page.name, await page.on_bench(partial(order, page.session, asked)))
+        page.prints.notify()
+
+    return command
 
 
 def _of_print(act: Callable[[RunningPrint, Asked], None], on_server: bool = False, over: bool = False) -> Command:
@@ -67,7 +86,7 @@ def _slices(session: Session, asked: Asked) -> Order:
     return order_of(session, printing, asked.get("force") is True, not sends_only)
 
 
-def _rest(session: Session, asked: Asked) -> Order:
+def _rest(asked: Asked) -> Order:
     """The rest of a print that was cut off."""
     journal, machine = (str(asked.get(key) or "").strip() for key in ("journal", "machine"))
     if not journal:
@@ -119,10 +138,10 @@ def _whole(asked: Asked, key: str, otherwise: int) -> int:
 COMMANDS: dict[str, Command] = {
     "ports": lambda page, asked: page.prints.look_for_ports(_whole(asked, "baud", 115200)),
     "journals": lambda page, asked: page.prints.look_for_journals(),
-    "check": _begin(_slices),
+    "check": _begin_from_bench(_slices),
     "go_on": _begin(_rest),
-    "follow": _begin(lambda session, asked: FollowOrder(_server(asked))),
-    "hand": _begin(_hand),
+    "follow": _begin(lambda asked: FollowOrder(_server(asked))),
+    "hand": _begin_from_bench(_hand),
     "by_hand": _of_print(_by_hand),
     "emergency": lambda page, asked: page.prints.stop_at_once(asked.get("print")),
     "take": _take,
@@ -137,11 +156,13 @@ COMMANDS: dict[str, Command] = {
 }
 
 
-def obey(page: PageOfPrints, asked: Asked) -> None:
-    """Do what a page asks for, `{"do": NAME, ...}`. Raises UserError for what cannot be done."""
+def obey(page: PageOfPrints, asked: Asked) -> Work | None:
+    """Do what a page asks for, `{"do": NAME, ...}`; the work that is left where its bench must be asked first. Both raise UserError
+    for what cannot be done."""
     name = asked.get("do")
     command = COMMANDS.get(name) if isinstance(name, str) else None
     if command is None:
         raise PrinterError("what the page has sent is no command of a print")
-    command(page, asked)
+    work = command(page, asked)
     page.prints.notify()
+    return work

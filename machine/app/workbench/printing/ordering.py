@@ -14,7 +14,7 @@ from profiles.machine import Machine
 
 
 def order_of(session: Session, printing: PrintRequest, force: bool, starts: bool = True) -> PrintOrder:
-    """The G-code that the session would save, for the profile that it was made with. Raises PlanError where there is none,
+    """The G-code that the session would save, for the profile that it was made with; called in the session's event loop. Raises PlanError where there is none,
     PrinterError for a machine or a rate that cannot print there, MoveError where the slices' dry run found errors; force: not for
     those."""
     if session.closed:

@@ -3,7 +3,8 @@
 import asyncio
 import json
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +15,24 @@ from starlette.websockets import WebSocket
 from machine.app.crash import bug_in_words, log_bug
 from machine.app.workbench.access.limits import DEVICE, check_print_command
 from machine.app.workbench.bench.page_words import page_words, with_page_words
-from machine.app.workbench.printing.commands import PageOfPrints, obey
+from machine.app.workbench.printing.commands import PageOfPrints, Work, obey
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.line import parsed, receive, refuse_closed, send, tell, until_either_ends
+from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.network.http import fetch_picture
-from profiles.errors import ServerError, UserError
+from profiles.errors import PrinterError, ServerError, UserError
 
 MOST_COMMAND = 10_000  # characters
 SENTENCES = ("sentence", "question", "checks", "figures", "said", "upload")  # of a print's state
 
 
-def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
+def prints_line(prints: Prints, workbench: Workbench, sessions: SessionsThread) -> Callable[[WebSocket], Awaitable[None]]:
     """What answers the websocket of a page of a session: state out, commands in. `?page=` names the page, so that a line that
     comes back is known.
 
     Each line has a task of its own that sends the newest state: one that reads nothing holds up itself alone. The session lives
-    in another event loop: of it only what lies there finished is read.
+    in another event loop and is read there alone, but for its being there.
     """
 
     async def talk(socket: WebSocket) -> None:
@@ -42,7 +44,7 @@ def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], A
         await socket.accept()
         with prints.page(page):
             try:
-                hearing = _hear(socket, PageOfPrints(page, session, prints))
+                hearing = _hear(socket, PageOfPrints(page, session, prints, sessions.call))
                 await until_either_ends(tell(prints, lambda: _told(prints), socket), hearing)
             except ExceptionGroup as bugs:
                 log_bug(bugs.exceptions[0], ())
@@ -87,14 +89,35 @@ def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 
 
 async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
-    while True:
-        text = await receive(socket)
-        try:
-            asked = parsed(text, MOST_COMMAND)
-            if DEVICE in socket.scope:
-                check_print_command(asked, page.prints.ports_known, page.prints.journals_known)
-            obey(page, asked)
-        except UserError as error:
-            await send(socket, json.dumps({"problem": page_words(str(error)), "forcible": error.forcible}))
-        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
-            await send(socket, json.dumps({"problem": bug_in_words(error, ())}))
+    """An order that waits for the bench, which may be busy, holds up nothing that the page says after it: an emergency stop is
+    given at once."""
+    async with asyncio.TaskGroup() as tasks:
+        ordering: asyncio.Task[None] | None = None
+        while True:
+            text = await receive(socket)
+            async with _refusals(socket):
+                asked = parsed(text, MOST_COMMAND)
+                if DEVICE in socket.scope:
+                    check_print_command(asked, page.prints.ports_known, page.prints.journals_known)
+                with_bench = obey(page, asked)
+                if with_bench is not None and ordering is not None and not ordering.done():
+                    with_bench.close()
+                    raise PrinterError("what this page has ordered last still waits for its bench: wait for that first")
+                if with_bench is not None:
+                    ordering = tasks.create_task(_order(socket, with_bench))
+
+
+async def _order(socket: WebSocket, with_bench: Work) -> None:
+    async with _refusals(socket):
+        await with_bench
+
+
+@asynccontextmanager
+async def _refusals(socket: WebSocket) -> AsyncIterator[None]:
+    """Tell the page why what it has asked for cannot be done."""
+    try:
+        yield
+    except UserError as error:
+        await send(socket, json.dumps({"problem": page_words(str(error)), "forcible": error.forcible}))
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
+        await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

@@ -79,7 +79,7 @@ def _router(served: Served, page: tuple[bytes, str], further: Sequence[BaseRoute
     of_prints = [
         Route(BELOW + "prints/{print:int}/log", print_log(prints)),
         Route(BELOW + "prints/{print:int}/webcam", print_webcam(prints)),
-        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench)),
+        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench, served.sessions)),
     ]
     others = served.sessions.application(_of_sessions(workbench, page, served.uploads))
     return Router([*of_prints, *further], redirect_slashes=False, default=others)

@@ -26,6 +26,14 @@ class SessionsThread:
         """What work in that loop gives; to cancel the waiting cancels the work."""
         return await _in(self._loop, work)
 
+    async def call(self, function: Callable[[], T]) -> T:
+        """What a function gives when it is called in that loop: nothing there changes while it runs."""
+
+        async def called() -> T:
+            return function()
+
+        return await self.run(called())
+
     def application(self, app: ASGIApp) -> ASGIApp:
         """An application that lives in that loop, for the server of another one."""
 

@@ -4,20 +4,24 @@ import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from starlette.types import Receive, Scope, Send
 
 from machine.app.requests import Given, PrintRequest
-from machine.app.workbench.printing.order import PrintOrder
+from machine.app.workbench.printing.commands import PageOfPrints, obey
+from machine.app.workbench.printing.order import Order, PrintOrder
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.server import Served, application
 from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.uploads import Uploads
+from machine.dryrun.findings import known_findings
 from profiles.profile import load
 
 PORT, TOKEN = 8000, "token"
@@ -57,7 +61,8 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
         hanging = asyncio.create_task(sessions.run(hang()))
         while not hangs.is_set():
             await asyncio.sleep(0.01)
-        said.put_nowait({"type": "websocket.receive", "text": '{"do": "emergency"}'})
+        for command in ('{"do": "check", "port": "sim"}', '{"do": "emergency"}'):  # the first waits for the bench, which hangs
+            said.put_nowait({"type": "websocket.receive", "text": command})
         stopped = await hanging
         said.put_nowait({"type": "websocket.disconnect", "code": 1001})
         await line
@@ -65,6 +70,40 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
         return stopped
 
     assert asyncio.run(run())
+
+
+class TakenAway(Slicing):
+    """Slices that something else takes away in the bench's loop between two reads of them, if it gets a turn there."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, slices: Any) -> None:
+        self.done = slices
+        self._loop, self._gone = loop, Event()
+
+    def lacking(self) -> str:
+        self._loop.call_soon_threadsafe(self._take_away)
+        self._gone.wait(0.2)
+        return ""
+
+    def _take_away(self) -> None:
+        self.done = None
+        self._gone.set()
+
+
+def test_an_order_is_of_one_moment_of_its_bench(sessions: SessionsThread, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[Order] = []
+    monkeypatch.setattr(Prints, "begin", lambda prints, page, order: begun.append(order))
+    bench = SimpleNamespace(model=SimpleNamespace(name="box.stl"))
+    sliced = SimpleNamespace(known=known_findings([], PROFILE, []), errors=(), gcode=Path("a.gcode"), key="key")
+    slicing = TakenAway(sessions._loop, SimpleNamespace(bench=bench, sliced=sliced))
+    session: Any = SimpleNamespace(closed=False, bench=bench, slicing=slicing)
+
+    async def run() -> None:
+        work = obey(PageOfPrints("mine", session, Prints(), sessions.call), {"do": "check", "port": "sim"})
+        assert work is not None
+        await work
+
+    asyncio.run(run())
+    assert [order.gcode for order in begun if isinstance(order, PrintOrder)] == [Path("a.gcode")]
 
 
 def scope(path: str) -> dict[str, Any]:

@@ -425,7 +425,10 @@ def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> No
 
 
 def page_of(prints: Prints, name: str = "me") -> PageOfPrints:
-    return PageOfPrints(name, SimpleNamespace(), prints)  # type: ignore[arg-type]
+    async def on_bench(order: Callable[[], Order]) -> Order:
+        return order()
+
+    return PageOfPrints(name, SimpleNamespace(), prints, on_bench)  # type: ignore[arg-type]
 
 
 def prints_with_one(port: str = "sim") -> Prints:
