@@ -1,10 +1,14 @@
 """Page words: a sentence of the program, which speaks to a terminal, as the workbench's page says it.
 
-Sentences are made once, below, and name options and keys; here alone they get the page's own fields and labels.
+Sentences are made once, below, and name options and keys; here alone they get the page's own fields and labels. What a person has
+named himself, as a file, stays to the letter, even where its name is made of keys and options: in doubt a key is shown as it is.
 """
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
+from itertools import count
+from pathlib import PurePath
 from typing import Any
 
 from profiles.labels.labels import LABELS, group_title
@@ -62,17 +66,53 @@ RULES = (
 _RULES = [(re.compile(pattern), replacement) for pattern, replacement in RULES]
 _TINY = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?e-(?:0[4-9]|[1-9]\d)(?= mm| deg| °)")
 _KEY = re.compile(r"(?<![\w./\[-])(?:process|material|machine|search)(?:\.[a-z][a-z0-9_]*)+(?![\w.]*[\w])")
-_WORD = re.compile(r"(?<![\w./-])(?:" + "|".join(sorted(map(re.escape, _BARE), key=len, reverse=True)) + r")(?![\w/-])")
+_WORD = re.compile(r"(?<![\w./-])(?:" + "|".join(sorted(map(re.escape, _BARE), key=len, reverse=True)) + r")(?![\w/-]|\.\w)")
+# What a sentence quotes, or gives as the value of an option, is somebody's own, too.
+_VALUES = (
+    r"(?<!\w)'[^'\n]*'(?!\w)|(?<!\w)\"[^\"\n]*\"(?!\w)"
+    r"|(?<=--ranker )[^:]*(?=: )|(?<=--port )\S+(?= is a)|(?<=\w=)[A-Za-z_][^\s,;:)]*"
+)
+_FIRST_STAND_IN = 0xF0000  # private use: in no rule, and a letter of nothing
 
 
-def page_words(sentence: str) -> str:
+def page_words(sentence: str, names: Iterable[str] = ()) -> str:
     """The sentence with the page's fields in the place of options, labels in that of keys, and nothing smaller than can be seen.
+
+    names: of models, files, machines and the like that it may speak of, which stay as they are, also by the last part of a path
+    alone and without the suffix.
 
     >>> page_words("process.walls is -3: it must be a whole number from 0 to 50")
     'Walls is -3: it must be a whole number from 0 to 50'
     >>> page_words("4 parts would save 21 mm2 of scars but take 12 min longer: --parts 4")
     '4 parts would save 21 mm² of scars but take 12 min longer: take 4 under In how many parts'
+    >>> page_words("infill_density 2.stl: infill_density is 3", ["infill_density 2.stl"])
+    'infill_density 2.stl: Infill density is 3'
     """
+    kept: dict[str, str] = {}
+    free = (chr(number) for number in count(_FIRST_STAND_IN) if chr(number) not in sentence)
+
+    def stand_in(own: re.Match[str]) -> str:
+        kept[letter := next(free)] = own[0]
+        return letter
+
+    rewritten = _rewritten(_own(tuple(names)).sub(stand_in, sentence))
+    return "".join(kept.get(letter, letter) for letter in rewritten) if kept else rewritten
+
+
+@lru_cache(maxsize=64)
+def _own(names: tuple[str, ...]) -> re.Pattern[str]:
+    """Where a sentence has something of a person's own: the longest names first, and none inside of a longer word."""
+    known = {form for name in names for form in (name, PurePath(name).name, PurePath(name).stem) if _is_at_risk(form)}
+    called = "|".join(map(re.escape, sorted(known, key=len, reverse=True)))
+    return re.compile(rf"(?<![\w.])(?:{called})(?!\w)|{_VALUES}" if called else _VALUES)
+
+
+def _is_at_risk(name: str) -> bool:
+    """Whether a rule may find something in a name, or begin in it."""
+    return any(letter in name for letter in "_-([`") or _rewritten(f"1 {name}") != f"1 {name}"
+
+
+def _rewritten(sentence: str) -> str:
     for pattern, replacement in _RULES:
         sentence = pattern.sub(replacement, sentence)
     sentence = _KEY.sub(_label, _TINY.sub("less than 0.001", sentence))
@@ -81,18 +121,18 @@ def page_words(sentence: str) -> str:
     return _WORD.sub(lambda word: _BARE[word[0]], sentence)
 
 
-def in_page_words(value: Any) -> Any:
+def in_page_words(value: Any, names: Iterable[str] = ()) -> Any:
     """All sentences of plain values, in lists and tables, too, as the page says them; what is no text stays."""
     if isinstance(value, str):
-        return page_words(value)
+        return page_words(value, names)
     if isinstance(value, dict):
-        return {key: in_page_words(inner) for key, inner in value.items()}
-    return [in_page_words(inner) for inner in value] if isinstance(value, list | tuple) else value
+        return {key: in_page_words(inner, names) for key, inner in value.items()}
+    return [in_page_words(inner, names) for inner in value] if isinstance(value, list | tuple) else value
 
 
-def with_page_words(table: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
+def with_page_words(table: dict[str, Any], keys: Iterable[str], names: Iterable[str] = ()) -> dict[str, Any]:
     """A table with the sentences of these keys as the page says them."""
-    return table | {key: in_page_words(table[key]) for key in keys if key in table}
+    return table | {key: in_page_words(table[key], names) for key in keys if key in table}
 
 
 def _label(key: re.Match[str]) -> str:

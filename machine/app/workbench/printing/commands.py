@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from machine.app.requests import PrintRequest
 from machine.app.workbench.bench.values import Asked, is_number
@@ -21,11 +21,18 @@ LONGEST_PORT = 300  # letters
 
 
 Work = Coroutine[Any, Any, None]
+T = TypeVar("T")
+
+
+class OnBench(Protocol):
+    """Calls a function in the event loop of the benches."""
+
+    def __call__(self, function: Callable[[], T]) -> Awaitable[T]: ...
 
 
 @dataclass(frozen=True)
 class PageOfPrints:
-    """A page that asks: its name, its bench, the prints, and on_bench, which calls a function in the event loop of the benches.
+    """A page that asks: its name, its bench, the prints, and the way to ask the bench.
 
     The prints have an event loop of their own, so the session is read by on_bench alone: what is read at two moments from here
     may be of two benches.
@@ -34,7 +41,7 @@ class PageOfPrints:
     name: str
     session: Session
     prints: Prints
-    on_bench: Callable[[Callable[[], Order]], Awaitable[Order]]
+    on_bench: OnBench
 
 
 # Returns work that is still to be awaited where the bench must be asked; raises UserError for what cannot be done, as that does.

@@ -58,6 +58,12 @@ class Prints(Observable):
         """Journals that were found here."""
         return {str(journal.path) for journal in self._journals or ()}
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What people have named themselves, of all that is told here."""
+        journals = (name for journal in self._journals or () for name in (str(journal.path), journal.name, journal.machine))
+        return (*(name for job in self.prints for name in job.names), *sorted(self.ports_known), *journals)
+
     def snapshot(self) -> dict[str, Any]:
         """What every page is told."""
         return {

@@ -10,7 +10,7 @@ from machine.app.crash import bug_in_words
 from machine.app.printer.rescue import cancel_on_server, rescue
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.at_page import BEGIN, LEAVE
-from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
+from machine.app.workbench.printing.order import FollowOrder, HandOrder, Order, PrintOrder, ResumeOrder, State, first_state
 from machine.app.workbench.work.processes import Process, end_process, start_process
 from machine.app.workbench.work.worker import frame, read_frame
 from machine.link.pending_commands import Command
@@ -35,6 +35,14 @@ class RunningPrint:
         self._begun = isinstance(order, FollowOrder)  # by somebody else
         self._emergency = self._given_up = self._cancelled = False
         self._ended = False  # by this program, on purpose
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What people have named themselves: the model, the machine, the port, and their files."""
+        told = tuple(str(self.state[key]) for key in ("name", "machine", "port", "resumes", "journal", "log"))
+        profile = self._order.profile if isinstance(self._order, PrintOrder | HandOrder) else None
+        further = (profile.machine.name, profile.material.name, profile.process.name) if profile else ()
+        return (*told, *further, server_name(told[0]))
 
     @property
     def over(self) -> bool:

@@ -143,6 +143,9 @@ def obey(session: Session, asked: Asked) -> None:
     session.forget_problem()
     session.stopped = ""
     name, ask = asked.get("do"), asked.get("ask")
+    for named in (asked.get("name"), asked.get("ranker")):
+        if isinstance(named, str):
+            session.hear_name(named)
     command = COMMANDS.get(name) if isinstance(name, str) else None
     if command is None:
         raise PlanError(f"{name!r} is no command of the workbench: docs/workbench.md lists them")

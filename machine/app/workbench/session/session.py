@@ -37,7 +37,7 @@ from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
 from machine.app.workbench.work.kept_work import KeptWork
-from machine.app.workbench.work.received import files_in
+from machine.app.workbench.work.received import NAMES_KEPT, files_in
 from machine.app.workbench.work.models import Resting, Unscaled
 from machine.app.workbench.work.worker_pool import WorkerPools
 from machine.planning.stops import parse_stops
@@ -99,6 +99,21 @@ class Session(SessionBase):
         self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
         self.unscaled: OfUnknownUnit | None = None
+        self._named: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What people have named themselves: models, plans, profiles, and their files."""
+        bench = self.bench
+        profile, given = bench.profile, bench.given
+        of_model = () if bench.model is None else (bench.model.name, bench.model.name.removeprefix("demo:"), str(bench.model.path))
+        of_profile = (profile.machine.name, profile.material.name, profile.process.name)
+        return (*of_model, *of_profile, given.machine, given.material, given.process, *self.received.names, *self._named)
+
+    def hear_name(self, name: str) -> None:
+        """Something is asked for by a name, which messages may repeat."""
+        if name not in self._named:
+            self._named = (*self._named, name)[-NAMES_KEPT:]
 
     async def close(self) -> str:
         """End all work, tell the pages, and keep the last change. Then the files that pages have sent go; where the change could
@@ -124,6 +139,8 @@ class Session(SessionBase):
     async def open_model(self, path: Path, name: str) -> None:
         """Put the model of a file on the bench. Raises UserError as the command line tells it; where its size is none that a
         printer makes, a page is asked for its unit."""
+        self.hear_name(name)
+        self.hear_name(str(path))
         self.readiness.load()
         if self._ranking is not None and self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self._ranking.cancel()  # it would be waited for
@@ -182,6 +199,7 @@ class Session(SessionBase):
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""
+        self.hear_name(str(path))
         try:
             plan = read_plan(path)
         except PlanError as error:
@@ -190,6 +208,8 @@ class Session(SessionBase):
 
     async def take_plan(self, plan: PlanFile) -> None:
         """The same for a plan that is read already."""
+        self.hear_name(plan.name)
+        self.hear_name(plan.model)
         with self.waiting(f"cutting by {plan.name}"):
             bench = None
             while bench is not self.bench:  # another model or setting may be there meanwhile

@@ -15,6 +15,7 @@ from starlette.websockets import WebSocket
 from machine.app.crash import bug_in_words, log_bug
 from machine.app.workbench.access.limits import DEVICE, check_print_command
 from machine.app.workbench.bench.page_words import page_words, with_page_words
+from machine.app.workbench.bench.values import Asked
 from machine.app.workbench.printing.commands import PageOfPrints, Work, obey
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.workbench import Workbench
@@ -67,9 +68,10 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 
 def _told(prints: Prints) -> dict[str, Any]:
     """What every page is told, in the page's own words; what the printer says stays."""
-    state = prints.snapshot()
-    jobs = [with_page_words(job, SENTENCES) | {"webcam": bool(job["webcam"])} for job in state["prints"]]
-    return with_page_words(state, ("ports",)) | {"prints": jobs}
+    state, names = prints.snapshot(), prints.names
+    jobs = [with_page_words(job, SENTENCES, names) | {"webcam": bool(job["webcam"])} for job in state["prints"]]
+    ports = state["ports"] and [with_page_words(port, ("words", "trouble"), names) for port in state["ports"]]
+    return state | {"ports": ports, "prints": jobs}
 
 
 def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
@@ -95,8 +97,9 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
         ordering: asyncio.Task[None] | None = None
         while True:
             text = await receive(socket)
-            async with _refusals(socket):
-                asked = parsed(text, MOST_COMMAND)
+            asked = dict[str, Any]()
+            async with _refusals(socket, lambda asked=asked: _names(page, asked)):
+                asked |= parsed(text, MOST_COMMAND)
                 if DEVICE in socket.scope:
                     check_print_command(asked, page.prints.ports_known, page.prints.journals_known)
                 with_bench = obey(page, asked)
@@ -104,20 +107,25 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
                     with_bench.close()
                     raise PrinterError("what this page has ordered last still waits for its bench: wait for that first")
                 if with_bench is not None:
-                    ordering = tasks.create_task(_order(socket, with_bench))
+                    ordering = tasks.create_task(_order(socket, page, with_bench))
 
 
-async def _order(socket: WebSocket, with_bench: Work) -> None:
-    async with _refusals(socket):
+async def _order(socket: WebSocket, page: PageOfPrints, with_bench: Work) -> None:
+    async with _refusals(socket, lambda: page.on_bench(lambda: page.session.names)):
         await with_bench
 
 
+async def _names(page: PageOfPrints, asked: Asked) -> tuple[str, ...]:
+    return (*page.prints.names, *(str(asked[key]) for key in ("port", "journal", "machine") if key in asked))
+
+
 @asynccontextmanager
-async def _refusals(socket: WebSocket) -> AsyncIterator[None]:
-    """Tell the page why what it has asked for cannot be done."""
+async def _refusals(socket: WebSocket, names: Callable[[], Awaitable[tuple[str, ...]]]) -> AsyncIterator[None]:
+    """Tell the page why what it has asked for cannot be done. names: what people have named themselves, for page_words()."""
     try:
         yield
     except UserError as error:
-        await send(socket, json.dumps({"problem": page_words(str(error)), "forcible": error.forcible}))
+        problem = page_words(str(error), await names())
+        await send(socket, json.dumps({"problem": problem, "forcible": error.forcible}))
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
         await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

@@ -29,7 +29,7 @@ SENTENCES = (
 
 def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles, in the page's own words; small enough to be told whole whenever anything changes."""
-    return with_page_words(_state(session), SENTENCES)
+    return with_page_words(_state(session), SENTENCES, session.names)
 
 
 def _state(session: Session) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def _state(session: Session) -> dict[str, Any]:
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": history.now.word if history.before else "",
         "redo": history.undone[-1].word if history.undone else "",
-        "model": None if bench.model is None else _model(bench.model),
+        "model": None if bench.model is None else _model(bench.model, session.names),
         "rotation": bench.rotation,
         "scale": bench.profile.process.scale,
         "standing": standing and {"size_mm": standing.size_mm, "problem": standing.problem},
@@ -110,14 +110,14 @@ def _zones(bench: Bench) -> list[dict[str, Any]]:
     return [{"kind": kind, "number": number, **asdict(zone)} for kind, zones in kinds for number, zone in zones]
 
 
-def _model(model: Model) -> dict[str, Any]:
+def _model(model: Model, names: tuple[str, ...]) -> dict[str, Any]:
     return {
         "key": model.key,
         "name": model.name,
         "faces": model.faces,
         "size_mm": model.size_mm,
         "volume_mm3": model.volume_mm3,
-        "notes": in_page_words(model.notes),
+        "notes": in_page_words(model.notes, names),
         "drawn": model.faces <= MOST_FACES,
     }
 

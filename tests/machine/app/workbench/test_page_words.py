@@ -1,10 +1,21 @@
 """Page words: what a terminal is told by options and keys, a page is told by its own fields and labels."""
 
 import re
+from dataclasses import replace
 
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
-from machine.app.workbench.bench.page_words import in_page_words, page_words, with_page_words
+from machine.app.requests import Given
+from machine.app.workbench.bench.bench import Bench, History, Step
+from machine.app.workbench.bench.page_words import RULES, in_page_words, page_words, with_page_words
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.web.snapshot import snapshot
+from machine.app.workbench.work.worker_pool import WorkerPools
+from profiles.labels.labels import LABELS
+from profiles.profile import load
+from tests.machine.app.workbench.models import model
 
 PAIRS = [
     ("--copies is 0: 1 to 1000 is allowed", "Copies is 0: 1 to 1000 is allowed"),
@@ -73,3 +84,56 @@ def test_sentences_in_lists_and_tables_are_said_so_and_numbers_and_other_keys_st
     state = {"problem": "--copies is 0", "name": "--copies is 0", "given": {"settings": ["process.walls=4"]}, "n": 3}
     assert with_page_words(state, ("problem", "lacking")) == {**state, "problem": "Copies is 0"}
     assert in_page_words([{"a": ["--copies is 0"]}, 2, None]) == [{"a": ["Copies is 0"]}, 2, None]
+
+
+KEYS = sorted({word for key in LABELS for word in (key, key.rpartition(".")[2])})
+OPTIONS = sorted({word for pattern, _ in RULES for word in re.findall(r"--[a-z-]+", pattern)})
+PHRASES = ("(criterion II)", "compiling the kernels", "deg C", "mm2", "offset_mm is 3", "(--force)", "= 3", "1", ":", "goes on")
+NAMES = st.builds(
+    lambda words, between, suffix: between.join(words) + suffix,
+    st.lists(st.sampled_from([*KEYS, *OPTIONS, *PHRASES]), min_size=1, max_size=4),
+    st.sampled_from([" ", "_", "-", ""]),
+    st.sampled_from([".stl", ".toml", ".gcode", ""]),
+)
+SAID = (
+    "reading {}",
+    "{}: has more than 1 MiB, at most so many are taken from a page",
+    "plan tee.toml: there is no model on the workbench to cut by it: open {} first",
+    "3 copies: {} is cut into 2 parts, copies are printed in one piece each: --parts 1",
+    "uploading {}: 1.0 of 2.0 MB",
+    "{} goes on printing on octoprint:printer: this page follows it no more",
+    "{}: process.walls is -3: it must be a whole number from 0 to 50 (--force goes on)",
+)
+
+
+@given(NAMES, st.sampled_from(SAID))
+def test_a_name_that_a_person_gave_is_never_rewritten_and_all_around_it_is(name: str, said: str) -> None:
+    assert name in page_words(said.format(name), [name])
+    assume(not any(own in said for own in (name, name.rpartition(".")[0]) if own))  # else the message's own words stay, too
+    assert page_words(said.format(name), [name]) == page_words(said).replace("{}", name)
+
+
+@pytest.mark.parametrize("sentence", [
+    "process.infill_pattern is 'infill_density': 'grid' is allowed",
+    'the printer says "machine.tilt.limits_deg --force goes on"',
+    "--ranker infill_density: no such ranker",
+    "--set machine.name=infill_density",
+    "open infill_density.stl first, or line_width_mm.3mf",
+])  # fmt: skip
+def test_what_is_quoted_or_given_as_a_value_or_is_a_file_stays(sentence: str) -> None:
+    own = re.search(r"'infill_density'|\"[^\"]*\"|infill_density(?=:|$)|infill_density\.stl first, or line_width_mm\.3mf", sentence)
+    assert own is not None
+    assert own[0] in page_words(sentence)
+
+
+def test_a_page_is_told_the_names_of_its_bench_as_they_are() -> None:
+    profile = load(settings=["machine.name=line_width_mm"])
+    session = Session(profile, Given(), WorkerPools())
+    sent = session.received.new_file("walls --copies 3 infill_density.stl")
+    session.history = History(Step("", Bench(profile, replace(model(), name="infill_density", path=sent))))
+    session.busy = "reading infill_density on line_width_mm"
+    session.problems = {"": "walls --copies 3 infill_density.stl is empty; process.walls is -3"}
+    state = snapshot(session)
+    assert state["busy"] == "reading infill_density on line_width_mm"
+    assert state["problems"] == {"": "walls --copies 3 infill_density.stl is empty; Walls is -3"}
+    session.received.remove()

@@ -1,5 +1,6 @@
 """Files that pages send: how large, what is refused is not kept, and what a workbench that is killed leaves."""
 
+import json
 import os
 import signal
 import subprocess
@@ -52,7 +53,8 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
     sent = temporary / "sent"
     sent.mkdir()
     (sent / "large.stl").write_bytes(bytes(2**20 + 1))
-    (sent / "broken.stl").write_bytes(stl(tee())[:400])
+    broken = "infill_density--copies_3.stl"
+    (sent / broken).write_bytes(stl(tee())[:400])
     (sent / "tee.stl").write_bytes(stl(tee()))
     (sent / "plan.toml").write_text("nothing = [")
     with workbench("--upload-mib", "1") as bench, bench.line() as page:
@@ -60,7 +62,8 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
             bench.send(sent / "large.stl")
         problem = page.until(lambda state: state["problem"])["problem"]
         assert problem.startswith("large.stl: has more than 1 MiB, at most so many are taken from a page")
-        assert [bench.send(sent / name)[0] for name in ("broken.stl", "tee.stl", "plan.toml")] == [422, 200, 422]
+        assert [bench.send(sent / name)[0] for name in (broken, "tee.stl", "plan.toml")] == [422, 200, 422]
+        assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken}: ")  # in no words of the page's
         assert [names_in(folder) for folder in temporary.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
     assert list(temporary.glob("tiltprint-edit-*")) == []
 
