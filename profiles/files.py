@@ -76,7 +76,7 @@ def _try_lock(descriptor: int, shared: bool) -> bool | None:
 
 
 def lock_folder(folder: Path, surely: bool = False) -> int | None:
-    """Lock a folder of this user's until its descriptor is closed; None when another process holds it, or when it is somebody else's.
+    """Lock a folder of this user's until the descriptor is closed; None when another process holds it, or it is somebody else's.
 
     surely: None also where there are no locks, so that nothing is known of other processes. Raises OSError.
     """

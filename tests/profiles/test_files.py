@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
+from typing import BinaryIO
 
 import pytest
 
@@ -15,11 +16,15 @@ from profiles.files import LOCK, SHARED, lock, lock_folder, remove_locked, whole
 def test_a_file_is_the_old_one_or_the_new_one_and_nothing_stays_beside_it(tmp_path: Path) -> None:
     file = tmp_path / "work.json"
     write_whole(file, b"old")
-    with pytest.raises(OSError, match="full"), whole_file(file) as half:
+
+    def fail(half: BinaryIO) -> None:
         half.write(b"ne")
         half.flush()
         assert file.read_bytes() == b"old"
         raise OSError("full")
+
+    with pytest.raises(OSError, match="full"), whole_file(file) as half:
+        fail(half)
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("work.json", b"old")]
     write_whole(file, b"new", SHARED)
     assert file.read_bytes() == b"new"

@@ -164,8 +164,8 @@ COMMANDS: dict[str, Command] = {
 
 
 def obey(page: PageOfPrints, asked: Asked) -> Work | None:
-    """Do what a page asks for, `{"do": NAME, ...}`; the work that is left where its bench must be asked first. Both raise UserError
-    for what cannot be done."""
+    """Do what a page asks for, `{"do": NAME, ...}`. Returns the work that is left where its bench must be asked first. Raises
+    UserError for what cannot be done, as that work does."""
     name = asked.get("do")
     command = COMMANDS.get(name) if isinstance(name, str) else None
     if command is None:

@@ -14,9 +14,11 @@ from profiles.machine import Machine
 
 
 def order_of(session: Session, printing: PrintRequest, force: bool, starts: bool = True) -> PrintOrder:
-    """The G-code that the session would save, for the profile that it was made with; called in the session's event loop. Raises PlanError where there is none,
-    PrinterError for a machine or a rate that cannot print there, MoveError where the slices' dry run found errors; force: not for
-    those."""
+    """Make an order of the slices on a bench. Called in the session's event loop, so that all of it is of one moment.
+
+    force: go past errors of the dry run. Raises PlanError where there are no slices of what lies there now, PrinterError for a
+    machine or a rate that cannot print there, MoveError where the dry run found errors.
+    """
     if session.closed:
         raise PlanError("this bench is not open any more: print from another one")
     check_need(session, Need.MODEL)

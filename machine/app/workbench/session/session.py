@@ -37,8 +37,8 @@ from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
 from machine.app.workbench.work.kept_work import KeptWork
-from machine.app.workbench.work.received import NAMES_KEPT, files_in
 from machine.app.workbench.work.models import Resting, Unscaled
+from machine.app.workbench.work.received import NAMES_KEPT, files_in
 from machine.app.workbench.work.worker_pool import WorkerPools
 from machine.planning.stops import parse_stops
 from mdp.directions.turns import turned_by
@@ -106,7 +106,9 @@ class Session(SessionBase):
         """What people have named themselves: models, plans, profiles, and their files."""
         bench = self.bench
         profile, given = bench.profile, bench.given
-        of_model = () if bench.model is None else (bench.model.name, bench.model.name.removeprefix("demo:"), str(bench.model.path))
+        of_model = (
+            () if bench.model is None else (bench.model.name, bench.model.name.removeprefix("demo:"), str(bench.model.path))
+        )
         of_profile = (profile.machine.name, profile.material.name, profile.process.name)
         return (*of_model, *of_profile, given.machine, given.material, given.process, *self.received.names, *self._named)
 
