@@ -5,6 +5,7 @@ import json
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,7 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
         while True:
             text = await receive(socket)
             asked = dict[str, Any]()
-            async with _refusals(socket, lambda asked=asked: _names(page, asked)):
+            async with _refusals(socket, partial(_names, page, asked)):
                 asked |= parsed(text, MOST_COMMAND)
                 if DEVICE in socket.scope:
                     check_print_command(asked, page.prints.ports_known, page.prints.journals_known)
