@@ -23,7 +23,7 @@ from typing import Any, Self
 from uuid import uuid4
 from zlib import crc32
 
-from machine.link.incomplete_mark import (
+from machine.link.disk.incomplete_mark import (
     BINARY,
     MARK,
     is_at,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.link import incomplete_mark
+from machine.link.disk import incomplete_mark
 from machine.link.journal import Checkpoint, Journal
 
 

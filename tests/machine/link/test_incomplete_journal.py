@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from machine.link import incomplete_mark
 from machine.link import journal as journal_module
+from machine.link.disk import incomplete_mark
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from profiles.errors import JournalError, OutputError
 from tests.machine.link.failing_disk import FailingDisk, full_disk, keep_notes_in, small_disk
