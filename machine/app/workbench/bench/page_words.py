@@ -95,16 +95,21 @@ def page_words(sentence: str, names: Iterable[str] = ()) -> str:
         kept[letter := next(free)] = own[0]
         return letter
 
-    rewritten = _rewritten(_own(tuple(names)).sub(stand_in, sentence))
+    rewritten = _rewritten(_own(sentence, tuple(names)).sub(stand_in, sentence))
     return "".join(kept.get(letter, letter) for letter in rewritten) if kept else rewritten
 
 
-@lru_cache(maxsize=64)
-def _own(names: tuple[str, ...]) -> re.Pattern[str]:
+def _own(sentence: str, names: tuple[str, ...]) -> re.Pattern[str]:
     """Where a sentence has something of a person's own: the longest names first, and none inside of a longer word."""
-    known = {form for name in names for form in (name, PurePath(name).name, PurePath(name).stem) if _is_at_risk(form)}
-    called = "|".join(map(re.escape, sorted(known, key=len, reverse=True)))
+    called = "|".join(re.escape(name) for name in _at_risk(names) if name in sentence)
     return re.compile(rf"(?<![\w.])(?:{called})(?!\w)|{_VALUES}" if called else _VALUES)
+
+
+@lru_cache(maxsize=64)
+def _at_risk(names: tuple[str, ...]) -> tuple[str, ...]:
+    """All forms of names in which a rule may find something, the longest first."""
+    forms = {form for name in names for form in (name, PurePath(name).name, PurePath(name).stem) if _is_at_risk(form)}
+    return tuple(sorted(forms, key=len, reverse=True))
 
 
 def _is_at_risk(name: str) -> bool:

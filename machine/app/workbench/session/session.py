@@ -26,7 +26,7 @@ from machine.app.workbench.bench.bench import (
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.settings import check_block, profile_as_given, with_typed
-from machine.app.workbench.session.base import SessionBase, asking
+from machine.app.workbench.session.base import LONGEST_SENTENCE, SessionBase, asking
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.keeping import Keeping
@@ -114,7 +114,7 @@ class Session(SessionBase):
 
     def hear_name(self, name: str) -> None:
         """Something is asked for by a name, which messages may repeat."""
-        if name not in self._named:
+        if name not in self._named and len(name) <= LONGEST_SENTENCE:
             self._named = (*self._named, name)[-NAMES_KEPT:]
 
     async def close(self) -> str:

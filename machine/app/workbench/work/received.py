@@ -19,7 +19,7 @@ BEGUN_S = 60.0  # an empty folder as new as this may be of a program that starts
 KEPT_S = 24 * 3600.0  # what lay on the benches of a program that was killed: nobody else may have it
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
-NAMES_KEPT = 50
+NAMES_KEPT = 20
 
 
 class Received:
