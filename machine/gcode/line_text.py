@@ -46,6 +46,10 @@ LETTERS = {
     "°": " deg ", "–": "-", "—": "-", "‘": "'", "’": "'", "“": "'", "”": "'", "„": "'", "×": "x", "·": "-", "€": "EUR",
 }  # fmt: skip
 
+# Comments that begin layers and parts: the dry run, the sender and the journal read them alike.
+LAYER = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}")  # PrusaSlicer's word and ours, Cura's
+PART = re.compile(r"PART: *([0-9]{1,6})(?: of ([0-9]{1,6}))?.*")
+
 
 class LineText(NamedTuple):
     """command: as it is sent, "" where the line has none; comment: what follows its `;`."""
@@ -197,3 +201,14 @@ def _joined(code: str, words: list[tuple[str, str]]) -> str:
     return " ".join(
         f"{command_name(letter + number) if letter in 'GMT' else letter + number.lstrip('+')}" for letter, number in words
     )
+
+
+def begins_layer(comment: str) -> bool:
+    """Whether a comment, its sign and the blanks around it taken off, begins a layer."""
+    return LAYER.fullmatch(comment) is not None
+
+
+def begun_part(comment: str) -> tuple[int, int] | None:
+    """The part that such a comment begins, from 1, and of how many, 0 where it does not tell; None for another comment."""
+    match = PART.fullmatch(comment)
+    return (int(match[1]), int(match[2] or 0)) if match else None

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from machine.gcode.landmarks import begins_layer, begun_part
-from machine.gcode.line_text import read_line
+from machine.gcode.line_text import begins_layer, begun_part, read_line
 from machine.gcode.words import read_words, split_command
 from machine.link.protocol.events import Temperature
 from machine.link.protocol.framing import LINE_LIMIT

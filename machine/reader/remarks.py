@@ -2,7 +2,7 @@
 
 import re
 
-from machine.gcode.landmarks import begins_layer, begun_part
+from machine.gcode.line_text import begins_layer, begun_part
 from machine.gcode.part_totals import KEY, read_totals
 from machine.reader.parsed import Unheld
 from machine.reader.state import Reader
