@@ -252,7 +252,7 @@ def test_an_override_outside_its_limits_is_refused_with_what_is_allowed(wish: Co
 
 @pytest.mark.parametrize("text", [
     "M110 N5", "M112", "M0", "G28", "G28 X", "g28", "G1 A5", "G0 Z0", "G1 X5 E1", "G92 E0", "G91", "M82", "T1", "M84", "M18 E",
-    "MANUAL_STEPPER STEPPER=stepper_a MOVE=3", "HOME_AB", "G1 X1*5", "M117 schön", "", "; nothing", "M600",
+    "MANUAL_STEPPER STEPPER=stepper_a MOVE=3", "HOME_AB", "G1 X1*5", "M104 S200ö", "", "; nothing", "M600",
 ])  # fmt: skip
 def test_a_line_that_would_spoil_the_print_is_not_sent(text: str) -> None:
     watcher = watched({100: (Command.LINE, 100.0, text), 120: Command.PAUSE, "paused": Command.RESUME})
