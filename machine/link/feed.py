@@ -29,6 +29,7 @@ PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
+WORTH_S = 0.3  # a planner that takes less to run empty is not asked the next time; a simulated one as fast as it goes takes none
 WATCH_S, WATCH_MOST_S = 0.02, 5.0  # the least time between questions how many moves wait, and how long they may bring no news
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
@@ -49,7 +50,7 @@ class Feed:
         self._job, self._journal, self._on_progress = job, journal, on_progress
         machine = job.profile.machine if job.profile is not None else None
         self.modal, self._position = ModalState(axes_of(machine)), ProgramPosition()
-        self._planner = PlannerReports()
+        self._planner, self._worth_following, self._reports_stand_still = PlannerReports(), False, False
         self.history = LineHistory(planner=self._planner)
         self._bounds = PrintedBounds(machine) if machine is not None else None
         self._pending = PendingCommands(self.modal.axes, job.limit, control, stop)
@@ -169,9 +170,12 @@ class Feed:
 
     def _end_moves(self) -> None:
         """Wait until every move sent so far is over."""
+        begun_s, waiting = self.exchange.medium.now_s(), self.history.waiting
         self._follow_moves()
         self.exchange.drain()
         self._note_end()
+        if waiting > 1 and not self._reports_stand_still:
+            self._worth_following = self.exchange.medium.now_s() - begun_s >= WORTH_S
 
     def _note_end(self) -> None:
         """Every move is over: the question that was answered last came after M400."""
@@ -181,12 +185,12 @@ class Feed:
         """Wait while more than one move is planned, so far as the printer reports that, and keep the journal up with them."""
         exchange, history = self.exchange, self.history
         waiting, news_s = inf, exchange.medium.now_s()
-        while history.tracked and self._journal is not None and history.waiting > 1:
+        while self._worth_following and history.tracked and self._journal is not None and history.waiting > 1:
             if history.waiting < waiting:
                 waiting, news_s = history.waiting, exchange.medium.now_s()
                 self._record()
             elif exchange.medium.now_s() - news_s > WATCH_MOST_S:
-                break
+                self._worth_following, self._reports_stand_still = False, True
             else:
                 exchange.wait(max(WATCH_S, (exchange.medium.now_s() - news_s) / 2))
             exchange.send("M114")  # its ok reports the planner, it waits for nothing and changes nothing

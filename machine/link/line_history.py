@@ -11,6 +11,7 @@ MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any 
 # Marlin drops a move of fewer than MIN_STEPS_PER_SEGMENT (6) steps on every axis and adds it to the next one (planner.cpp). One
 # of twice as many has a block of its own whatever was dropped before: X Y Z and E in mm at 80 steps, tilt and turn in deg at 8.
 OWN_BLOCK = (0.15, 0.15, 0.15, 1.5, 1.5, 0.15)
+SMALLEST_PLANNER = 3  # places; a printer that reports fewer while nothing moves does not report what it means
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not report what it has executed
 
@@ -44,7 +45,7 @@ class PlannerReports:
 
     def rest(self) -> None:
         """Nothing moves: all places are free."""
-        if self.reported and self._free == self._idle_free:
+        if SMALLEST_PLANNER <= self._free == self._idle_free:
             self._places = self._free
         self._idle_free = self._free
 

@@ -247,6 +247,40 @@ def test_after_a_power_cut_few_moves_are_done_twice_and_the_height_is_known_whil
     assert len(at) == 1 or record.end[-1, 5] <= record.start[-1, 5]
 
 
+class _Frozen:
+    """A wire whose printer reports a full planner whatever is in it."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire, self.name, self.write = wire, wire.name, wire.write
+        self.discard, self.close = wire.discard, wire.close
+
+    def read(self) -> bytes:
+        return re.sub(rb" P\d+ ", b" P0 ", self._wire.read())
+
+
+def seconds_of_a_print(text: GcodeFile, journal: str, wrap: Callable[[Wire], Wire]) -> float:
+    printer = VirtualPrinter(PROFILE.machine)
+    medium = replace(printer.medium, open=lambda name, baud: wrap(printer.medium.open(name, baud)))
+    with journal_of(text, journal) as written:
+        print_lines(text, PATH, medium=medium, profile=PROFILE, journal=written)
+    return printer.now_s
+
+
+def test_a_printer_whose_reports_stand_still_is_waited_for_once(text: GcodeFile) -> None:
+    usual_s = seconds_of_a_print(text, "usual", lambda wire: wire)
+    assert seconds_of_a_print(text, "frozen", _Frozen) - usual_s < 10.0
+
+
+def test_a_simulated_printer_as_fast_as_it_goes_is_not_asked_how_many_moves_wait(text: GcodeFile) -> None:
+    sent: list[bytes] = []
+    with SimulatedPrinter(PROFILE.machine) as printer, journal_of(text, "fast") as journal:
+        medium = tap(lambda way, data: sent.append(data) if way == ">" else None)
+        print_lines(text, printer.path, profile=PROFILE, journal=journal, medium=medium)
+    written = b"".join(sent)
+    assert written.count(b"G1 X") > 100
+    assert written.count(b" M114*") < 10
+
+
 def doubtful(text: GcodeFile, journal: Path, printer: SimulatedPrinter) -> None:
     assert main(["print", str(text.path), "--port", printer.path, "--journal", str(journal), "--force"]) == 1
 
