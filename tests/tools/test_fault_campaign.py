@@ -66,7 +66,7 @@ def test_a_sender_that_repeats_something_else_is_caught(monkeypatch: pytest.Monk
 
 
 def test_a_host_that_only_says_that_it_switched_the_heaters_off_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.link.stream.heaters_off", lambda *given, **named: Heaters.OFF)
+    monkeypatch.setattr("machine.link.shutdown.heaters_off", lambda *given, **named: Heaters.OFF)
     monkeypatch.setattr(fault_campaign, "script", lambda seed, lines: FaultScript((Fault("error", 40),)))
     assert trial(4, 80).wrong == ("a heater is on",)
 
