@@ -23,7 +23,8 @@ NAMES = shipped("machine")
 HOMED = [name for name in NAMES if not dialect_of(load(name).machine).homed_before]
 # Written from each firmware's own documentation, not from the table.
 HEATING = {
-    "marlin": ("M104 S200", "M104 I1", "M109 S200", "M109 R0", "M140 S60", "M190 S60", "M190 R20", "M141 S40", "M191 S40"),
+    "marlin": ("M104 S200", "M104 I1", "M109 S200", "M109 R0", "M140 S60", "M190 S60", "M190 R20", "M141 S40", "M191 S40",
+               "N10 M104 S200"),
     "reprapfirmware": (
         "M104 S200", "M109 S200", "M116", "M116 P0", "M140 S60", "M140 S60 R30", "M141 S40", "M190 S60", "M191 S40",
         "G10 P0 S210", "G10 P0 R210", "G10 P0 S0 R180", "G10 S210", "M568 P0 S210", "M568 P0 A2", "M104 S{var.hot}",
@@ -37,7 +38,7 @@ HEATING = {
     "grblhal": ("M104 S200", "M109 S200", "M140 S60", "M190 S60"),
 }  # fmt: skip
 UNSURE = {
-    "marlin": ("G29", "G26 H200", "M303 S200", "M600", "M701", "M24", "PRINT_START", "M2000", "N10 M104 S200"),
+    "marlin": ("G29", "G26 H200", "M303 S200", "M600", "M701", "M24", "PRINT_START", "M2000"),
     "reprapfirmware": ('M98 P"prime.g"', "M144 S1", "G32", "M703", "M1234", "if true", 'M32 "print.g"'),
     "klipper": (
         "PRINT_START BED=60 EXTRUDER=215",
