@@ -39,8 +39,22 @@ def run_faces(solid: Solid) -> list[tuple[int, Ints]]:
 
 
 def cut(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
-    """The solid above the plane and the solid below it; their volumes add up."""
-    return above(solid, plane), below(solid, plane)
+    """What a plane cuts off a solid, all of it above the plane or the limbs that it names, and the rest; their volumes add up."""
+    if plane.limbs_mm is None:
+        return above(solid, plane), below(solid, plane)
+    limbs, standing = divide(above(solid, plane), plane.limbs_mm)
+    return limbs, below(solid, plane) + standing
+
+
+def divide(upper: Solid, points_mm: Floats) -> tuple[Solid, Solid]:
+    """The pieces of a solid that lie nearest to (k, 3) points, and its other pieces; a void goes with the piece around it."""
+    pieces = upper.decompose()
+    bodies = [piece for piece in pieces if piece.volume() > 0.0]
+    meshes = [mesh_of(body) for body in bodies]
+    named = {min(range(len(bodies)), key=lambda k: meshes[k].distance_mm(point)) for point in points_mm} if bodies else set()
+    limbs = m3.Manifold.compose([body for k, body in enumerate(bodies) if k in named])
+    standing = m3.Manifold.compose([body for k, body in enumerate(bodies) if k not in named])
+    return (limbs, standing) if len(bodies) == len(pieces) else (upper ^ limbs, upper ^ standing)
 
 
 def above(solid: Solid, plane: Plane) -> Solid:

@@ -136,14 +136,14 @@ class Decomposition:
             raise DecompositionError(f"the parts of {self.name} add up to {together:.6g} mm3, the model has {whole:.6g} mm3")
 
     def _check_order(self) -> None:
-        """A part lies above its base plane, everything printed before it lies below."""
+        """A part lies above its base plane; everything printed before it lies below, unless the part is a limb."""
         for position, part in enumerate(self.parts):
             if part.index != position + 1:
                 raise DecompositionError(f"part {part.index} of {self.name} stands at place {position + 1} of the print order")
             lowest = float(part.base.heights_mm(part.mesh.vertices).min())
             if lowest < -ORDER_TOLERANCE_MM:
                 raise DecompositionError(f"part {part.index} of {self.name} reaches {-lowest:.4g} mm below its base plane")
-            for earlier in self.parts[:position]:
+            for earlier in self.parts[:position] if part.base.limbs_mm is None else ():
                 highest = float(np.max(part.base.heights_mm(earlier.mesh.vertices)))
                 if highest > ORDER_TOLERANCE_MM:
                     raise DecompositionError(

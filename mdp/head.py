@@ -7,10 +7,12 @@ right.
 
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from mdp.directions.spread import spread
+from mdp.kernels.kernel import borrower
 from mdp.mesh import Floats
 from mdp.pose import UP
 from profiles.frozen import Vector
@@ -50,6 +52,32 @@ class Block:
 
 
 Body = Ring | Block
+
+
+class Head(NamedTuple):
+    """The head for kernels: (k, 2) radii and heights of the hot end's lowest points, and (j, 6) boxes that go with the tip: least,
+    greatest x y z."""
+
+    silhouette: Floats
+    boxes: Floats
+
+
+def head_of(machine: Machine) -> Head:
+    """The machine's head as the kernels take it."""
+    boxes = np.array([[*box.min_mm, *box.max_mm] for box in machine.head.boxes], dtype=np.float64).reshape(-1, 6)
+    return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes)
+
+
+@borrower
+def lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
+    """Height above the tip of the hot end's lowest point at a radius; a great number beyond its widest."""
+    if radius <= silhouette[0, 0]:
+        return float(silhouette[0, 1])
+    for k in range(len(silhouette) - 1):
+        if radius <= silhouette[k + 1, 0]:
+            share = (radius - silhouette[k, 0]) / (silhouette[k + 1, 0] - silhouette[k, 0])
+            return float(silhouette[k, 1] + share * (silhouette[k + 1, 1] - silhouette[k, 1]))
+    return 1e9
 
 
 def bodies(machine: Machine) -> tuple[Body, ...]:

@@ -103,6 +103,25 @@ class Mesh:
         vertices = self.vertices @ np.asarray(rotation, dtype=np.float64).T + np.asarray(shift_mm, dtype=np.float64)
         return Mesh(vertices, self.faces, self.colours)
 
+    def nearest_face(self, point: Floats) -> tuple[int, float]:
+        """The face with area that is nearest to a point (3,), the first of several, and its distance, mm."""
+        corners = self.vertices[self.faces] - point
+        edges = np.roll(corners, -1, axis=1) - corners
+        lengths = np.einsum("fki,fki->fk", edges, edges)
+        share = np.clip(-np.einsum("fki,fki->fk", corners, edges) / np.where(lengths > 0.0, lengths, 1.0), 0.0, 1.0)
+        least = np.linalg.norm(corners + share[..., None] * edges, axis=2).min(axis=1)
+        sides = np.einsum("fki,fki->fk", np.cross(corners, edges), self.normals[:, None])  # of the point's shadow on the face
+        height = np.abs(np.einsum("fi,fi->f", corners[:, 0], self.normals))
+        distance = np.where((sides >= 0.0).all(axis=1), height, least)
+        distance[self.areas_mm2 == 0.0] = np.inf
+        face = int(np.argmin(distance))
+        return face, float(distance[face])
+
+    def distance_mm(self, point: Floats) -> float:
+        """Distance of a point (3,) from the surface; 0 at a vertex."""
+        at_vertex = (self.vertices == point).all(axis=1).any()
+        return 0.0 if at_vertex else self.nearest_face(point)[1]
+
     def to_trimesh(self) -> "Trimesh":
         """The same as a trimesh.Trimesh, the door to other programs; vertices and faces stay as they are."""
         from trimesh import Trimesh

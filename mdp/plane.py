@@ -34,12 +34,14 @@ def unit_direction(x: float, y: float, z: float) -> Vector | None:
 class Plane:
     """The points p with normal . p = offset_mm; normal (3,) is the printing direction above the plane.
 
-    A normal of another length than 1 is scaled to it; offset_mm is along the scaled one. Raises PlanError for a normal that
+    limbs_mm: (k, 3) a point on each limb that a cut takes off, where it leaves other pieces above the plane standing; None: it
+    takes all that lies above. A normal of another length than 1 is scaled to it; offset_mm is along the scaled one. Raises PlanError for a normal that
     `unit_direction` refuses.
     """
 
     normal: Floats
     offset_mm: float
+    limbs_mm: Floats | None = None
 
     def __post_init__(self) -> None:
         given = np.asarray(self.normal, dtype=np.float64).tolist()
@@ -49,6 +51,10 @@ class Plane:
         normal = np.array(direction)
         normal.setflags(write=False)
         object.__setattr__(self, "normal", normal)
+        if self.limbs_mm is not None:
+            limbs_mm = np.array(self.limbs_mm, dtype=np.float64).reshape(-1, 3)
+            limbs_mm.setflags(write=False)
+            object.__setattr__(self, "limbs_mm", limbs_mm)
 
     def heights_mm(self, points: Floats) -> Floats:
         """(n,) signed distances of (n, 3) points, positive on the printed side.

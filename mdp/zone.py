@@ -129,7 +129,7 @@ class Grown:
 
     def faces(self, mesh: Mesh) -> Mask:
         """(m,) which faces of a mesh they are; those without area count where they link others."""
-        face = nearest_face(mesh, np.array(self.point_mm))[0]
+        face = mesh.nearest_face(np.array(self.point_mm))[0]
         alike = mesh.normals @ mesh.normals[face] >= cos(radians(self.angle_deg)) - ROUNDING_COSINE
         alike |= mesh.areas_mm2 == 0.0
         pairs = edges_of(mesh.faces.astype(np.int64)).twins // 3
@@ -140,22 +140,7 @@ class Grown:
 
     def away_mm(self, mesh: Mesh) -> float:
         """How far from the surface the point lies."""
-        return nearest_face(mesh, np.array(self.point_mm))[1]
-
-
-def nearest_face(mesh: Mesh, point: Floats) -> tuple[int, float]:
-    """The face with area that is nearest to a point (3,), the first of several, and its distance, mm."""
-    corners = mesh.vertices[mesh.faces] - point
-    edges = np.roll(corners, -1, axis=1) - corners
-    lengths = np.einsum("fki,fki->fk", edges, edges)
-    share = np.clip(-np.einsum("fki,fki->fk", corners, edges) / np.where(lengths > 0.0, lengths, 1.0), 0.0, 1.0)
-    least = np.linalg.norm(corners + share[..., None] * edges, axis=2).min(axis=1)
-    sides = np.einsum("fki,fki->fk", np.cross(corners, edges), mesh.normals[:, None])  # of the point's shadow on the face
-    height = np.abs(np.einsum("fi,fi->f", corners[:, 0], mesh.normals))
-    distance = np.where((sides >= 0.0).all(axis=1), height, least)
-    distance[mesh.areas_mm2 == 0.0] = np.inf
-    face = int(np.argmin(distance))
-    return face, float(distance[face])
+        return mesh.nearest_face(np.array(self.point_mm))[1]
 
 
 AnyZone = Zone | Painted | Grown

@@ -7,7 +7,7 @@ from pydantic import Field
 from profiles.frozen import Frozen
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
-OF_SCARS = {"seam_mm": 0.0, "nozzle_load_n": 0.0}  # what the paper's terms do not know
+OF_SCARS = {"seam_mm": 0.0, "nozzle_load_n": 0.0, "single_limb": False}  # what the paper's terms do not know
 OF_SEAMS = {
     "cut_mm2": 0.0,
     "second_mm2": 0.0,
@@ -182,6 +182,11 @@ class Search(Frozen):
     )
     count_platform_faces: bool = Field(
         False, description="true: faces standing on the platform count as risky (the authors' terms)"
+    )
+    single_limb: bool = Field(
+        True,
+        description="a cut may take single limbs off and leave others standing beside them, where the head passes clear; false: "
+        "it takes all that lies above its plane",
     )
     clearance: bool = Field(True, description="false: the head's bodies and the axis limits are ignored (the authors' terms)")
 

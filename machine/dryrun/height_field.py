@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.head import Head, lowest_of_hot_end
 from mdp.kernels.kernel import borrower
 from mdp.mesh import Floats
 from slicer.geometry.segments import Segment, squared_distance
@@ -31,13 +32,6 @@ class Field(NamedTuple):
     owner: NDArray[np.int32]
     coarse: Floats
     highest: Floats
-
-
-class Head(NamedTuple):
-    """(k, 2) radii and heights of the hot end's lowest points, and (j, 6) boxes that go with the tip: least, greatest x y z."""
-
-    silhouette: Floats
-    boxes: Floats
 
 
 def empty_field(low: Floats, high: Floats) -> Field:
@@ -90,18 +84,6 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
 
 
 @borrower
-def _lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
-    """Height above the tip of the hot end's lowest point at a radius; a great number beyond its widest."""
-    if radius <= silhouette[0, 0]:
-        return float(silhouette[0, 1])
-    for k in range(len(silhouette) - 1):
-        if radius <= silhouette[k + 1, 0]:
-            share = (radius - silhouette[k, 0]) / (silhouette[k + 1, 0] - silhouette[k, 0])
-            return float(silhouette[k, 1] + share * (silhouette[k + 1, 1] - silhouette[k, 1]))
-    return 1e9
-
-
-@borrower
 def _distance_across(px: float, py: float, a: Point, b: Point) -> float:
     """Distance across, in X and Y alone, of a point from a move."""
     return float(np.sqrt(squared_distance(Segment(a[0], a[1], b[0], b[1]), px, py)))
@@ -132,7 +114,7 @@ def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point,
     """
     px, py, half, rise = column
     deepest = 0.0
-    depth = rise - _lowest_of_hot_end(max(_distance_across(px, py, a, b) - 1.4143 * half, 0.0), head.silhouette)
+    depth = rise - lowest_of_hot_end(max(_distance_across(px, py, a, b) - 1.4143 * half, 0.0), head.silhouette)
     if depth > slack:
         deepest = depth
     for k in range(len(head.boxes)):

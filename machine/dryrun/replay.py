@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.height_field import NOTHING, Field, Head, depth_of, empty_field, lay_bead
+from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, lay_bead
 from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
 from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pieces, pose_runs
+from mdp.head import Head, head_of
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -84,12 +85,6 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
             _replay_run(run.rows, moves, strokes, about, contacts, np.zeros((len(run.rows), 2)))
             del field, about  # before there is another one
     return contacts
-
-
-def head_of(machine: Machine) -> Head:
-    """The machine's head as the kernels take it."""
-    boxes = np.array([[*box.min_mm, *box.max_mm] for box in machine.head.boxes]).reshape(-1, 6)
-    return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes)
 
 
 def _field(

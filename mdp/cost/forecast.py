@@ -22,6 +22,7 @@ from mdp.plane import Plane
 from mdp.stairs import step_share
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
 from mdp.sweep.cylinders import crossings
+from mdp.sweep.limbs import cylinders_cut, limb_reach
 from mdp.sweep.rims import ROUNDING_MM, weigh_chord
 from mdp.sweep.sweep import Remainder
 
@@ -29,16 +30,24 @@ LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face p
 
 
 class Planes(NamedTuple):
-    """Planes in the order of their cuts: (k, 3) normals and (k,) offsets."""
+    """Planes in the order of their cuts: (k, 3) normals, (k,) offsets, and (k, m) which of the faces each may cut, (0, 0): all."""
 
     directions: Floats
     offsets_mm: Floats
+    reach: Mask
 
 
-def planes_of(planes: Sequence[Plane]) -> Planes:
+def planes_of(planes: Sequence[Plane], reach: Mask) -> Planes:
     """Planes for kernels."""
     directions = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
-    return Planes(directions, np.array([plane.offset_mm for plane in planes], dtype=np.float64))
+    return Planes(directions, np.array([plane.offset_mm for plane in planes], dtype=np.float64), reach)
+
+
+def reach_of(remainder: Remainder, planes: Sequence[Plane], chosen: Mask) -> Mask:
+    """(k, m) which of the chosen faces of a solid each plane may cut: those of its limbs and below them; (0, 0): all of them."""
+    if all(plane.limbs_mm is None for plane in planes):
+        return np.zeros((0, 0), np.bool_)
+    return np.stack([limb_reach(remainder, plane)[chosen] for plane in planes])
 
 
 class Faces(NamedTuple):
@@ -85,6 +94,7 @@ class Surface:
     remainder: Remainder
     faces: Faces
     terms: CostTerms
+    chosen: Mask
 
     @classmethod
     def of(cls, remainder: Remainder, terms: CostTerms) -> "Surface":
@@ -95,27 +105,32 @@ class Surface:
         if weights is not None:
             chosen = np.ones(count, dtype=np.bool_)
         seam_mm2 = np.zeros(count) if weights is None else terms.seam_mm * weights
-        return cls(remainder, faces_of(remainder, terms, seam_mm2, chosen), terms)
+        return cls(remainder, faces_of(remainder, terms, seam_mm2, chosen), terms, chosen)
 
     def classes(self, planes: Sequence[Plane]) -> Classes:
         """(k, n) what the faces of the model need along the planes' normals."""
-        return self.remainder.classes(planes_of(planes).directions)
+        return self.remainder.classes(np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3))
 
-    def left_mm2(self, planes: Sequence[Plane], classes: Classes | None = None) -> float:
+    def reach(self, planes: Sequence[Plane]) -> Mask:
+        """Which of the faces each plane may cut, see reach_of."""
+        return reach_of(self.remainder, planes, self.chosen)
+
+    def left_mm2(self, planes: Sequence[Plane], classes: Classes | None = None, reach: Mask | None = None) -> float:
         """What cuts along the planes, in this order, would cost: the area left that needs support, the seams, the
         stairs, and each cut.
 
-        classes: those of planes that lean a little otherwise; absent: the planes' own.
+        classes, reach: those of planes that lean a little otherwise; absent: the planes' own.
         """
         needs = self.classes(planes) if classes is None else classes
         cuts_mm2 = self.terms.cut_mm2 * len(planes) + self._crossed_mm2(planes)
-        return _sum_left(self.faces, planes_of(planes), needs) + cuts_mm2
+        return _sum_left(self.faces, planes_of(planes, self.reach(planes) if reach is None else reach), needs) + cuts_mm2
 
     def _crossed_mm2(self, planes: Sequence[Plane]) -> float:
         """What it costs that bores are cut askew, each as long as something of it is left."""
         left, crossed = self.remainder.cylinders if self.terms.feature_mm2 > 0.0 else (), 0.0
         for plane in planes:
-            crossed += float(crossings(left, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])
+            cut = cylinders_cut(self.remainder, left, plane)
+            crossed += float(crossings(cut, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])
             left = tuple(cylinder for cylinder in left if cylinder.reaches_below(plane))
         return self.terms.feature_mm2 * crossed
 
@@ -133,6 +148,8 @@ def _sum_left(surface: Faces, planes: Planes, classes: Classes) -> float:
             for axis in range(3):
                 polygon[corner, axis] = corners[face, corner, axis]
         for cut in range(len(directions)):
+            if len(planes.reach) > 0 and not planes.reach[cut, face]:
+                continue
             lowest, highest = find_heights(polygon, size, planes, cut, heights)
             if highest <= 0.0:
                 continue

@@ -80,13 +80,13 @@ def needing_upright(mesh: Mesh, profile: Profile) -> Mask:
     return needing
 
 
-def excess_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane) -> float:
+def excess_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane, cut: Mask) -> float:
     """By how much what needs support above a plane along its normal counts more than its area: over nothing but air, and where
-    none is wanted. mesh: what the plane cuts."""
+    none is wanted. mesh: what the plane cuts; cut: (m,) those of its faces that it may cut."""
     classes, counts = pieces.along(plane.normal), 1.0 if pieces.counts is None else pieces.counts
     times = np.where(classes == UNSUPPORTABLE, pieces.need.weight, 1.0) * counts
     risky = facing_down(mesh, plane.normal, pieces.need.process.self_supporting_angle_deg)
-    chosen = np.flatnonzero(risky & (classes != CARRIES_ITSELF) & (times != 1.0))
+    chosen = np.flatnonzero(cut & risky & (classes != CARRIES_ITSELF) & (times != 1.0))
     low, middle, high = np.sort(plane.heights_mm(mesh.vertices)[mesh.faces[chosen]], axis=1).T
     with np.errstate(divide="ignore", invalid="ignore"):
         lower, upper = low * low / ((middle - low) * (high - low)), high * high / ((high - middle) * (high - low))

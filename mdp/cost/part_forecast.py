@@ -25,6 +25,7 @@ from mdp.cost.forecast import (
     find_heights,
     flat_area_mm2,
     planes_of,
+    reach_of,
     weight_along,
 )
 from mdp.kernels.arrays import floats, ints, table
@@ -67,7 +68,8 @@ class ModelForecast:
     def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
         """The parts that planes cut off, in the order of the cuts, and the area of what remains that needs support printed
         straight up, mm2."""
-        cuts = planes_of(planes)
+        every = np.ones(len(self.faces.areas_mm2), np.bool_)
+        cuts = planes_of(planes, reach_of(self.remainder, planes, every))
         directions = cuts.directions
         apexes = self.middle - (directions @ self.middle - cuts.offsets_mm)[:, None] * directions
         meeting = np.zeros((len(planes), len(planes)))
@@ -139,6 +141,9 @@ def _divide(surface: Faces, cuts: Cuts, room: Room, face: int, waiting: int, sum
             polygon[corner, axis] = room.corners[3 * waiting + corner, axis]
     area = flat_area_mm2(polygon, size, normals, row)
     while cut < len(directions) and size > 0:
+        if len(cuts.planes.reach) > 0 and not cuts.planes.reach[cut, face]:
+            cut += 1
+            continue
         lowest, highest = find_heights(polygon, size, cuts.planes, cut, heights)
         if highest > 0.0:
             cosine, left = along(normals, row, directions, cut), 0.0

@@ -33,8 +33,10 @@ class Mirror:
 
     def image(self, plane: Plane) -> Plane:
         """A plane's mirror image."""
-        across = float(plane.normal @ self.normal)
-        return Plane(plane.normal - 2.0 * across * self.normal, plane.offset_mm - 2.0 * across * self.offset_mm)
+        across, limbs_mm = float(plane.normal @ self.normal), plane.limbs_mm
+        if limbs_mm is not None:
+            limbs_mm = limbs_mm - 2.0 * (limbs_mm @ self.normal - self.offset_mm)[:, None] * self.normal
+        return Plane(plane.normal - 2.0 * across * self.normal, plane.offset_mm - 2.0 * across * self.offset_mm, limbs_mm)
 
     def upright(self, plane: Plane, middle: Floats) -> Plane | None:
         """The plane next to a given one that is its own image and meets it at a point; None where it leans far across."""
@@ -44,7 +46,7 @@ class Mirror:
         normal = plane.normal - across * self.normal
         on_plane = middle - plane.heights_mm(middle[None])[0] * plane.normal
         normal = normal / np.linalg.norm(normal)
-        return Plane(normal, float(normal @ on_plane))
+        return Plane(normal, float(normal @ on_plane), plane.limbs_mm)
 
 
 def find_mirrors(mesh: Mesh) -> list[Mirror]:

@@ -17,6 +17,7 @@ from mdp.directions.spread import spread
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
+from mdp.sweep.limbs import LimbSums
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import Patches, Zone, spans_mm
 from profiles.machine import Machine
@@ -192,23 +193,23 @@ def score_candidates(
     )
 
 
-def residual_mm2(swept: Gains, terms: CostTerms) -> Floats:
+def residual_mm2(swept: Gains | LimbSums, terms: CostTerms) -> Floats:
     """What each cut costs for ever, see CutCost."""
     return swept.residual_mm2 + swept.stairs_mm2 + seam_mm2(swept, terms)
 
 
-def lost_mm2(swept: Gains, residual_mm2: Floats) -> Floats:
+def lost_mm2(swept: Gains | LimbSums, residual_mm2: Floats) -> Floats:
     """What of that each cut has made worse. Every surface has stairs whichever way it is printed, so large parts would be
     shunned for those that they had before."""
     return residual_mm2 - np.minimum(swept.stairs_mm2, swept.stairs_up_mm2)
 
 
-def gain_mm2(swept: Gains, residual_mm2: Floats) -> Floats:
+def gain_mm2(swept: Gains | LimbSums, residual_mm2: Floats) -> Floats:
     """What each cut saves on the whole."""
     return swept.up_mm2 + swept.stairs_up_mm2 - residual_mm2
 
 
-def seam_mm2(swept: Gains, terms: CostTerms) -> Floats:
+def seam_mm2(swept: Gains | LimbSums, terms: CostTerms) -> Floats:
     """The scar of each cut's seam, the bores that it cuts askew, and that it is made."""
     return terms.seam_mm * swept.rim_mm + terms.feature_mm2 * swept.crossed + terms.cut_mm2
 

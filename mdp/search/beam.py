@@ -58,7 +58,8 @@ class Beam:
         self.nodes: list[Node | None] = [problem.start] + [None] * (width - 1)
         self.bests = [problem.start] * width
         self.front = Front(problem.start)
-        self._branches: list[Branch | None] = [self._branch(problem.start, 0)]
+        self.first = self._branch(problem.start, 0)
+        self._branches: list[Branch | None] = [self.first]
         self._seen = {problem.start.signature: 0}  # solids and the lowest slot that had them
         self._children: dict[tuple[int, int], Node | None] = {}
         self._taken: dict[int, list[Plane]] = {}

@@ -5,10 +5,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
+import numpy as np
+
 from mdp.cost.model_need import excess_mm2
 from mdp.decomposition import FrontRow, Part
 from mdp.kernels.processes import side_by_side
 from mdp.search.node import Node
+from mdp.sweep.limbs import limb_faces
 from profiles.profile import Profile
 
 # Costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams.
@@ -83,7 +86,9 @@ def _excess_mm2(node: Node) -> float:
     if node.parent is None:
         return 0.0
     before = node.parent.remainder
-    here_mm2 = 0.0 if before.pieces is None else excess_mm2(before.mesh, before.pieces, node.cuts[-1].base)
+    base = node.cuts[-1].base
+    cut = np.ones(len(before.mesh.faces), np.bool_) if base.limbs_mm is None else limb_faces(before, base)
+    here_mm2 = 0.0 if before.pieces is None else excess_mm2(before.mesh, before.pieces, base, cut)
     return here_mm2 + _excess_mm2(node.parent)
 
 

@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, measure_seam, stair_weights
 from mdp.cost.model_need import Piece
-from mdp.cut import Solid, above
+from mdp.cut import Solid, above, cut
 from mdp.mesh import Floats
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
+from mdp.sweep.limbs import limb_faces
 from mdp.sweep.rims import Rim
 from mdp.sweep.sweep import Remainder
 
@@ -24,7 +27,7 @@ class Cut:
     @cached_property
     def solid(self) -> Solid:
         """The part. Most of what a search cuts off is never looked at, so it is made when it is asked for."""
-        return above(self.whole, self.base)
+        return above(self.whole, self.base) if self.base.limbs_mm is None else cut(self.whole, self.base)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +68,10 @@ class Node:
         before = self.parent
         if before is None:
             return ()
-        seam = measure_seam(before.remainder.mesh, before.seam_weights, self.cuts[-1].base, self.terms.feather)
+        base, weights = self.cuts[-1].base, before.seam_weights
+        if base.limbs_mm is not None:
+            weights = np.where(limb_faces(before.remainder, base), weights, 0.0)
+        seam = measure_seam(before.remainder.mesh, weights, base, self.terms.feather)
         return (*before.seams, seam)
 
     @cached_property

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms
 from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
@@ -12,6 +14,7 @@ from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, least_rotation, level, poses, rotation
 from mdp.search.node import Node
 from mdp.search.problem import Problem
+from mdp.standing import passes_clear
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
 from mdp.sweep.rims import NO_RIM
@@ -34,10 +37,15 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     pieces = [node.piece, *(node.places.surface.piece(cut.solid) for cut in reversed(node.cuts))]
 
     def allowed(position: int, near_turn_deg: float | None = None) -> list[Pose]:
-        normal = bases[position].normal
+        base, mesh = bases[position], pieces[position].mesh
         if not clearance:
-            return poses(machine, normal, near_turn_deg)
-        return allowed_poses(machine, normal, pieces[position].mesh.vertices + problem.place_mm, near_turn_deg)
+            return poses(machine, base.normal, near_turn_deg)
+        reached = allowed_poses(machine, base.normal, mesh.vertices + problem.place_mm, near_turn_deg)
+        if base.limbs_mm is None:
+            return reached
+        stands = np.concatenate([piece.mesh.vertices[piece.mesh.faces] for piece in pieces[:position]])
+        tips = mesh.vertices[mesh.faces]
+        return [pose for pose in reached if passes_clear(machine, pose, tips, stands, base.offset_mm)]
 
     def fits(position: int, pose: Pose) -> bool:
         return not clearance or pose in allowed(position, pose.turn_deg)

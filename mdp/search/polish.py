@@ -5,10 +5,12 @@ plane may still be cut, and where that made room further cuts are added. What co
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from math import cos, radians, sin
+
+import numpy as np
 
 from mdp.cost.forecast import Surface
 from mdp.cost.symmetry import Mirror
@@ -92,7 +94,7 @@ def _align(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane
     here, *later = chain.planes[position:]
     middle = _middle(chain.nodes[position + 1])
     for normal in problem.flats.beside(here.normal, problem.least_z):
-        yield [Plane(normal, float(normal @ middle)), *later]
+        yield [replace(here, normal=normal, offset_mm=float(normal @ middle)), *later]
 
 
 def _stand_upright(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
@@ -177,13 +179,14 @@ def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> I
     """Ever better planes from a position on, the first of them moved, the best ones last. surface: before the cut there."""
     here, *later = chain.planes[position:]
     classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own
-    least_mm2 = surface.left_mm2([here, *later], classes)
+    reach = surface.reach([here, *later])
+    least_mm2 = surface.left_mm2([here, *later], classes, reach)
     pivot = _middle(chain.nodes[position + 1])
     for share, turn_deg in STEPS:
         for _ in range(ROUNDS):
             before_mm2 = least_mm2
             for plane in _neighbours(here, pivot, share * problem.settings.offset_step_mm, turn_deg):
-                left_mm2 = surface.left_mm2([plane, *later], classes)
+                left_mm2 = surface.left_mm2([plane, *later], classes, reach)
                 if left_mm2 < least_mm2 - SAME_MM2 and problem.allowed(chain.nodes[position], plane):
                     here, least_mm2 = plane, left_mm2
                     yield [here, *later]
@@ -193,18 +196,19 @@ def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> I
 
 def _neighbours(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) -> Iterator[Plane]:
     """The planes next to one: shifted both ways, and leaning four ways about a point with and without a shift."""
-    yield from (Plane(plane.normal, plane.offset_mm + shift) for shift in (-step_mm, step_mm))
+    yield from (replace(plane, offset_mm=plane.offset_mm + shift) for shift in (-step_mm, step_mm))
     aside, across = frame_across(plane.normal)
     height_mm = plane.offset_mm - float(plane.normal @ pivot)
     for lean in (-aside, aside, -across, across):
         normal = cos(radians(turn_deg)) * plane.normal + sin(radians(turn_deg)) * lean
         offset_mm = float(normal @ pivot) + height_mm
-        yield from (Plane(normal, offset_mm + shift) for shift in (0.0, -step_mm, step_mm))
+        yield from (replace(plane, normal=normal, offset_mm=offset_mm + shift) for shift in (0.0, -step_mm, step_mm))
 
 
 def _middle(node: Node) -> Floats:
     """(3,) middle of the corners of a node's last cut face."""
     base, points = node.cuts[-1].base, node.remainder.mesh.vertices
     heights = base.heights_mm(points)
-    middle: Floats = points[heights >= heights.max() - BASE_TOLERANCE_MM].mean(axis=0)
+    top = heights.max() if base.limbs_mm is None else 0.0
+    middle: Floats = points[np.abs(heights - top) <= BASE_TOLERANCE_MM].mean(axis=0)
     return middle

@@ -10,13 +10,16 @@ import numpy as np
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
 from mdp.cost.model_need import ModelNeed, ModelSurface
-from mdp.cut import below, solid_of
+from mdp.cut import Solid, below, cut, solid_of
 from mdp.directions.flats import Flats
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import BASE_TOLERANCE_MM, UP, Mask, standing, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
 from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import (
+    COPLANAR_MM,
+    LEAST_CONTACT_AREA_MM2,
     Bounds,
     Feasibility,
     Reason,
@@ -32,10 +35,13 @@ from mdp.ranking.candidates import (
 )
 from mdp.search.front import Worth
 from mdp.search.node import Cut, Node
+from mdp.standing import passes_clear
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
 from mdp.sweep.cylinders import bores_of
 from mdp.sweep.hopeless import Savers, hopeless_faces
+from mdp.sweep.limbs import LimbGrid, LimbSums, limb_faces, limb_vertices, sum_limbs
+from mdp.sweep.slivers import sliver_mm
 from mdp.sweep.sweep import gains
 from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
@@ -141,25 +147,24 @@ class Problem:
         """Whether a node has as many parts as are allowed."""
         return len(node.cuts) >= self.settings.most_parts - 1
 
-    def table(self, node: Node, large: bool = False, described: bool = False) -> CandidateTable:
+    def table(self, node: Node, large: bool = False, described: bool = False, limits: Bounds | None = None) -> CandidateTable:
         """The scored candidates of a node; large: also those that gain enough only for a part of the preferred volume; described:
-        with what no cut can save, for features."""
+        with what no cut can save, for features; limits: of some directions in place of all."""
+        limits = self.limits if limits is None else limits
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
         hopeless = self._hopeless(node) if described else None
         remainder, step_mm = node.remainder, self.settings.offset_step_mm
-        scored = score_candidates(
-            remainder, self.limits, self.terms, step_mm=step_mm, least_gain_mm2=least_mm2, hopeless=hopeless
-        )
+        scored = score_candidates(remainder, limits, self.terms, step_mm=step_mm, least_gain_mm2=least_mm2, hopeless=hopeless)
         self._evaluated.append(scored.evaluated)
 
         def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
-            return check(remainder, self.limits, self.settings, direction, offset_mm)
+            return check(remainder, limits, self.settings, direction, offset_mm)
 
         hopeless_mm2 = 0.0 if hopeless is None else float(remainder.facets.counted_mm2[hopeless].sum())
         situation = self._situation(node, hopeless_mm2)
         return CandidateTable(
             scored,
-            self.limits,
+            limits,
             situation,
             check=check_planes,
             least_gain_mm2=self.least_gain_mm2,
@@ -192,6 +197,8 @@ class Problem:
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""
+        if plane.limbs_mm is not None:
+            return self.check_limbs(node, plane, self.bounds_along(plane.normal[None])) == Reason.FEASIBLE
         if 0.0 < abs(plane.offset_mm) < FINEST * self.settings.offset_step_mm:
             return False
         return bool(self.check_plane(node, plane, self.bounds_along(plane.normal[None])).reason[0] == Reason.FEASIBLE)
@@ -207,6 +214,51 @@ class Problem:
             keep=self.zones.keep,
         )
 
+    def limb_grid(self, limits: Bounds, least_gain_mm2: float) -> LimbGrid:
+        """Where the search looks for limbs along directions with these limits."""
+        step_mm = self.settings.offset_step_mm
+        return LimbGrid(
+            directions=limits.directions,
+            step_mm=step_mm,
+            least_offset_mm=limits.least_offset_mm,
+            least_height_mm=limits.least_height_mm,
+            keep_mm=limits.keep_mm,
+            seam_mm=self.terms.seam_mm,
+            cut_mm2=self.terms.cut_mm2,
+            least_gain_mm2=max(self.least_gain_mm2, least_gain_mm2),
+            least_volume_mm3=limits.least_volume_mm3,
+            least_interface_mm2=max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2),
+            crumb=limits.crumb_mm / step_mm,
+        )
+
+    def limb_sums(self, node: Node, planes: Sequence[Plane]) -> LimbSums:
+        """What cutting off the limbs of planes would do to a node; nothing is cut."""
+        return sum_limbs(node.remainder, planes, threshold(self.terms.angle_deg), sqrt(self.settings.least_interface_mm2))
+
+    def check_limbs(self, node: Node, plane: Plane, limits: Bounds) -> Reason:
+        """Why the limbs of a plane cannot be cut off a node; limits: those of its direction. What would float and which poses
+        serve is known only after the cut."""
+        sums, offset_mm, keep_mm = self.limb_sums(node, [plane]), plane.offset_mm, limits.keep_mm[0]
+        least_mm2 = max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2)
+        if offset_mm < limits.least_offset_mm[0]:
+            return Reason.PLATFORM
+        if not sums.exists[0] or sums.contact_mm2[0] < least_mm2:
+            return Reason.INTERFACE
+        if not np.isfinite(limits.least_height_mm[0]):
+            return Reason.REACH
+        if sums.lowest_mm[0] < limits.least_height_mm[0]:
+            return Reason.CLEARANCE
+        if sums.volume_mm3[0] < limits.least_volume_mm3:
+            return Reason.VOLUME
+        if ((keep_mm[:, 0] < offset_mm) & (offset_mm < keep_mm[:, 1])).any():
+            return Reason.KEEP
+        limb = limb_vertices(node.remainder, plane)
+        if sliver_mm(node.remainder.facets, limb, plane, frame_across(plane.normal)) < max(self.settings.fragile_mm, COPLANAR_MM):
+            return Reason.FRAGILE
+        if self.is_weak(node, plane):
+            return Reason.WEAK
+        return Reason.FEASIBLE
+
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
         """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
         own = self.settings.model_copy(update={"offset_step_mm": self.step_mm(plane.offset_mm)})
@@ -221,15 +273,20 @@ class Problem:
 
     def stress_mpa(self, node: Node, plane: Plane) -> float:
         """The stress at the base of what lies above a plane when the nozzle pushes its top."""
-        return self.settings.nozzle_load_n * stress_per_newton(
-            node.remainder.mesh, plane, sqrt(self.settings.least_interface_mm2)
-        )
+        remainder, crumb_mm = node.remainder, sqrt(self.settings.least_interface_mm2)
+        if plane.limbs_mm is None:
+            stress = stress_per_newton(remainder.mesh, plane, crumb_mm)
+        else:
+            stress = stress_per_newton(remainder.facets.mesh, plane, crumb_mm, limb_vertices(remainder, plane))
+        return self.settings.nozzle_load_n * stress
 
     def cut(self, node: Node, plane: Plane, cost: CutCost | None = None) -> Node | None:
         """The node after a cut; None when nothing is cut off or no pose serves the part.
 
         cost: what the cut costs for ever, where that is known.
         """
+        if plane.limbs_mm is not None:
+            return self._cut_limbs(node, plane)
         vertices = node.remainder.mesh.vertices
         upper, rest = vertices[plane.heights_mm(vertices) > 0.0], below(node.solid, plane)
         if len(upper) == 0 or rest.is_empty():
@@ -243,8 +300,34 @@ class Problem:
                 return None
         return child
 
+    def _cut_limbs(self, node: Node, plane: Plane) -> Node | None:
+        """The node after limbs are cut off, where nothing would float and the head passes clear of what stands."""
+        if not self.is_clear(node, plane):
+            return None
+        limbs, rest = cut(node.solid, plane)
+        if limbs.is_empty() or rest.is_empty() or _floats(rest):
+            return None
+        return Node(rest, (*node.cuts, Cut(plane, node.solid, self._cost(node, plane))), self.terms, node.places, node)
+
+    def is_clear(self, node: Node, plane: Plane) -> bool:
+        """Whether the head passes clear of what stands, at some pose, while the limbs of a plane are printed."""
+        if not self.settings.clearance:
+            return True
+        mesh, limb = node.remainder.mesh, limb_faces(node.remainder, plane)
+        heights = plane.heights_mm(mesh.vertices)[mesh.faces]
+        corners = mesh.vertices[mesh.faces]
+        tips, stands = corners[limb], corners[(heights > 0.0).any(axis=1) & ~limb]
+        points = tips.reshape(-1, 3)[heights[limb].ravel() > 0.0]
+        poses = allowed_poses(self.machine, plane.normal, points + self.place_mm)
+        return any(passes_clear(self.machine, pose, tips, stands, plane.offset_mm) for pose in poses)
+
     def _cost(self, node: Node, plane: Plane) -> CutCost:
         """What a cut costs for ever."""
+        if plane.limbs_mm is not None:
+            swept = self.limb_sums(node, [plane])
+            residual = residual_mm2(swept, self.terms)
+            costs = (residual, lost_mm2(swept, residual), swept.stairs_mm2, seam_mm2(swept, self.terms))
+            return CutCost(*(float(cost[0]) for cost in costs))
         step_mm = self.step_mm(plane.offset_mm)
         swept = gains(node.remainder, plane.normal[None], step_mm, threshold(self.terms.angle_deg))
         column = round(plane.offset_mm / step_mm) - int(swept.first[0])
@@ -267,6 +350,11 @@ class Problem:
                 return None
             nodes.append(child)
         return nodes
+
+
+def _floats(solid: Solid) -> bool:
+    """Whether a piece of a solid does not reach the platform."""
+    return any(piece.volume() > 0.0 and piece.bounding_box()[2] > PLATFORM_TOLERANCE_MM for piece in solid.decompose())
 
 
 def without_limits(machine: Machine) -> Machine:

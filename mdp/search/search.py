@@ -6,7 +6,7 @@ bounds all descendants), two orders of the same cuts take one slot, the slots of
 (beam), and the best results are polished off the grid of candidates (polish).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -26,6 +26,7 @@ from mdp.search.beam import Beam
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
 from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
+from mdp.search.limbs import search_limbs
 from mdp.search.node import Node
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.polish import make_regular, polish
@@ -35,6 +36,7 @@ from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
+PROMISING = 1.02  # times the beam's best that cuts of single limbs may cost to be polished
 WITHOUT_SEAMS = {
     "hidden_seam_share": 1.0,
     "feature_mm2": 0.0,
@@ -186,7 +188,8 @@ def _search_beam(
             beam.advance()
             held = sum(node is not None for node in beam.nodes)
             _report(problem, report, stage, held, beam.best)
-        best = _polish_finalists(problem, beam, stage, report)
+        limbs = search_limbs(problem, beam.first.table) if problem.settings.single_limb else []
+        best = _polish_finalists(problem, beam, limbs, partial(_report, problem, report, stage, 1))
         if problem.settings.polish and problem.terms.seam_mm > 0.0:
             _prefer_regular(problem, beam.front)
         return best, beam.front, stage
@@ -197,15 +200,20 @@ def _search_beam(
         beam.close()
 
 
-def _polish_finalists(problem: Problem, beam: Beam, stage: int, report: Callable[[Progress], None]) -> Node:
-    """The best of a beam and of its polished finalists."""
+def _polish_finalists(problem: Problem, beam: Beam, limbs: Sequence[Node], report: Callable[[Node], None]) -> Node:
+    """The best of a beam, of a search for single limbs, and of their polished finalists."""
     best = beam.best
     finalists = beam.finalists() if problem.settings.polish and problem.model.risky_mm2 > 0 else []
+    for node in limbs:
+        beam.front.offer(node)
+    if limbs and limbs[-1].cost_mm2 < PROMISING * best.cost_mm2:
+        finalists += limbs[-1:] if finalists else []
+        best = min(best, limbs[-1], key=lambda node: node.cost_mm2)
     for coming in [ahead(polish, problem, node) for node in finalists]:
         polished = coming.result()
         beam.front.offer(polished)
         best = min(best, polished, key=lambda node: (node.cost_mm2, len(node.cuts)))
-        _report(problem, report, stage, 1, best)
+        report(best)
     return best
 
 

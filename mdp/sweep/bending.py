@@ -16,6 +16,7 @@ from mdp.directions.frame import frame_across
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Ints, Mesh
+from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.sweep.components import UNKNOWN
 from mdp.topology.union_find import join, root
@@ -31,20 +32,21 @@ class Section(NamedTuple):
     shells: Ints
 
 
-def stress_per_newton(mesh: Mesh, plane: Plane, crumb_mm: float) -> float:
+def stress_per_newton(mesh: Mesh, plane: Plane, crumb_mm: float, limb: Mask | None = None) -> float:
     """The greatest stress at a plane, MPa for every newton that pushes the top of a piece above it sideways; infinite where a
-    piece hangs on nothing. Pieces lower than crumb_mm are crumbs."""
+    piece hangs on nothing. Pieces lower than crumb_mm are crumbs. limb: (n,) the vertices of the only pieces that count."""
     across = (mesh.vertices - mesh.vertices[0]) @ frame_across(plane.normal).T
-    return _most_stress(mesh.faces, plane.heights_mm(mesh.vertices), np.ascontiguousarray(across), crumb_mm)
+    counted = np.zeros(0, np.bool_) if limb is None else limb
+    return _most_stress(mesh.faces, plane.heights_mm(mesh.vertices), np.ascontiguousarray(across), crumb_mm, counted)
 
 
 @kernel
-def _most_stress(faces: Ints, heights: Floats, across: Floats, crumb: float) -> float:
+def _most_stress(faces: Ints, heights: Floats, across: Floats, crumb: float, counted: Mask) -> float:
     shells = _find_shells(faces, heights)
     volumes, section = _measure(faces, heights, across, shells)
     moments, tops, stressed = table(len(heights), len(MOMENTS)), floats(len(heights), -1.0), floats(len(heights), 0.0)
     for v in range(len(heights)):
-        if shells[v] >= 0 and volumes[shells[v]] > 0.0:
+        if shells[v] >= 0 and volumes[shells[v]] > 0.0 and (len(counted) == 0 or counted[v]):
             tops[shells[v]] = max(tops[shells[v]], heights[v])
     _find_pieces(section, volumes)
     segments, pieces = section

@@ -145,25 +145,32 @@ def join_at_saddles(tree: MergeTree) -> Ints:
 
 
 @part
+def anchor_of(topology: Topology, v: int) -> int:
+    """The face that a ray from a vertex into the solid meets; below 0: none."""
+    if topology.anchors[v] == UNKNOWN:
+        # Threads may look up the same vertex twice; the answer does not depend on the direction.
+        triangles, inward = topology.triangles, -topology.vertex_normals[v]
+        topology.anchors[v] = first_hit(triangles, triangles.vertices[v], inward, np.inf, v, -2.0)
+    return int(topology.anchors[v])
+
+
+@part
 def join_to_anchors(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floats) -> Ints:
     """(j, 3): the leaf at a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
-    heights, anchors, faces, up = tree.heights, topology.anchors, topology.triangles.faces, tree.up
+    heights, faces, up = tree.heights, topology.triangles.faces, tree.up
     joins = int_table(len(leaves), 3)
     size = 0
     for leaf in range(len(leaves)):
         v = leaves[leaf]
         if cosines[v] == 0.0 or (cosines[v] < 0.0) != up:
             continue
-        if anchors[v] == UNKNOWN:
-            # Threads may look up the same vertex twice; the answer does not depend on the direction.
-            inward = -topology.vertex_normals[v]
-            anchors[v] = first_hit(topology.triangles, topology.triangles.vertices[v], inward, np.inf, v, -2.0)
-        if anchors[v] < 0:
+        anchor = anchor_of(topology, int(v))
+        if anchor < 0:
             continue
-        w = faces[anchors[v], 0]
+        w = faces[anchor, 0]
         for corner in (1, 2):
-            if before(heights, faces[anchors[v], corner], w, up):
-                w = faces[anchors[v], corner]
+            if before(heights, faces[anchor, corner], w, up):
+                w = faces[anchor, corner]
         if before(heights, w, v, up):
             joins[size, 0], joins[size, 2] = leaf, v
             joins[size, 1] = find_leaf(tree, int(w))

@@ -54,7 +54,8 @@ class Facets:
     """Made once a solid. mesh has its vertices and faces in spatial order; risky (m,) tells which faces are risky upright,
     seam_weights (m,) how much a mm of rim counts on each, (0,): not at all; sources (m,) of which face of the model each is a
     piece, below 0: of none; counted_mm2 (m,) what each counts where it needs support; stair_areas_mm2 (m,) what each counts where
-    its steps are as high as a layer, (0,): stairs do not count."""
+    its steps are as high as a layer, (0,): stairs do not count; order (m,): the number of each face in
+    the solid's own mesh."""
 
     mesh: Mesh
     risky: Mask
@@ -62,6 +63,7 @@ class Facets:
     sources: Ints
     counted_mm2: Floats
     stair_areas_mm2: Floats
+    order: NDArray[np.int64]
 
     @cached_property
     def points(self) -> Floats:
@@ -159,7 +161,8 @@ def lay_out(
     weights = np.zeros(0) if seam_weights is None else np.ascontiguousarray(seam_weights[turn])
     laid = Mesh(mesh.vertices[order], number[mesh.faces[turn]])
     stairs_mm2 = np.zeros(0) if stair_weights is None else laid.areas_mm2 * stair_weights[turn]
-    return Facets(laid, risky[turn], weights, np.ascontiguousarray(sources[turn]), laid.areas_mm2 * counts[turn], stairs_mm2)
+    counted_mm2 = laid.areas_mm2 * counts[turn]
+    return Facets(laid, risky[turn], weights, np.ascontiguousarray(sources[turn]), counted_mm2, stairs_mm2, turn)
 
 
 @kernel

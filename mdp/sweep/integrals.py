@@ -151,7 +151,7 @@ def share_above(c: float, low: float, middle: float, high: float, rise: float, f
 
 
 @inlined
-def _moment(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
+def moment_above(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
     """First moment about an offset of the share of a face above it."""
     mean, up, down = (low + middle + high) * THIRD, c - low, high - c
     return mean - c + up * up * rise * up * THIRD if c < middle else down * down * fall * down * THIRD
@@ -165,7 +165,7 @@ def _weigh(ahead: float, block: Block, area: Floats, moment: Floats) -> None:
         c = max(np.ceil(low[k]), 0.0) + ahead
         inside = weight[k] if c < high[k] else 0.0
         area[k] = inside * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
-        moment[k] = inside * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
+        moment[k] = inside * moment_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
 @vector_part
@@ -185,7 +185,7 @@ def _add_volumes(block: Block, shares: Floats, integrals: Floats) -> None:
         for ahead in range(AHEAD, crossed[k]):
             c = float(b) + ahead
             integrals[b + ahead, 2] += weight[k] * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
-            integrals[b + ahead, 3] += weight[k] * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
+            integrals[b + ahead, 3] += weight[k] * moment_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
 @part

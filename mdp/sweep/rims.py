@@ -64,7 +64,7 @@ def _weigh_rims(cosines: Floats, areas: Floats, weights: Floats, feather: float,
 
 
 @inlined
-def _chord(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
+def chord_at(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
     """Length of a face's chord at an offset that it crosses, of its longest chord times its extent."""
     return (c - low) * rise if c < middle else (high - c) * fall
 
@@ -76,7 +76,7 @@ def _measure_chords(ahead: float, block: Block, length: Floats) -> None:
     for k in range(len(low)):
         c = max(np.ceil(low[k]), 0.0) + ahead
         inside = weight[k] if c < high[k] else 0.0
-        length[k] = inside * _chord(c, low[k], middle[k], high[k], rise[k], fall[k])
+        length[k] = inside * chord_at(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
 @vector_part
@@ -89,7 +89,7 @@ def _add_rims(block: Block, lengths: Floats, rim: Floats) -> None:
         rim[b + 1] += lengths[1, k]
         rim[b + 2] += lengths[2, k]
         for ahead in range(AHEAD, crossed[k]):
-            rim[b + ahead] += weight[k] * _chord(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
+            rim[b + ahead] += weight[k] * chord_at(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
 
 
 @vector_part

@@ -12,7 +12,7 @@ from mdp.kernels.kernel import inlined, kernel, part
 from mdp.mesh import Floats
 from mdp.overhang import Mask
 from mdp.plane import Plane
-from mdp.sweep.facets import Rows
+from mdp.sweep.facets import Facets, Rows
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rays import TriangleTree, first_hit
 
@@ -76,3 +76,21 @@ def least_distance_mm(corners: Floats, plane: Plane) -> float:
     heights = corners @ plane.normal - plane.offset_mm
     low, high = heights.min(axis=1, initial=np.inf), heights.max(axis=1, initial=-np.inf)
     return float(np.maximum(np.maximum(low, -high), 0.0).min(initial=np.inf))
+
+
+def sliver_mm(facets: Facets, limb: Mask, plane: Plane, across: Floats) -> float:
+    """Distance from a plane up to the next surface of a limb that looks along its normal, and down to the next one straight below
+    it that looks against it: so thin is what the cut leaves. limb (n,): its vertices; across (2, 3): vectors across the normal."""
+    vertices, faces = facets.mesh.vertices, facets.mesh.faces
+    heights, cosines = plane.heights_mm(vertices), facets.mesh.normals @ plane.normal
+    along, against = (np.zeros(len(vertices), np.bool_) for _ in range(2))
+    along[faces[cosines > SLIVER_COSINE]] = True
+    against[faces[cosines < -SLIVER_COSINE]] = True
+    up = float(heights[limb & along].min(initial=np.inf))
+    passed = faces[limb[faces].any(axis=1) & ~limb[faces].all(axis=1)]
+    if len(passed) == 0:
+        return up
+    flat = vertices @ across.T
+    low, high = flat[passed].reshape(-1, 2).min(axis=0), flat[passed].reshape(-1, 2).max(axis=0)
+    below = (heights <= 0.0) & against & ((flat >= low) & (flat <= high)).all(axis=1)
+    return min(up, float(-heights[below].max(initial=-np.inf)))

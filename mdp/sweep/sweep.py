@@ -236,11 +236,20 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     >>> swept.offsets_mm(1.0)[0, :3].tolist(), swept.up_mm2[0, :3].round().tolist()
     ([1.0, 2.0, 3.0], [404.0, 323.0, 188.0])
     """
-    facets, lost = remainder.facets, np.zeros(0, np.bool_) if hopeless is None else hopeless
-    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.counted_mm2, facets.risky, risky_below, lost)
     shape = (len(directions), remainder.most_columns(step_mm))
     columns = np.zeros((2, shape[0]), np.int32)
     swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(7)))
+    scars = scars_of(remainder, directions, risky_below, hopeless)
+    in_threads(_gains, shape[0], scars, np.ascontiguousarray(directions), step_mm, swept)
+    if remainder.cylinders:
+        swept.crossed[:] = crossings(remainder.cylinders, directions, swept.offsets_mm(step_mm))
+    return swept
+
+
+def scars_of(remainder: Remainder, directions: Floats, risky_below: float, hopeless: Mask | None = None) -> Scars:
+    """What blemishes a solid's surface along each of some directions; risky_below, hopeless: see gains."""
+    facets, lost = remainder.facets, np.zeros(0, np.bool_) if hopeless is None else hopeless
+    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.counted_mm2, facets.risky, risky_below, lost)
     rims = Rims(
         corners=facets.corners,
         normals=facets.normals,
@@ -250,11 +259,7 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
         stair_areas_mm2=facets.stair_areas_mm2,
         stairs_up_mm2=facets.stairs_up_mm2,
     )
-    needs = NeedsTable(facets.sources, remainder.classes(directions), remainder.weight)
-    in_threads(_gains, shape[0], Scars(surface, needs, rims), np.ascontiguousarray(directions), step_mm, swept)
-    if remainder.cylinders:
-        swept.crossed[:] = crossings(remainder.cylinders, directions, swept.offsets_mm(step_mm))
-    return swept
+    return Scars(surface, NeedsTable(facets.sources, remainder.classes(directions), remainder.weight), rims)
 
 
 def sweep(

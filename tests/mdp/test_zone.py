@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.pose import about
-from mdp.zone import Grown, Painted, Zone, Zones, nearest_face, spans_mm, touched
+from mdp.zone import Grown, Painted, Zone, Zones, spans_mm, touched
 from tests import shapes
 from tests.mdp.files import both
 from tests.mdp.solids import random_direction, random_solid
@@ -130,4 +130,4 @@ def test_the_nearest_face_is_the_one_that_trimesh_finds(seed: int, point: tuple[
     mesh: Mesh = random_solid(seed)
     corners = mesh.vertices[mesh.faces]
     nearest = trimesh.triangles.closest_point(corners, np.tile(point, (len(corners), 1)))
-    assert nearest_face(mesh, np.array(point))[1] == pytest.approx(np.linalg.norm(nearest - point, axis=1).min(), abs=1e-9)
+    assert mesh.nearest_face(np.array(point))[1] == pytest.approx(np.linalg.norm(nearest - point, axis=1).min(), abs=1e-9)

@@ -11,7 +11,7 @@ from shapely.affinity import translate
 from machine.dryrun import DryRun, dry_run
 from machine.dryrun.conformity.filling import filled_share, in_beads, lattice
 from machine.dryrun.height_field import CELL_MM, Field, depth_of, empty_field, lay_bead
-from machine.dryrun.replay import head_of
+from mdp.head import head_of
 from profiles.profile import load
 from tests import shapes
 
