@@ -55,8 +55,8 @@ Body = Ring | Block
 
 
 class Head(NamedTuple):
-    """The head for kernels: (k, 2) radii and heights of the hot end's lowest points, and (j, 6) boxes that go with the tip: least,
-    greatest x y z."""
+    """The head for kernels: (k, 2) radii and heights of the hot end's lowest points, and (j, 6) least and greatest x y z of boxes
+    that go with the tip."""
 
     silhouette: Floats
     boxes: Floats

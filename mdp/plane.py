@@ -35,7 +35,9 @@ class Plane:
     """The points p with normal . p = offset_mm; normal (3,) is the printing direction above the plane.
 
     limbs_mm: (k, 3) a point on each limb that a cut takes off, where it leaves other pieces above the plane standing; None: it
-    takes all that lies above. A normal of another length than 1 is scaled to it; offset_mm is along the scaled one. Raises PlanError for a normal that
+    takes all that lies above.
+
+    A normal of another length than 1 is scaled to it; offset_mm is along the scaled one. Raises PlanError for a normal that
     `unit_direction` refuses.
     """
 

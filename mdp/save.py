@@ -137,7 +137,8 @@ def front_values(row: FrontRow) -> dict[str, Any]:
 
 def plane_values(plane: Plane) -> dict[str, Any]:
     """A plane as JSON has it."""
-    return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm}
+    limbs = {} if plane.limbs_mm is None else {"limbs_mm": plane.limbs_mm.tolist()}
+    return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm, **limbs}
 
 
 def _object(mesh: Mesh, index: int) -> str:

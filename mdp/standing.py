@@ -1,9 +1,9 @@
 """Standing: what stands beside a limb while it is printed, and how high the tip must be for the head to pass clear of it.
 
-The head is taken as everything above its underside: the silhouette turned about the nozzle, and boxes, which count as far as the
-nozzle. A point that stands at a height t, r aside from the tip, asks for a tip at t - h(r), where h is the height of the underside
-at that radius. h does not fall with r, so in every layer the outline asks for more than any place inside it: only the surfaces of
-the limb and of what stands are compared, as triangles so small that it does not matter where on one a place lies.
+The head is taken as everything above its underside: the silhouette turned about the nozzle, and boxes, which count as far as
+the nozzle. A point that stands at a height t, r aside from the tip, asks for a tip at t - h(r), where h is the height of the
+underside at that radius. h does not fall with r, so in every layer the outline asks for more than any place inside it: only the
+surfaces of the limb and of what stands are compared, as triangles so small that it does not matter where on one a place lies.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from mdp.pose import Pose, rotation
 from profiles.machine import Machine
 
 CELLS_MM = (2.0, 0.6, 0.2)  # sides of the cells in which pieces of both surfaces are compared; finer where coarse leave doubt
-MOST_TRIANGLES, MOST_PAIRS = 100_000, 2_000_000  # of one surface, and of cells of both, that are compared
+MOST_TRIANGLES, MOST_PAIRS = 250_000, 2_000_000  # of one surface, and of cells of both, that are compared
 NOTHING = -1e9
 MOST_TRIED = 1000  # corners of either surface that are compared first
 
@@ -47,30 +47,61 @@ class Standing:
 
 
 @borrower
-def _asked(across: float, along: float, top: float, beyond: float, head: Head, clearance: float) -> float:
-    """The height of the tip that what stands up to `top`, so far aside, asks for; beyond: how much nearer it may be."""
-    asked, square, widest = NOTHING, across * across + along * along, head.silhouette[len(head.silhouette) - 1, 0] + beyond
-    if square <= widest * widest:
-        under = lowest_of_hot_end(max(np.sqrt(square) - beyond, 0.0), head.silhouette)
-        asked = top - max(under - clearance, 0.0)
-    for k in range(len(head.boxes)):
-        inside = min(head.boxes[k, 0], 0.0) - beyond <= across and across <= max(head.boxes[k, 3], 0.0) + beyond
-        if inside and min(head.boxes[k, 1], 0.0) - beyond <= along and along <= max(head.boxes[k, 4], 0.0) + beyond:
-            asked = max(asked, top - max(head.boxes[k, 2] - clearance, 0.0))
-    return float(asked)
+def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head, clearance: float) -> float:
+    """The height of the tip that what stands up to `top` asks for; square: of its distance aside; beyond: how much nearer it may
+    be."""
+    widest = head.silhouette[len(head.silhouette) - 1, 0] + beyond
+    if square > widest * widest:
+        return NOTHING
+    under = lowest_of_hot_end(max(np.sqrt(square) - beyond, 0.0), head.silhouette)
+    return float(top - max(under - clearance, 0.0))
+
+
+@borrower
+def _is_under(box: Floats, across: float, along: float, beyond: float) -> bool:
+    """Whether something so far aside from the tip lies under a box, or as near to that as `beyond`."""
+    inside = box[0] - beyond <= across and across <= box[3] + beyond
+    return bool(inside and box[1] - beyond <= along and along <= box[4] + beyond)
 
 
 @kernel
 def _least_tip(places: Floats, points: Floats, slack: float, head: Head, clearance: float) -> Floats:
-    least = floats(len(places), NOTHING)
+    least, beyond = floats(len(places), NOTHING), slack + clearance
     for i in range(len(places)):
         for j in range(len(points)):
             top = points[j, 2] + slack
             if top <= least[i]:
                 break
-            asked = _asked(points[j, 0] - places[i, 0], points[j, 1] - places[i, 1], top, slack + clearance, head, clearance)
-            least[i] = max(least[i], asked)
+            across, along = points[j, 0] - places[i, 0], points[j, 1] - places[i, 1]
+            square = across * across + along * along
+            least[i] = max(least[i], _asked_by_hot_end(square, top, beyond, head, clearance))
+            for k in range(len(head.boxes)):
+                if _is_under(head.boxes[k], across, along, beyond):
+                    least[i] = max(least[i], top - max(head.boxes[k, 2] - clearance, 0.0))
     return least
+
+
+@dataclass(frozen=True, eq=False)
+class _Meeting:
+    """A head that passes over a limb. around_mm (2, 3): the box of the tip's places."""
+
+    head: Head
+    clearance_mm: float
+    around_mm: Floats
+
+    def close(self, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
+        """(i,) the places of the tip at which the head may meet any of (j, 3) points that stand, and (j,) those points.
+
+        Of the limb only its surface is looked at. So a box counts as far as the nozzle, under which no place inside the limb asks
+        for more than one on its outline; and it counts only for what it reaches from anywhere in the limb's box.
+        """
+        boxes, beyond = self.head.boxes, slack_mm + self.clearance_mm
+        low, high = self.around_mm[0, :2] + boxes[:, :2] - beyond, self.around_mm[1, :2] + boxes[:, 3:5] + beyond
+        places = points[:, None, :2]
+        reached = ((places >= low) & (places <= high)).all(axis=2)
+        wide = boxes.copy()
+        wide[:, :2], wide[:, 3:5] = np.minimum(boxes[:, :2], 0.0), np.maximum(boxes[:, 3:5], 0.0)
+        return _find_close(tips, points, slack_mm, Head(self.head.silhouette, wide), self.clearance_mm, reached)
 
 
 def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> bool:
@@ -79,10 +110,8 @@ def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, b
     limb, standing: (m, 3, 3) corners of the faces of both surfaces in the workpiece frame; base_mm: the base plane's offset. What
     of them lies below the base plane is left out. Surfaces that would take long to compare are not taken to be clear.
     """
-    turn, head = rotation(machine, pose), head_of(machine)
-    down = np.array([0.0, 0.0, base_mm])
-    tips, stands = np.ascontiguousarray(limb @ turn.T - down), np.ascontiguousarray(standing @ turn.T - down)
-    if _surely_meets(_few(tips), _few(stands), head, machine.clearance_mm):
+    tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
+    if meeting.close(_few(tips), _few(stands), 0.0)[0].any():
         return False
     for cell_mm in CELLS_MM:
         if max(count_divided(corners, cell_mm) for corners in (tips, stands)) > MOST_TRIANGLES:
@@ -94,9 +123,29 @@ def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, b
         if len(low) * len(high) > MOST_PAIRS:
             return False
         slack_mm = hypot(cell_mm, cell_mm) + 2.0 * cell_mm  # of the middles of two cells, and of two triangles
-        close_tips, close_stands = _find_close(low, high, slack_mm, head, machine.clearance_mm)
+        close_tips, close_stands = meeting.close(low, high, slack_mm)
         tips, stands = tips[close_tips[of_tip]], stands[close_stands[of_stand]]
     return len(tips) == 0
+
+
+def _meeting(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> tuple[Floats, Floats, _Meeting]:
+    """Both surfaces in the part's frame, and the head over the limb."""
+    turn, down = rotation(machine, pose), np.array([0.0, 0.0, base_mm])
+    tips, stands = (_above(np.ascontiguousarray(corners @ turn.T - down)) for corners in (limb, standing))
+    places = tips.reshape(-1, 3) if len(tips) else np.zeros((1, 3))
+    around_mm = np.stack([places.min(axis=0), places.max(axis=0)])
+    return tips, stands, _Meeting(head_of(machine), machine.clearance_mm, around_mm)
+
+
+def places_met(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> Floats:
+    """(k, 3) corners of what stands that the head surely meets while a limb is printed, the highest first; see passes_clear."""
+    tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
+    if max(count_divided(corners, CELLS_MM[0]) for corners in (tips, stands)) <= MOST_TRIANGLES:
+        tips, stands = (subdivide(corners, CELLS_MM[0]) for corners in (tips, stands))
+    points = _few(stands)
+    _, met = meeting.close(_few(tips), points, 0.0)
+    places: Floats = (np.unique(points[met], axis=0) + np.array([0.0, 0.0, base_mm])) @ rotation(machine, pose)
+    return places[np.argsort(-places[:, 2], kind="stable")]
 
 
 def _above(corners: Floats) -> Floats:
@@ -111,21 +160,9 @@ def _few(corners: Floats) -> Floats:
     return np.ascontiguousarray(points[:: len(points) // MOST_TRIED + 1])
 
 
-@kernel
-def _surely_meets(tips: Floats, points: Floats, head: Head, clearance: float) -> bool:
-    """Whether the head meets one of some points at one of some places of the tip."""
-    for i in range(len(tips)):
-        for j in range(len(points)):
-            if points[j, 2] > tips[i, 2]:
-                across, along = points[j, 0] - tips[i, 0], points[j, 1] - tips[i, 1]
-                if _asked(across, along, points[j, 2], clearance, head, clearance) > tips[i, 2]:
-                    return True
-    return False
-
-
 def _in_cells(corners: Floats, cell_mm: float, sign: float) -> tuple[Floats, Indices]:
-    """(c, 3) the middles of the cells in which (m, 3, 3) triangles begin and their least height in each, sign -1: the greatest, and
-    (m,) the cell of each triangle."""
+    """(c, 3) the middles of the cells in which (m, 3, 3) triangles begin and their least height in each, sign -1: the greatest,
+    and (m,) the cell of each triangle."""
     cells = np.floor(corners[:, 0, :2] / cell_mm).astype(np.int64)
     _, first, inverse = np.unique(cells[:, 0] * 1_000_003 + cells[:, 1], return_index=True, return_inverse=True)
     heights = np.full(len(first), np.inf)
@@ -134,15 +171,21 @@ def _in_cells(corners: Floats, cell_mm: float, sign: float) -> tuple[Floats, Ind
 
 
 @kernel
-def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearance: float) -> tuple[Mask, Mask]:
-    """The cells of tips in which the head may meet a cell of points, and those cells."""
-    close_tips, close_points = flags(len(tips)), flags(len(points))
+def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearance: float, reached: Mask) -> tuple[Mask, Mask]:
+    """See _Meeting.close; reached (j, b): which points may come under which box."""
+    close_tips, close_points, beyond = flags(len(tips)), flags(len(points)), slack + clearance
     for i in range(len(tips)):
         for j in range(len(points)):
-            if points[j, 2] > tips[i, 2]:
-                across, along = points[j, 0] - tips[i, 0], points[j, 1] - tips[i, 1]
-                if _asked(across, along, points[j, 2], slack + clearance, head, clearance) > tips[i, 2]:
-                    close_tips[i], close_points[j] = True, True
+            top = points[j, 2]
+            if top <= tips[i, 2]:
+                continue
+            across, along = points[j, 0] - tips[i, 0], points[j, 1] - tips[i, 1]
+            meets = _asked_by_hot_end(across * across + along * along, top, beyond, head, clearance) > tips[i, 2]
+            for k in range(len(head.boxes)):
+                if reached[j, k] and top - max(head.boxes[k, 2] - clearance, 0.0) > tips[i, 2]:
+                    meets = meets or _is_under(head.boxes[k], across, along, beyond)
+            if meets:
+                close_tips[i], close_points[j] = True, True
     return close_tips, close_points
 
 

@@ -63,3 +63,11 @@ def octahedron(radius: float = 5.0) -> Mesh:
     """A double pyramid standing on its point."""
     points = [(radius, 0, 0), (0, radius, 0), (-radius, 0, 0), (0, -radius, 0), (0, 0, radius), (0, 0, -radius)]
     return standing(m3.Manifold.hull_points(points))
+
+
+def bar_beside_a_tower(gap: float = 12.0) -> Mesh:
+    """A plate with a post that carries a bar, 41 mm long, over it, and a taller tower, so far beside the bar."""
+    plate = m3.Manifold.cube((80, 80, 4)).translate((-40, -40, 0))
+    post = m3.Manifold.cube((12, 12, 60)).translate((-25, -6, 0))
+    bar = m3.Manifold.cube((41, 12, 12)).translate((-14, -6, 48))
+    return from_manifold(plate + post + bar + m3.Manifold.cube((12, 12, 75)).translate((-6, 6 + gap, 0)))

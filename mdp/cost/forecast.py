@@ -30,7 +30,7 @@ LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face p
 
 
 class Planes(NamedTuple):
-    """Planes in the order of their cuts: (k, 3) normals, (k,) offsets, and (k, m) which of the faces each may cut, (0, 0): all."""
+    """Planes in the order of their cuts: (k, 3) normals, (k,) offsets, and (k, m) which faces each may cut, (0, 0): all."""
 
     directions: Floats
     offsets_mm: Floats

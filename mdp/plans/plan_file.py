@@ -9,6 +9,7 @@
     normal = [0.0, 0.5, 0.8660254]      # printing direction; its base plane: the points p with normal . p = offset_mm
     offset_mm = 31.0
     process = {walls = 4}               # settings of this part alone
+    limbs_mm = [[0.0, 12.0, 48.0]]      # only the pieces above the plane at these points, the others stand; absent: all of them
 
     [[keep]]                            # no plane passes through this box of the workpiece frame
     min_mm = [-5.0, -5.0, 20.0]
@@ -27,7 +28,7 @@
     angle_deg = 30.0
 
     [[front]]                           # the best decomposition of every other number of parts, for --parts
-    planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ...
+    planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ..., then the points of its limbs, if any
 
 A file of planes by hand needs no sha256, and a part may leave out `normal` or `offset_mm`: the search completes it.
 """
@@ -50,7 +51,7 @@ VERSION = 1  # of what a plan's keys mean
 GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
 ZONE_KINDS = ("keep", "no_seam", "no_support")  # as mdp.zone.Zones has them
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "front")
-PART_KEYS = ("normal", "offset_mm", "process")
+PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
 ZONE_KEYS = ("min_mm", "max_mm", "axes", "colour", "point_mm", "angle_deg")
 ROW_FIGURES = ("support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2")
 ROW_KEYS = ("planes", *ROW_FIGURES)
@@ -58,16 +59,26 @@ ROW_KEYS = ("planes", *ROW_FIGURES)
 
 @dataclass(frozen=True)
 class PlannedPart:
-    """The base plane of a part, its normal of length 1; None: to be found by the search. remark: a comment for the reader."""
+    """The base plane of a part, its normal of length 1; None: to be found by the search. limbs_mm: a point on each piece above
+    the plane that the part is; none: it is all that lies above. remark: a comment for the reader."""
 
     normal: Vector | None
     offset_mm: float | None
     remark: str = field(default="", compare=False)
+    limbs_mm: tuple[Vector, ...] = ()
+
+    @classmethod
+    def of(cls, plane: Plane, remark: str = "") -> "PlannedPart":
+        """The part that stands on a plane."""
+        limbs_mm = () if plane.limbs_mm is None else tuple(map(_vector, plane.limbs_mm))
+        return cls(_vector(plane.normal), float(plane.offset_mm), remark, limbs_mm)
 
     @property
     def plane(self) -> Plane | None:
         """The plane where it is given whole."""
-        return None if self.normal is None or self.offset_mm is None else Plane(np.array(self.normal), self.offset_mm)
+        if self.normal is None or self.offset_mm is None:
+            return None
+        return Plane(np.array(self.normal), self.offset_mm, np.array(self.limbs_mm) if self.limbs_mm else None)
 
 
 @dataclass(frozen=True)
@@ -126,9 +137,8 @@ def plan_of(
     """The plan of a decomposition."""
     rows = tuple(_row(row) for row in decomposition.front)
     parts = tuple(
-        PlannedPart(
-            _vector(part.base.normal),
-            float(part.base.offset_mm),
+        PlannedPart.of(
+            part.base,
             f"part {part.index}: {part.volume_mm3 / 1000:.2f} cm3, printed at tilt {part.pose.tilt_deg:.2f} and turn "
             f"{part.pose.turn_deg:.2f} deg",
         )
@@ -140,7 +150,7 @@ def plan_of(
 
 
 def _row(row: FrontRow) -> PlannedRow:
-    parts = tuple(PlannedPart(_vector(plane.normal), float(plane.offset_mm)) for plane in reversed(row.planes))
+    parts = tuple(map(PlannedPart.of, reversed(row.planes)))
     return planned_row(parts, row)
 
 

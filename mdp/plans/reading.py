@@ -22,6 +22,7 @@ from mdp.plans.plan_file import (
     PlannedPart,
     PlannedRow,
 )
+from mdp.sweep.limbs import MOST_JOINED
 from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, Painted, Zone, Zones
 from profiles.errors import PlanError, reason
 from profiles.frozen import Vector
@@ -76,7 +77,15 @@ class _Reader:
         self._only(table, PART_KEYS, where)
         normal = self._unit(table["normal"], f"{where}normal") if "normal" in table else None
         offset_mm = self._number(table["offset_mm"], f"{where}offset_mm") if "offset_mm" in table else None
-        return PlannedPart(normal, offset_mm)
+        limbs_mm = self._points(table["limbs_mm"], f"{where}limbs_mm") if "limbs_mm" in table else ()
+        if limbs_mm and (normal is None or offset_mm is None):
+            raise self._error(f"{where}limbs_mm needs both normal and offset_mm: which pieces lie above depends on them")
+        return PlannedPart(normal, offset_mm, limbs_mm=limbs_mm)
+
+    def _points(self, value: Any, key: str) -> tuple[Vector, ...]:
+        if not isinstance(value, list) or not 1 <= len(value) <= MOST_JOINED:
+            raise self._error(f"{key} is {_show(value)}: a list of 1 to {MOST_JOINED} points is expected, as [[0, 12, 48]]")
+        return tuple(self._vector(point, key) for point in value)
 
     def _settings(self, table: dict[str, Any], number: int) -> PartSettings:
         process = table["process"]
@@ -92,9 +101,16 @@ class _Reader:
             raise self._error(f"{where}planes is {_show(planes)}: a list of [x, y, z, offset_mm] is expected")
         parts = []
         for plane in planes:
-            values = self._numbers(plane, f"{where}planes", 4)
-            parts.append(PlannedPart(self._unit(values[:3], f"{where}planes"), self._number(values[3], f"{where}planes")))
+            parts.append(self._row_part(plane, f"{where}planes"))
         return PlannedRow(tuple(parts), **{key: self._number(table.get(key, 0.0), where + key, 1e15) for key in ROW_FIGURES})
+
+    def _row_part(self, plane: Any, key: str) -> PlannedPart:
+        """A part by the four numbers of its plane and three more for each of its limbs."""
+        limbs = (len(plane) - 4) // 3 if isinstance(plane, list) else 0
+        values = self._numbers(plane, key, 4 + 3 * min(max(limbs, 0), MOST_JOINED))
+        points = [values[at : at + 3] for at in range(4, len(values), 3)]
+        limbs_mm = tuple(self._vector(point, key) for point in points)
+        return PlannedPart(self._unit(values[:3], key), self._number(values[3], key), limbs_mm=limbs_mm)
 
     def _zones(self, table: dict[str, Any], key: str) -> tuple[AnyZone, ...]:
         zones: list[AnyZone] = []

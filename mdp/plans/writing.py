@@ -6,6 +6,7 @@ from typing import Any
 import tomlkit
 
 from mdp.mesh import colour_text
+from mdp.plane import Plane
 from mdp.plans.plan_file import ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
 from mdp.zone import AnyZone, Grown, Painted
 
@@ -64,11 +65,19 @@ def _part_table(part: PlannedPart, process: Mapping[str, Any]) -> tomlkit.items.
         table["normal"] = list(part.normal)
     if part.offset_mm is not None:
         table["offset_mm"] = part.offset_mm
+    if part.limbs_mm:
+        table["limbs_mm"] = [list(point) for point in part.limbs_mm]
     if process:
         own = tomlkit.inline_table()
         own.update(process)
         table["process"] = own
     return table
+
+
+def _numbers(plane: Plane) -> list[float]:
+    """A plane in a row: its normal, its offset, and the points of its limbs."""
+    limbs_mm = [] if plane.limbs_mm is None else plane.limbs_mm.ravel().tolist()
+    return [*plane.normal.tolist(), plane.offset_mm, *limbs_mm]
 
 
 def _row_table(row: PlannedRow) -> tomlkit.items.Table:
@@ -77,7 +86,7 @@ def _row_table(row: PlannedRow) -> tomlkit.items.Table:
     count = len(row.parts) + 1
     table.add(tomlkit.comment(f"{count} part{'s' * (count > 1)}"))
     planes = tomlkit.array()
-    planes.extend([[*plane.normal.tolist(), plane.offset_mm] for part in row.parts if (plane := part.plane) is not None])
+    planes.extend([_numbers(plane) for part in row.parts if (plane := part.plane) is not None])
     table["planes"] = planes.multiline(len(row.parts) > 1)
     table.update({figure: getattr(row, figure) for figure in ROW_FIGURES})
     return table

@@ -42,6 +42,7 @@ class Reason(IntEnum):
     GAIN = 8
     KEEP = 9
     WEAK = 10
+    STANDING = 11
 
 
 REASONS = {
@@ -55,6 +56,7 @@ REASONS = {
     Reason.GAIN: "it would make too little safe for the seam it leaves (search.seam_mm, search.least_gain)",
     Reason.KEEP: "the plane would pass through a zone that stays whole ([[keep]])",
     Reason.WEAK: "the nozzle could break the part or a piece of it off its base (search.nozzle_load_n)",
+    Reason.STANDING: "the head would meet what stands beside it",
 }
 
 

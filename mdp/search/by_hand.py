@@ -12,7 +12,7 @@ from math import ceil, cos, floor, radians, sin
 import numpy as np
 
 from mdp.clearance import find_obstacle, lowest_body
-from mdp.cut import corners_above, passing_places
+from mdp.cut import above, divide, mesh_of, passing_places
 from mdp.directions.frame import frame_across
 from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text
 from mdp.overhang import threshold
@@ -32,6 +32,7 @@ LEANS_DEG = (0.0, 1.0, 3.0)
 MOST_PLACES = 400  # along a normal that are looked at for the nearest one to a plane
 FARTHER_LEANS_DEG = (*LEANS_DEG, 10.0, 30.0)  # on a model with steps all the way up only these miss them
 OUT_OF_REACH = "what it stands on is out of reach"
+LIMB_SHIFT_MM = 0.5  # between the places along a normal that are looked at for limbs, each of them by itself
 MOST_SHOWN = 8  # colours in a message
 
 
@@ -91,9 +92,36 @@ class Refusal:
 
 def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     """The node after a person's cut, or the reason why it cannot be made."""
-    why = refusal(problem, node, plane)
-    child = problem.cut(node, plane) if why is None else None
-    return child if child is not None else why or Refusal(OUT_OF_REACH, Reason.REACH)
+    named = name_limbs(node, plane)
+    if isinstance(named, Refusal):
+        return named
+    why = refusal(problem, node, named)
+    child = problem.cut(node, named) if why is None else None
+    if child is not None:
+        return child
+    floats = Refusal(REASONS[Reason.FLOATING], Reason.FLOATING)
+    return why or (Refusal(OUT_OF_REACH, Reason.REACH) if named.limbs_mm is None else floats)
+
+
+def name_limbs(node: Node, plane: Plane) -> Plane | Refusal:
+    """A plane whose limbs are named by vertices, those farthest from it where they are not; without limbs where they are all that
+    lies above it. A limb is the piece above the plane that is nearest to its point."""
+    if plane.limbs_mm is None:
+        return plane
+    limbs, standing = divide(above(node.solid, plane), plane.limbs_mm)
+    if limbs.is_empty():
+        return Refusal("nothing lies above its plane")
+    if standing.is_empty():
+        return replace(plane, limbs_mm=None)
+    surface = mesh_of(limbs)
+    if all((surface.vertices == point).all(axis=1).any() for point in plane.limbs_mm):
+        return plane
+    away_mm = [surface.distance_mm(point) for point in plane.limbs_mm]
+    if max(away_mm) > FARTHEST_MM:
+        place = ", ".join(f"{x:.4g}" for x in plane.limbs_mm[int(np.argmax(away_mm))])
+        return Refusal(f"no piece above its plane lies at {place}: the nearest one is {max(away_mm):.3g} mm away")
+    tops = [piece.vertices[np.argmax(piece.vertices @ plane.normal)] for piece in map(mesh_of, limbs.decompose())]
+    return replace(plane, limbs_mm=np.array(tops))
 
 
 def cut_near(problem: Problem, node: Node, plane: Plane) -> Node | None:
@@ -109,6 +137,9 @@ def cut_near(problem: Problem, node: Node, plane: Plane) -> Node | None:
 
 def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
     """The planes around one that the sweep finds nothing against: shifted ones, the nearest first, then leaning ones."""
+    if plane.limbs_mm is not None:
+        yield from _beside_limbs(problem, node, plane)
+        return
     vertices, passed = node.remainder.mesh.vertices, passing_places(node.remainder.mesh, plane)
     if len(passed) == 0:
         return
@@ -126,9 +157,25 @@ def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
                 yield Plane(normals[row[place]], float(offsets[row[place], column[place]]))
 
 
+def _beside_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
+    """The planes around that of limbs that nothing is found against, the nearest first, then leaning ones."""
+    passed = passing_places(node.remainder.mesh, plane)
+    middle = passed.mean(axis=0) if len(passed) else plane.offset_mm * plane.normal
+    shifts = sorted(range(-MOST_SHIFTS, MOST_SHIFTS + 1), key=abs)
+    for lean_deg in LEANS_DEG:
+        for normal in _leaning(plane.normal, lean_deg):
+            for shift in shifts:
+                near = replace(plane, normal=normal, offset_mm=float(normal @ middle) + SHIFT_MM * shift)
+                if refusal(problem, node, near) is None:
+                    yield near
+
+
 def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
     """The planes that the sweep finds nothing against, over the whole height of what remains: first those of the same normal, the
     nearest first, then those that lean by a few degrees."""
+    if plane.limbs_mm is not None:
+        yield from _planes_near_limbs(problem, node, plane)
+        return
     vertices = node.remainder.mesh.vertices
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # a plane that leans, leans about it
@@ -145,6 +192,17 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
                 yield Plane(normal, float(offset_mm))
 
 
+def _planes_near_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
+    """The same for the plane of limbs, along its normal only."""
+    heights = node.remainder.mesh.vertices @ plane.normal
+    low, high = float(heights.min()), float(heights.max())
+    offsets = np.arange(low, high, max(LIMB_SHIFT_MM, (high - low) / MOST_PLACES))
+    for offset_mm in offsets[np.argsort(np.abs(offsets - plane.offset_mm), kind="stable")]:
+        near = replace(plane, offset_mm=float(offset_mm))
+        if refusal(problem, node, near) is None:
+            yield near
+
+
 def _leaning(normal: Floats, lean_deg: float) -> Floats:
     """(k, 3) normals that lean four ways from one; itself for 0."""
     if lean_deg == 0.0:
@@ -158,6 +216,8 @@ def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     why = _refusal(problem, node, plane)
     if why is not None or not problem.settings.clearance:
         return why
+    if plane.limbs_mm is not None and not problem.is_clear(node, plane):
+        return Refusal(REASONS[Reason.STANDING], Reason.STANDING)
     hindrance = _find_hindrance(problem, node, plane)
     return None if hindrance is None else Refusal(hindrance, Reason.REACH)
 
@@ -180,12 +240,15 @@ def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     if missed is not None:
         return Refusal(missed)
     limits = _limits(problem, plane.normal[None])
-    checked = problem.check_plane(node, plane, limits)
-    reason = Reason(int(checked.reason[0]))
+    if plane.limbs_mm is None:
+        checked = problem.check_plane(node, plane, limits)
+        reason, fragile_mm = Reason(int(checked.reason[0])), float(checked.fragile_mm[0])
+    else:
+        reason, fragile_mm = problem.check_limbs(node, plane, limits), problem.sliver_mm(node, plane)
     if reason == Reason.WEAK:
         stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
         return Refusal(f"{REASONS[reason]}: {problem.settings.nozzle_load_n:g} N at its top are {stress}", reason)
-    text = _explain(problem, plane, limits, reason, float(checked.fragile_mm[0]))
+    text = _explain(problem, plane, limits, reason, fragile_mm)
     return None if text is None else Refusal(text, reason)
 
 
@@ -229,7 +292,7 @@ def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fra
 
 def _find_hindrance(problem: Problem, node: Node, plane: Plane) -> str | None:
     """Why no pose serves a part that the sweep found nothing against; None: one does."""
-    points, machine = corners_above(node.remainder.mesh, plane) + problem.place_mm, problem.machine
+    points, machine = problem.corners_cut(node, plane) + problem.place_mm, problem.machine
     if len(points) == 0:
         return "nothing lies above its plane"
     obstacles = [find_obstacle(machine, pose, points) for pose in poses(machine, plane.normal)]

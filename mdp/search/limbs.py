@@ -1,8 +1,8 @@
 """Limbs: a search beside the beam's whose cuts may take single limbs off and leave the others standing.
 
-The beam's cuts take all that lies above their planes. Letting single limbs compete with them for its slots can end worse, so limbs
-have a search of their own. It chooses among few planes: the limbs that would save something of the uncut model, the head being
-clear of what stands there, and the planes that the beam's ranking puts first. What they save of a node is summed up anew.
+The beam's cuts take all that lies above their planes. Letting single limbs compete with them for its slots can end worse, so
+limbs have a search of their own. It chooses among few planes: the limbs that would save something of the uncut model, the head
+being clear of what stands there, and the planes that the beam's ranking puts first. What they save of a node is summed up anew.
 """
 
 from collections.abc import Iterator, Sequence

@@ -5,15 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.clearance import lowest_body
-from mdp.cut import Solid, above, below, corners_above, mesh_of, passing_places
+from mdp.cut import Solid, above, below, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.plane import Plane
 from mdp.pose import poses, rotation, shift
 from mdp.ranking.candidates import COPLANAR_MM, Reason
-from mdp.search.by_hand import Refusal
+from mdp.search.by_hand import Refusal, name_limbs
 from mdp.search.node import Node
 from mdp.search.problem import Problem
+from mdp.standing import places_met
+from mdp.sweep.limbs import limb_faces
 from mdp.sweep.slivers import SLIVER_COSINE
 from mdp.zone import Zone
 from profiles.frozen import Vector
@@ -62,19 +64,34 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
         case Reason.WEAK:
             section = passing_places(node.remainder.mesh, plane)
             return Obstacle((_vector(0.5 * (section.min(axis=0) + section.max(axis=0))),))
+        case Reason.STANDING:
+            return _standing(problem, node, plane)
         case Reason.REACH:
-            return _outside(problem, corners_above(node.remainder.mesh, plane), plane)
+            return _outside(problem, problem.corners_cut(node, plane), plane)
+    return None
+
+
+def _standing(problem: Problem, node: Node, plane: Plane) -> Obstacle | None:
+    """The places of what stands above a plane that ask for a higher tip than the limbs beside them have."""
+    named = name_limbs(node, plane)
+    if isinstance(named, Refusal):
+        return None
+    mesh, limb = node.remainder.mesh, limb_faces(node.remainder, named)
+    corners = mesh.vertices[mesh.faces]
+    for pose in poses(problem.machine, plane.normal)[:1]:
+        places = places_met(problem.machine, pose, corners[limb], corners[~limb], plane.offset_mm)
+        return Obstacle(tuple(_vector(place) for place in places[:MOST_PLACES])) if len(places) else None
     return None
 
 
 def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
     """The head at the lowest place of what is cut off, at the pose that needs least."""
-    machine, mesh = problem.machine, node.remainder.mesh
+    machine = problem.machine
     options = [(*lowest_body(machine, pose), pose) for pose in poses(machine, plane.normal)]
     if not options:
         return None
     _, body, point, pose = min(options, key=lambda option: option[0])
-    printed = corners_above(mesh, plane)
+    printed = problem.corners_cut(node, plane)
     tip, turned = printed[int(np.argmin(printed[:, 2]))], rotation(machine, pose)
     x, y, _ = tip + np.array(point) @ turned
     return Touch(body, _vector(tip), tuple(_vector(row) for row in turned), (float(x), float(y), 0.0))

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms
 from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
@@ -14,7 +12,6 @@ from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, least_rotation, level, poses, rotation
 from mdp.search.node import Node
 from mdp.search.problem import Problem
-from mdp.standing import passes_clear
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
 from mdp.sweep.rims import NO_RIM
@@ -36,6 +33,10 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     bases = [PLATFORM, *(cut.base for cut in reversed(node.cuts))]
     pieces = [node.piece, *(node.places.surface.piece(cut.solid) for cut in reversed(node.cuts))]
 
+    ancestors = [node]  # for each part the node that it was cut off, the first one's is the last
+    while ancestors[-1].parent is not None:
+        ancestors.append(ancestors[-1].parent)
+
     def allowed(position: int, near_turn_deg: float | None = None) -> list[Pose]:
         base, mesh = bases[position], pieces[position].mesh
         if not clearance:
@@ -43,9 +44,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
         reached = allowed_poses(machine, base.normal, mesh.vertices + problem.place_mm, near_turn_deg)
         if base.limbs_mm is None:
             return reached
-        stands = np.concatenate([piece.mesh.vertices[piece.mesh.faces] for piece in pieces[:position]])
-        tips = mesh.vertices[mesh.faces]
-        return [pose for pose in reached if passes_clear(machine, pose, tips, stands, base.offset_mm)]
+        return list(problem.clear_poses(ancestors[position], base, reached))
 
     def fits(position: int, pose: Pose) -> bool:
         return not clearance or pose in allowed(position, pose.turn_deg)

@@ -1,6 +1,6 @@
 """Problem: what one search holds fixed, which planes may cut a node, and what a cut makes of it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
 from math import radians, sin, sqrt
 from time import perf_counter
@@ -10,12 +10,13 @@ import numpy as np
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
 from mdp.cost.model_need import ModelNeed, ModelSurface
-from mdp.cut import Solid, below, cut, solid_of
+from mdp.cut import Solid, below, corners_above, cut, solid_of
 from mdp.directions.flats import Flats
 from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
+from mdp.pose import Pose
 from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import (
     COPLANAR_MM,
@@ -220,7 +221,7 @@ class Problem:
         return LimbGrid(
             directions=limits.directions,
             step_mm=step_mm,
-            least_offset_mm=limits.least_offset_mm,
+            least_offset_mm=np.full(len(limits.directions), -np.inf),
             least_height_mm=limits.least_height_mm,
             keep_mm=limits.keep_mm,
             seam_mm=self.terms.seam_mm,
@@ -240,8 +241,6 @@ class Problem:
         serve is known only after the cut."""
         sums, offset_mm, keep_mm = self.limb_sums(node, [plane]), plane.offset_mm, limits.keep_mm[0]
         least_mm2 = max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2)
-        if offset_mm < limits.least_offset_mm[0]:
-            return Reason.PLATFORM
         if not sums.exists[0] or sums.contact_mm2[0] < least_mm2:
             return Reason.INTERFACE
         if not np.isfinite(limits.least_height_mm[0]):
@@ -252,12 +251,24 @@ class Problem:
             return Reason.VOLUME
         if ((keep_mm[:, 0] < offset_mm) & (offset_mm < keep_mm[:, 1])).any():
             return Reason.KEEP
-        limb = limb_vertices(node.remainder, plane)
-        if sliver_mm(node.remainder.facets, limb, plane, frame_across(plane.normal)) < max(self.settings.fragile_mm, COPLANAR_MM):
+        if self.sliver_mm(node, plane) < max(self.settings.fragile_mm, COPLANAR_MM):
             return Reason.FRAGILE
         if self.is_weak(node, plane):
             return Reason.WEAK
         return Reason.FEASIBLE
+
+    def sliver_mm(self, node: Node, plane: Plane) -> float:
+        """How thin a sliver the cut of a plane's limbs would leave."""
+        limb = limb_vertices(node.remainder, plane)
+        return sliver_mm(node.remainder.facets, limb, plane, frame_across(plane.normal))
+
+    def corners_cut(self, node: Node, plane: Plane) -> Floats:
+        """(n, 3) the corners of what a plane would cut off a node: vertices, and where edges pass through the plane. Nothing is
+        cut."""
+        mesh = node.remainder.mesh
+        if plane.limbs_mm is not None:
+            mesh = Mesh(mesh.vertices, mesh.faces[limb_faces(node.remainder, plane)])
+        return corners_above(mesh, plane)
 
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
         """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
@@ -310,16 +321,19 @@ class Problem:
         return Node(rest, (*node.cuts, Cut(plane, node.solid, self._cost(node, plane))), self.terms, node.places, node)
 
     def is_clear(self, node: Node, plane: Plane) -> bool:
-        """Whether the head passes clear of what stands, at some pose, while the limbs of a plane are printed."""
+        """Whether the limbs of a plane can be printed at some pose, the head clear of what stands beside them."""
         if not self.settings.clearance:
             return True
+        poses = allowed_poses(self.machine, plane.normal, self.corners_cut(node, plane) + self.place_mm)
+        return any(True for _ in self.clear_poses(node, plane, poses))
+
+    def clear_poses(self, node: Node, plane: Plane, poses: Sequence[Pose]) -> Iterator[Pose]:
+        """Those of some poses at which the head passes clear of what stands while the limbs of a plane, cut off a node, are
+        printed."""
         mesh, limb = node.remainder.mesh, limb_faces(node.remainder, plane)
-        heights = plane.heights_mm(mesh.vertices)[mesh.faces]
         corners = mesh.vertices[mesh.faces]
-        tips, stands = corners[limb], corners[(heights > 0.0).any(axis=1) & ~limb]
-        points = tips.reshape(-1, 3)[heights[limb].ravel() > 0.0]
-        poses = allowed_poses(self.machine, plane.normal, points + self.place_mm)
-        return any(passes_clear(self.machine, pose, tips, stands, plane.offset_mm) for pose in poses)
+        stands = corners[(plane.heights_mm(mesh.vertices) > 0.0)[mesh.faces].any(axis=1) & ~limb]
+        return (pose for pose in poses if passes_clear(self.machine, pose, corners[limb], stands, plane.offset_mm))
 
     def _cost(self, node: Node, plane: Plane) -> CutCost:
         """What a cut costs for ever."""

@@ -7,7 +7,7 @@ trial has in common with the one before not again. Of a plane that is dragged wh
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -17,7 +17,7 @@ from mdp.mesh import Mesh
 from mdp.overhang import UP
 from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
-from mdp.search.by_hand import Refusal, cut_or_refuse, planes_near, refusal
+from mdp.search.by_hand import Refusal, cut_or_refuse, name_limbs, planes_near, refusal
 from mdp.search.neck import find_neck
 from mdp.search.node import Node
 from mdp.search.obstacle import Obstacle, find_refused
@@ -29,7 +29,7 @@ MOST_TRIED = 16  # places for a plane that the sweep finds nothing against
 APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were refused;
 # once a place is found, those passed over on the way to it are searched by bisection
 
-Key = tuple[float, float, float, float]
+Key = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Trials:
         self._keep_alike(order)
         for done in range(len(self._cut), len(order)):
             whole = done < len(order) - 1 and most_cuts > 0
-            refused = self._cut_off(order[done]) if whole else refusal(self._problem, self._node, order[done])
+            refused = self._cut_off(order[done]) if whole else self._look(order[done])
             if refused is not None:
                 return self._refused(order, done, refused)
             if not whole:
@@ -85,7 +85,9 @@ class Trials:
         those cannot be cut off. planes as in attempt."""
         if not self._cut_later(planes, number):
             return None
-        return find_neck(self._node.remainder.mesh, self._node.seam_weights, planes[number - 2], reach_mm)
+        plane = planes[number - 2]
+        neck = find_neck(self._node.remainder.mesh, self._node.seam_weights, plane, reach_mm)
+        return None if neck is None else replace(neck, limbs_mm=plane.limbs_mm)
 
     def nearest(self, planes: Sequence[Plane], number: int) -> Plane | None:
         """The plane of the part of a number at the nearest place along its normal where all planes can be cut, else leaning by a
@@ -138,14 +140,25 @@ class Trials:
         self._cut.append((_key(plane), child))
         return None
 
+    def _named(self, order: Sequence[Plane]) -> list[Plane]:
+        """Planes in the order of their cuts, their limbs named by vertices of the model."""
+        made = [node.cuts[-1].base for _, node in self._cut[: len(order)]]
+        others = [name_limbs(self._node, plane) for plane in order[len(made) :]]
+        return [*made, *(plane for plane in others if isinstance(plane, Plane))]
+
+    def _look(self, plane: Plane) -> Refusal | None:
+        """Why a plane cannot cut what is left; nothing is cut."""
+        named = name_limbs(self._node, plane)
+        return named if isinstance(named, Refusal) else refusal(self._problem, self._node, named)
+
     def _allowed(self, order: Sequence[Plane], unchecked: int) -> Trial:
-        parts, left_mm2 = self._forecast.parts(order)
+        parts, left_mm2 = self._forecast.parts(self._named(order))
         support_mm2, seam_mm = left_mm2 + sum(part.support_mm2 for part in parts), sum(part.rim_mm for part in parts)
         return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=unchecked)
 
     def _refused(self, order: Sequence[Plane], done: int, why: Refusal) -> Trial:
         """What is known where the plane after so many cannot be cut."""
-        parts, _ = self._forecast.parts(order[:done])
+        parts, _ = self._forecast.parts(self._named(order[:done]))
         obstacle = find_refused(self._problem, self._node, order[done], why)
         return Trial((*[None] * (len(order) - done), *parts[::-1]), len(order) + 1 - done, why.text, obstacle=obstacle)
 
@@ -156,5 +169,5 @@ def _are_near(plane: Plane, other: Plane, apart_mm: float) -> bool:
 
 
 def _key(plane: Plane) -> Key:
-    x, y, z = (float(value) for value in plane.normal)
-    return x, y, z, plane.offset_mm
+    limbs_mm = () if plane.limbs_mm is None else tuple(plane.limbs_mm.ravel().tolist())
+    return *plane.normal.tolist(), plane.offset_mm, *limbs_mm

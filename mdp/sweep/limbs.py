@@ -1,9 +1,9 @@
 """Limbs: the pieces of a solid above each plane, and what each of them would save if it were cut off alone (numba kernels).
 
-A direction's offsets are passed from the top down. Vertices that come to lie above join their neighbours that do (union-find), and
-a face that comes to lie wholly above adds its sums to those of its piece. At each offset the faces that cross it add their shares.
-The first vertex of a void has solid above it: it joins the surface that a ray into the solid meets. So vertices, faces and
-crossings are what a direction costs, as in the sweep.
+A direction's offsets are passed from the top down. Vertices that come to lie above join their neighbours that do (union-find),
+and a face that comes to lie wholly above adds its sums to those of its piece. At each offset the faces that cross it add their
+shares. The first vertex of a void has solid above it: it joins the surface that a ray into the solid meets. So vertices, faces
+and crossings are what a direction costs, as in the sweep.
 """
 
 from collections.abc import Sequence
@@ -128,8 +128,8 @@ def find_limbs(remainder: Remainder, grid: LimbGrid, risky_below: float) -> Limb
 
 @dataclass(frozen=True, eq=False)
 class LimbSums:
-    """What cutting off limbs would do, (r,) each: as sweep.Gains and sweep.Sweep have it. contact_mm2: the least section of a limb
-    that is no crumb; exists: whether every limb still reaches above its plane; alone: whether nothing else does."""
+    """What cutting off limbs would do, (r,) each: as sweep.Gains and sweep.Sweep have it. contact_mm2: the least section of a
+    limb that is no crumb; exists: whether every limb still reaches above its plane; alone: whether nothing else does."""
 
     up_mm2: Floats
     residual_mm2: Floats
@@ -199,8 +199,8 @@ def limb_vertices(remainder: Remainder, plane: Plane) -> Mask:
 
 
 def limb_reach(remainder: Remainder, plane: Plane) -> Mask:
-    """(m,) the faces that a plane may cut when it is moved a little, in the order of a solid's mesh: those of its limbs and, below
-    it, those from which the steepest way up leads into one; without limbs all faces."""
+    """(m,) the faces that a plane may cut when it is moved a little, in the order of a solid's mesh: those of its limbs and,
+    below it, those from which the steepest way up leads into one; without limbs all faces."""
     facets = remainder.facets
     if plane.limbs_mm is None:
         return np.ones(len(remainder.mesh.faces), np.bool_)

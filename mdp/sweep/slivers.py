@@ -79,8 +79,9 @@ def least_distance_mm(corners: Floats, plane: Plane) -> float:
 
 
 def sliver_mm(facets: Facets, limb: Mask, plane: Plane, across: Floats) -> float:
-    """Distance from a plane up to the next surface of a limb that looks along its normal, and down to the next one straight below
-    it that looks against it: so thin is what the cut leaves. limb (n,): its vertices; across (2, 3): vectors across the normal."""
+    """Distance from a plane up to the next surface of a limb that looks along its normal, and down to the next one straight
+    below it that looks against it: so thin is what the cut leaves. limb (n,): its vertices; across (2, 3): vectors across the
+    normal."""
     vertices, faces = facets.mesh.vertices, facets.mesh.faces
     heights, cosines = plane.heights_mm(vertices), facets.mesh.normals @ plane.normal
     along, against = (np.zeros(len(vertices), np.bool_) for _ in range(2))

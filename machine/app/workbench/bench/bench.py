@@ -288,7 +288,7 @@ def with_parts(bench: Bench, count: int) -> Bench:
 
 def parts_of(row: FrontRow) -> tuple[PlannedPart, ...]:
     """The parts of a row from the second on, in print order."""
-    return tuple(PlannedPart(vector_of(plane.normal), float(plane.offset_mm)) for plane in reversed(row.planes))
+    return tuple(map(PlannedPart.of, reversed(row.planes)))
 
 
 def plan_of_bench(bench: Bench, name: str) -> PlanFile:

@@ -64,7 +64,9 @@ def moved_part(part: PlannedPart, move: Placing) -> PlannedPart:
     if part.normal is None or part.offset_mm is None:
         return part
     normal = move.turn @ np.array(part.normal)
-    return replace(part, normal=vector_of(normal), offset_mm=move.factor * part.offset_mm + float(normal @ move.shift_mm))
+    limbs_mm = tuple(vector_of(move.factor * move.turn @ np.array(point) + move.shift_mm) for point in part.limbs_mm)
+    offset_mm = move.factor * part.offset_mm + float(normal @ move.shift_mm)
+    return replace(part, normal=vector_of(normal), offset_mm=offset_mm, limbs_mm=limbs_mm)
 
 
 def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:

@@ -4,8 +4,10 @@ The edits take the bench, on which a model lies, and what is asked, and give the
 sense.
 """
 
+from dataclasses import replace
+
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.bench.values import MOST_MM, Asked, number, unit_vector, vector_of, whole
+from machine.app.workbench.bench.values import MOST_MM, Asked, number, unit_vector, vector, whole
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
@@ -42,8 +44,14 @@ def moved_alone(bench: Bench, asked: Asked) -> list[tuple[Cuts, int]]:
 
 
 def move_plane(bench: Bench, asked: Asked) -> Cuts:
-    """The plane of `part` becomes `normal`, `offset_mm`."""
-    return _replaced(bench, asked, _plane(asked))
+    """The plane of `part` becomes `normal`, `offset_mm`; its limbs stay."""
+    return _replaced(bench, asked, replace(_plane(asked), limbs_mm=planned_part(bench, asked).limbs_mm))
+
+
+def choose_limb(bench: Bench, asked: Asked) -> Cuts:
+    """`part` becomes the piece above its plane at `point_mm` alone, or without a point all that lies above."""
+    limbs_mm = () if asked.get("point_mm") is None else (vector(asked, "point_mm", MOST_MM),)
+    return _replaced(bench, asked, replace(planned_part(bench, asked), limbs_mm=limbs_mm))
 
 
 def remove_plane(bench: Bench, asked: Asked) -> Cuts:
@@ -61,7 +69,7 @@ def reorder(bench: Bench, asked: Asked) -> Cuts:
 
 def snap(bench: Bench, asked: Asked, plane: Plane) -> Cuts:
     """The plane of `part` becomes another one."""
-    return _replaced(bench, asked, PlannedPart(vector_of(plane.normal), float(plane.offset_mm)))
+    return _replaced(bench, asked, PlannedPart.of(plane))
 
 
 def planned_part(bench: Bench, asked: Asked) -> PlannedPart:

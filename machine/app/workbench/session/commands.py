@@ -7,7 +7,7 @@ from typing import Any
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.changes import lay, lock, reset_part, set_part, stand, take, turn
-from machine.app.workbench.bench.planes import Cuts, added_anywhere, move_plane, moved_alone, remove_plane, reorder
+from machine.app.workbench.bench.planes import Cuts, added_anywhere, choose_limb, move_plane, moved_alone, remove_plane, reorder
 from machine.app.workbench.bench.settings import with_name, with_typed, without_settings
 from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
 from machine.app.workbench.bench.values import Asked, text_or_none
@@ -126,6 +126,7 @@ COMMANDS: dict[str, Command] = {
     "move": _place("move a plane", moved_alone),
     "remove": _planes("remove a plane", remove_plane),
     "reorder": _planes("print a part at another time", reorder, _too_early),
+    "limb": _planes("choose a limb", choose_limb),
     "neck": Command(Need.MODEL, lambda session, asked: session.trials.take_neck(asked)),
     "lock": Command(Need.MODEL, _lock),
     "mark": _marks("mark"),

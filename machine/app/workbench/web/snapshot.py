@@ -15,8 +15,8 @@ from machine.view.front import front_record
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
-from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS
+from mdp.save import plane_values
 from mdp.zone import Zone
 
 MOST_FACES = 2_000_000  # that a page draws
@@ -37,7 +37,7 @@ def _state(session: Session) -> dict[str, Any]:
     standing = session.standing.now
     resting = session.resting[1] if bench.model is not None and session.resting[0] == bench.model.key else ()
     best = None if search is None else search.searched.best
-    planes = [] if best is None else [_plane(plane) for plane in reversed(best.planes)]
+    planes = [] if best is None else [plane_values(plane) for plane in reversed(best.planes)]
     return {
         "version": session.version,
         "problem": session.problem,
@@ -149,8 +149,4 @@ def _units(session: Session) -> dict[str, Any] | None:
 
 
 def _cuts(cuts: Cuts) -> list[dict[str, Any]]:
-    return [_plane(part.plane) for part in cuts if part.plane is not None]
-
-
-def _plane(plane: Plane) -> dict[str, Any]:
-    return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm}
+    return [plane_values(part.plane) for part in cuts if part.plane is not None]

@@ -11,7 +11,6 @@ import numpy as np
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.planes import Cuts
-from machine.app.workbench.bench.values import vector_of
 from machine.app.workbench.work.cutting import turned_mesh
 from machine.app.workbench.work.processes import Tell
 from mdp.cut import convex_hull
@@ -59,7 +58,7 @@ def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]
             continue
         leans, far_mm = float(plane.normal @ wanted.normal) < UNTILTED, abs(plane.offset_mm - wanted.offset_mm)
         if best is None or (leans, far_mm) < best[0]:
-            put = PlannedPart(vector_of(plane.normal), float(plane.offset_mm))
+            put = PlannedPart.of(plane)
             best = (leans, far_mm), (*cuts[: part - 2], put, *cuts[part - 1 :])
     return None if best is None else best[1]
 

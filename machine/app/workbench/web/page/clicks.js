@@ -6,21 +6,22 @@ import { layFacet } from "./facets.js";
 import { markAt, markWord } from "./marks-panel.js";
 import { openMenu } from "./parts-list.js";
 import { apartNow, pieceMet, shiftsOf } from "./pieces.js";
-import { choosePart, partAt, snapTo } from "./planes.js";
+import { choosePart, cutLimb, partAt, snapTo } from "./planes.js";
 import { store, subscribe, update } from "./store.js";
 import { faceMet, placeMet } from "./triangles.js";
 
 const STILL_PIXELS = 4; // a hand that moves less only clicks
-const BUTTONS = { lay: "lay", snap: "snap", faces: "mark-faces", box: "mark-box" };
+const BUTTONS = { lay: "lay", snap: "snap", limb: "limb", faces: "mark-faces", box: "mark-box" };
 const WANTED = {
   lay: () => "Click a lit face: it can rest on that.", snap: () => "Click the face whose plane it is to take.",
+  limb: () => "Click the limb above the plane that is to come off alone; the others stay.",
   faces: () => `Click where there is to be ${markWord()}; Esc ends it.`, box: () => (store.corner ? "Now the opposite corner." : "Click a corner of the box."),
 };
 
 export function clicksOf(picture) {
   for (const [clicks, id] of Object.entries(BUTTONS)) {
     $(id).addEventListener("click", () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }));
-    if (clicks !== "lay" && clicks !== "snap") $(id).disabled = !picture;
+    if (!["lay", "snap", "limb"].includes(clicks)) $(id).disabled = !picture;
   }
   if (picture) menuOf($("canvas"), picture);
   listen("change", { "mark-kind": () => update({ corner: null }) });
@@ -54,6 +55,7 @@ export function press(event, picture) {
   const spot = met(event, picture);
   if (!spot) return;
   if (clicks === "snap") snapTo(spot.face, picture);
+  else if (clicks === "limb") cutLimb(spot.place);
   else markAt(spot.place);
 }
 

@@ -62,12 +62,12 @@ export function modelOf(picture) {
   });
 }
 
-/** Parts in their colours where they are looked at, else red faces; the row of the front under the hand before it is taken, whatever is told
+/** Parts in their colours where they are looked at, single limbs only as pieces, else red faces; the row of the front under the hand before it is taken, whatever is told
  * meanwhile. */
 function look(picture, red) {
   const { state: { search, parts, colours }, tab, row, part } = store;
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;
-  picture.cut(cut ? planes : null, row || search ? colours : fadedColours(colours, part));
+  picture.cut(cut && !planes.some((plane) => plane.limbs_mm) ? planes : null, row || search ? colours : fadedColours(colours, part));
   picture.red(cut ? null : red);
   const entries = cut ? colours.slice(0, planes.length + 1).slice(0, MOST_NAMED).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`)) : [];
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));

@@ -6,7 +6,7 @@ import { alike, disable, fill, hide, listen, mm2, tell } from "./elements.js";
 import { sectionNow } from "./handles.js";
 import { send } from "./line.js";
 import { sizeOf } from "./model-panel.js";
-import { anglesOf, figuresNow, followHand, isLocked, planeNow, putNear, putPlane, removePart, reorderPart } from "./planes.js";
+import { anglesOf, cutLimb, figuresNow, followHand, isLocked, planeNow, putNear, putPlane, removePart, reorderPart } from "./planes.js";
 import { onState, store, subscribe, update } from "./store.js";
 
 const MOVED_MM = 0.01, MOVED_DEG = 0.05; // less is not told
@@ -27,7 +27,7 @@ export function planesPanel(picture) {
   const tellPlane = () => tellAll(alike(moved.cuts, store.state.cuts) ? moved.text : "");
   const leanAsTyped = () => lean(Number($("plane-tilt").value), Number($("plane-towards").value));
   byPlane("click", {
-    remove: removePart, neck: (part) => send({ do: "neck", part }), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
+    remove: removePart, neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
   });
   byPlane("change", {
     "plane-offset": () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
@@ -76,6 +76,7 @@ function tellAll(moved) {
     fill($("plane-tilt"), tilt.toFixed(1));
     fill($("plane-towards"), towards.toFixed(1));
     document.querySelectorAll("#plane input, #plane button").forEach((control) => { control.disabled = isLocked(); });
+    hide({ limb: Boolean(plane.limbs_mm), "all-above": !plane.limbs_mm });
     $("earlier").disabled ||= part === 2;
     $("later").disabled ||= part === cuts.length + 1;
   }

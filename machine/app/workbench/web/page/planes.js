@@ -106,6 +106,12 @@ export function reorderPart(part, to) {
   ask({ do: "reorder", part, to }, (refusal) => { if (!refusal) choosePart(to); });
 }
 
+/** The chosen part is the piece above its plane at a place of the platform's frame alone; null: all that lies above. */
+export function cutLimb(place) {
+  update({ clicks: "" });
+  if (planeNow()) send({ do: "limb", part: store.part, point_mm: place });
+}
+
 /** The plane takes that of a face of the model. */
 export function snapTo(face, picture) {
   update({ clicks: "" });

@@ -1,0 +1,112 @@
+"""Cuts that take single limbs off: found by the search, kept in plans, made by hand, and refused where the head would meet what
+stands."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.decomposition import Decomposition
+from mdp.mesh import Mesh
+from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
+from mdp.plans.reading import read_plan
+from mdp.plans.writing import plan_text
+from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import decompose
+from mdp.search.trial import Trials
+from profiles.errors import PlanError
+from profiles.profile import Profile, load
+from tests import shapes
+
+ALONG = (0.84, 0.0, (1.0 - 0.84**2) ** 0.5)
+TIP = (27.0, 0.0, 54.0)  # at the end of the bar
+BAR = PlannedPart(ALONG, 38.0, limbs_mm=(TIP,))  # the plane leaves the post above its foot
+
+
+def _profile(**search: object) -> Profile:
+    profile = load()
+    return profile.model_copy(update={"search": profile.search.model_copy(update=search)})
+
+
+def _by_hand(mesh: Mesh, part: PlannedPart) -> Decomposition:
+    return cut_by_plan(mesh, "bar", _profile(), PlanFile("plan.toml", parts=(part,)))
+
+
+def test_a_bar_beside_a_tower_is_cut_off_alone_where_no_half_space_is_worth_it() -> None:
+    mesh = shapes.bar_beside_a_tower()
+    whole, limbs = (decompose(mesh, "bar", _profile(single_limb=single)) for single in (False, True))
+    assert len(whole.parts) == 1
+    assert [part.base.limbs_mm is None for part in limbs.parts] == [True, False]
+    assert limbs.cost_mm2 < 0.95 * whole.cost_mm2
+    assert limbs.parts[1].mesh.bounds_mm[1, 0] == pytest.approx(27.0)
+    assert limbs.parts[0].mesh.bounds_mm[1, 2] == pytest.approx(75.0)  # the tower stands
+
+
+@pytest.mark.parametrize("terms", [{"objective": "risky"}, {"method": "published"}, {"single_limb": False}])
+def test_the_papers_terms_know_no_limbs(terms: dict[str, object]) -> None:
+    found = decompose(shapes.bar_beside_a_tower(), "bar", _profile(**terms))
+    assert all(part.base.limbs_mm is None for part in found.parts)
+
+
+def test_a_plan_brings_back_the_same_limb(tmp_path: Path) -> None:
+    mesh = shapes.bar_beside_a_tower()
+    found = decompose(mesh, "bar", _profile())
+    (tmp_path / "plan.toml").write_text(plan_text(plan_of(found)))
+    plan = read_plan(tmp_path / "plan.toml")
+    again = cut_by_plan(mesh, "bar", _profile(), plan)
+    assert again.cost_mm2 == pytest.approx(found.cost_mm2)
+    assert [part.volume_mm3 for part in again.parts] == pytest.approx([part.volume_mm3 for part in found.parts])
+    assert plan.front == plan_of(again).front
+
+
+def test_a_limb_by_hand_is_the_piece_above_the_plane_that_is_nearest_to_its_point() -> None:
+    mesh = shapes.bar_beside_a_tower()
+    on_its_end = _by_hand(mesh, BAR).parts[1]
+    on_its_side = _by_hand(mesh, replace(BAR, limbs_mm=((20.0, -6.0, 52.0),))).parts[1]
+    assert on_its_end.volume_mm3 == pytest.approx(on_its_side.volume_mm3)
+    assert on_its_end.mesh.bounds_mm[0, 2] == pytest.approx(48.0)
+
+
+def test_a_point_beside_every_piece_is_refused_with_its_distance() -> None:
+    with pytest.raises(PlanError, match="no piece above its plane lies at 27, 0, 70: the nearest one is 10 mm away"):
+        _by_hand(shapes.bar_beside_a_tower(), replace(BAR, limbs_mm=((27.0, 0.0, 70.0),)))
+
+
+def test_a_limb_too_near_to_a_tower_is_refused_and_the_place_of_the_tower_is_shown() -> None:
+    mesh = shapes.bar_beside_a_tower(gap=2.0)
+    with pytest.raises(PlanError, match="the head would meet what stands beside it"):
+        _by_hand(mesh, BAR)
+    trial = Trials(mesh, _profile()).attempt([plane for plane in (BAR.plane,) if plane is not None])
+    assert trial.obstacle is not None
+    assert np.array(trial.obstacle.places_mm)[:, 1].min() > 7.9
+
+
+def test_a_plan_with_limbs_but_without_a_plane_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text("version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\nlimbs_mm = [[0, 0, 1]]\n")
+    with pytest.raises(PlanError, match="part 2: limbs_mm needs both normal and offset_mm"):
+        read_plan(tmp_path / "plan.toml")
+
+
+@pytest.mark.parametrize(
+    "limbs", ["3", "[]", "[[1, 2]]", "[[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1]]"]
+)
+def test_points_that_are_none_are_refused_with_what_is_expected(tmp_path: Path, limbs: str) -> None:
+    text = f"version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 4\nlimbs_mm = {limbs}\n"
+    (tmp_path / "plan.toml").write_text(text)
+    with pytest.raises(PlanError, match="part 2: limbs_mm"):
+        read_plan(tmp_path / "plan.toml")
+
+
+def test_a_limb_moved_by_a_trial_keeps_its_point_and_its_figures_are_those_of_the_limb() -> None:
+    trials = Trials(shapes.bar_beside_a_tower(), _profile())
+    plane = BAR.plane
+    assert plane is not None
+    trial = trials.attempt([plane])
+    assert trial.refused == ""
+    forecast = trial.parts[0]
+    assert forecast is not None
+    assert forecast.volume_mm3 == pytest.approx(_by_hand(shapes.bar_beside_a_tower(), BAR).parts[1].volume_mm3)
+    nearest = trials.nearest([replace(plane, offset_mm=plane.offset_mm - 12.0)], 2)
+    assert nearest is not None
+    assert nearest.limbs_mm is not None
