@@ -165,9 +165,8 @@ def _beside_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]
     for lean_deg in LEANS_DEG:
         for normal in _leaning(plane.normal, lean_deg):
             for shift in shifts:
-                near = replace(plane, normal=normal, offset_mm=float(normal @ middle) + SHIFT_MM * shift)
-                if refusal(problem, node, near) is None:
-                    yield near
+                offset_mm = float(normal @ middle) + SHIFT_MM * shift
+                yield from _if_free(problem, node, replace(plane, normal=normal, offset_mm=offset_mm))
 
 
 def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
@@ -198,9 +197,14 @@ def _planes_near_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[P
     low, high = float(heights.min()), float(heights.max())
     offsets = np.arange(low, high, max(LIMB_SHIFT_MM, (high - low) / MOST_PLACES))
     for offset_mm in offsets[np.argsort(np.abs(offsets - plane.offset_mm), kind="stable")]:
-        near = replace(plane, offset_mm=float(offset_mm))
-        if refusal(problem, node, near) is None:
-            yield near
+        yield from _if_free(problem, node, replace(plane, offset_mm=float(offset_mm)))
+
+
+def _if_free(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
+    """A plane, its limbs named, where nothing is found against it."""
+    named = name_limbs(node, plane)
+    if isinstance(named, Plane) and refusal(problem, node, named) is None:
+        yield named
 
 
 def _leaning(normal: Floats, lean_deg: float) -> Floats:
