@@ -361,7 +361,7 @@ def _volume(pieces: Pieces, piece: int, column: int) -> float:
     return float(_value(pieces, piece, MOMENT) - column * pieces.whole[piece, SECTION])
 
 
-@borrower
+@inlined
 def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
     """What cutting off a piece would gain and lose, the cut itself left out; seam_mm: for RIM in steps."""
     stairs, seam = _value(pieces, piece, STAIRS), seam_mm * _value(pieces, piece, RIM)

@@ -73,7 +73,7 @@ REFUSED = [
     ("version = 1\norientation = 7", "orientation is 7: 3 numbers in brackets are expected"),
     (f"{FIRST}process = 4", "part 1: process is 4: keys and values are expected, as {walls = 4}"),
     ("version = 1\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 5", "part 1 stands on the platform and has no plane"),
-    (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is no key of a plan: normal, offset_mm, process are allowed"),
+    (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is no key of a plan: normal, offset_mm, limbs_mm, process are allowed"),
     (f"{FIRST}[[part]]\nnormal = [0, 1]", "part 2: normal is [0, 1]: 3 numbers in brackets are expected"),
     (f"{FIRST}[[part]]\nnormal = 'up'", "part 2: normal is 'up': 3 numbers in brackets are expected"),
     (f"{FIRST}[[part]]\nnormal = [0, 0, nan]", "part 2: normal is [0, 0, nan]: 3 numbers in brackets are expected"),

@@ -108,7 +108,8 @@ def costs_mm2(mesh: Mesh) -> Floats:
     remainder = Remainder(mesh, risky_upright(mesh, UP_DEG) & pieces.upright, pieces=pieces)
     swept = gains(remainder, DIRECTIONS, 0.73, threshold(UP_DEG))
     sums = [np.concatenate((swept.up_mm2[k, :n], swept.residual_mm2[k, :n])) for k, n in enumerate(swept.columns)]
-    return np.concatenate([*sums, [excess_mm2(mesh, pieces, Plane(direction, 2.3)) for direction in DIRECTIONS]])
+    every = np.ones(len(mesh.faces), np.bool_)
+    return np.concatenate([*sums, [excess_mm2(mesh, pieces, Plane(direction, 2.3), every) for direction in DIRECTIONS]])
 
 
 @settings(max_examples=15)
