@@ -22,11 +22,10 @@ from mdp.plans.plan_file import PlanFile
 from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
-from mdp.search.beam import Beam
+from mdp.search.beam import Beam, search_limbs
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
 from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
-from mdp.search.limbs import search_limbs
 from mdp.search.node import Node
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.polish import make_regular, polish

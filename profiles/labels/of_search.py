@@ -36,5 +36,6 @@ SEARCH: dict[str, Label] = {
     "least_gain_preferred": rare("Least share a preferred cut makes safe"),
     "platform_radius_mm": rare("Radius that planes must clear"),
     "count_platform_faces": rare("Count faces on the platform"),
+    "single_limb": simple("Cut off single limbs", "branch arm leg tree one at a time"),
     "clearance": rare("Heed the head and the axes", "collision"),
 }
