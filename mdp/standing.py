@@ -41,9 +41,20 @@ class Standing:
         highest_first = np.argsort(-points_mm[:, 2], kind="stable")
         return cls(np.ascontiguousarray(points_mm[highest_first]), slack_mm, head_of(machine), machine.clearance_mm)
 
-    def least_tip_mm(self, places_mm: Floats) -> Floats:
-        """(n,) least heights of the tip over (n, 2) places; NOTHING where nothing asks for one."""
-        return _least_tip(np.ascontiguousarray(places_mm), self.points_mm, self.slack_mm, self.head, self.clearance_mm)
+    def least_tip_mm(self, places_mm: Floats, known_mm: float = NOTHING) -> Floats:
+        """(n,) least heights of the tip over (n, 2) places; NOTHING where nothing asks for one. known_mm: a height that the tip
+        has in any case: where no more than that is asked for, less or nothing may be told."""
+        count = int(np.searchsorted(-self.points_mm[:, 2], self.slack_mm - known_mm))
+        places, points = np.ascontiguousarray(places_mm), self.points_mm[:count]
+        return _least_tip(places, points, self.slack_mm, self.head, self.clearance_mm)
+
+
+def highest_in_cells(points_mm: Floats, cell_mm: float) -> Floats:
+    """(c, 3) the middles of the cells of a lattice over X and Y in which any of (n, 3) points lie, and their greatest heights."""
+    cells, inverse = np.unique(np.floor(points_mm[:, :2] / cell_mm).astype(np.int64), axis=0, return_inverse=True)
+    highest = np.full(len(cells), -np.inf)
+    np.maximum.at(highest, inverse.ravel(), points_mm[:, 2])
+    return np.column_stack([(cells + 0.5) * cell_mm, highest])
 
 
 @borrower

@@ -45,7 +45,8 @@ def _part_moved(part: Part, shift: Floats) -> Part:
 
 
 def _plane_moved(plane: Plane, shift: Floats) -> Plane:
-    return Plane(plane.normal, plane.offset_mm + float(plane.normal @ shift))
+    limbs_mm = None if plane.limbs_mm is None else plane.limbs_mm + shift
+    return Plane(plane.normal, plane.offset_mm + float(plane.normal @ shift), limbs_mm)
 
 
 def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine, about_mm: Place = MIDDLE) -> list[Place]:

@@ -16,11 +16,11 @@ import numpy as np
 from mdp.mesh import Floats
 from mdp.pose import shift
 from slicer.geometry.polygons import Polygons, offset, union
+from slicer.interface.base_plane import BasePlane
 from slicer.interface.interface import frame_change
 from slicer.overhangs import LEAST_MM2
 from slicer.sections import Sections
 from slicer.support.blocker import blocked_areas, near_table, support_reach_mm
-from slicer.support.handed_down.base_plane import BasePlane
 from slicer.support.handed_down.patch import NEAR_MM, Patch, keep_off, upper_side
 from slicer.support.missed import find_missed
 from slicer.support.reachable import ReachableAreas, reachable_areas

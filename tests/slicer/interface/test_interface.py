@@ -122,7 +122,7 @@ def test_a_place_is_shared_out_to_the_least_of_linear_functions(seed: int, count
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points = points[shapely.contains_xy(as_shapely(ring), points)]
     least = np.argmin([points @ f[:2] + f[2] for f in functions], axis=0)
-    areas = _nearest_areas(ring, functions)
+    areas = _nearest_areas(ring, functions, [None] * count)
     assert areas == pytest.approx(0.01 * np.bincount(least, minlength=count), abs=1.5)
     assert sum(areas) == pytest.approx(ring.area())
 
