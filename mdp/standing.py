@@ -21,6 +21,7 @@ from profiles.machine import Machine
 
 CELLS_MM = (2.0, 0.6, 0.2)  # sides of the cells in which pieces of both surfaces are compared; finer where coarse leave doubt
 MOST_TRIANGLES, MOST_PAIRS = 100_000, 2_000_000  # of one surface, and of cells of both, that are compared
+EVEN_MM = 1e-4  # what lies no higher above the base plane is the face on which the limb stands
 NOTHING = -1e9
 MOST_TRIED = 1000  # corners of either surface that are compared first
 
@@ -91,8 +92,8 @@ def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, b
     of them lies below the base plane is left out. Surfaces that would take long to compare are not taken to be clear.
     """
     turn, head = rotation(machine, pose), head_of(machine)
-    down = np.array([0.0, 0.0, base_mm])
-    tips, stands = np.ascontiguousarray(limb @ turn.T - down), np.ascontiguousarray(standing @ turn.T - down)
+    down, even = np.array([0.0, 0.0, base_mm]), np.array([0.0, 0.0, EVEN_MM])
+    tips, stands = np.ascontiguousarray(limb @ turn.T - down), np.ascontiguousarray(standing @ turn.T - down - even)
     if _surely_meets(_few(tips), _few(stands), head, machine.clearance_mm):
         return False
     for cell_mm in CELLS_MM:
