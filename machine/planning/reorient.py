@@ -161,9 +161,9 @@ def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Spe
         lowest = min(lowest, max(least, *turn.over_mm))
     if best is not None:
         return best
-    where = f"{machine.tilt.letter}{turn.end.tilt_deg:.3f} {machine.turn.letter}{turn.end.turn_deg:.3f}"
+    where = f"turning the table to {machine.tilt.letter}{turn.end.tilt_deg:.3f} {machine.turn.letter}{turn.end.turn_deg:.3f}"
     raise MoveError(
-        f"part {part}: turning the table to {where} needs the tip at Z {lowest:.1f} mm, "
+        f"part {part}: {where if turn.start != turn.end else 'the way to it'} needs the tip at Z {lowest:.1f} mm, "
         f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm, and no way aside is clear"
     )
 

@@ -89,14 +89,15 @@ def _way(tip: Tip, path: Path, start: Floats, shift: Floats, over: float) -> Flo
 
 
 def _over_standing(tip: Tip, path: Path, start: Floats, shift: Floats, over: float, profile: Profile) -> float:
-    """Z no less than that at which the head passes clear of what stands beside a limb, on the way to a path's start."""
+    """Z at which the head passes clear of what stands beside a limb on the way to a path's start: `over` or, where that does not
+    do, with the clearance beneath the nozzle, too."""
     assert tip.limb is not None
     (part, standing), way = tip.limb, _way(tip, path, start, shift, over)
     z_mm = least_height_mm(standing, way[:, :2] - shift[:2], over - float(shift[2])) + float(shift[2])
     if z_mm <= over + STANDING_MM:
         return over
-    check_height(z_mm, part, "a way within it", profile.machine)
-    return z_mm
+    check_height(z_mm + profile.machine.clearance_mm, part, "a way within it", profile.machine)
+    return z_mm + profile.machine.clearance_mm
 
 
 def go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:

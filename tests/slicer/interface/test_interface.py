@@ -127,6 +127,13 @@ def test_a_place_is_shared_out_to_the_least_of_linear_functions(seed: int, count
     assert sum(areas) == pytest.approx(ring.area())
 
 
+def test_a_limb_s_plane_shares_in_places_beside_the_limb_alone() -> None:
+    square, left = Polygons.square((10.0, 10.0), True), Polygons.square((4.0, 10.0)).translate((-5.0, -5.0))
+    functions = [np.array([0.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])]
+    assert _nearest_areas(square, functions, [None, left]) == pytest.approx([60.0, 40.0])
+    assert _nearest_areas(square, functions[1:], [left]) == pytest.approx([40.0])
+
+
 @pytest.mark.parametrize(
     ("beside", "area_mm2"),
     [
