@@ -18,15 +18,19 @@ STEP_MM = 0.5  # between places of a way, and of a bead, that are looked at; sid
 
 
 def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> Standing:
-    """What stands above the base plane of a limb, in its frame, of the beads of parts that are printed."""
+    """What stands above the base plane of a limb, in its frame, of the beads of parts that are printed.
+
+    Beads that end less than their width above the plane are the steps of the face on which the limb stands.
+    """
     tops, widest_mm = [np.zeros((0, 3))], 0.0
     for part, piece in printed:
         turn, shift = frame_change(part, limb)
         for layer in piece.layers:
             for path in layer.paths:
                 points = np.column_stack([path.points, layer.z_mm + path.z_mm]) @ turn.T + shift
-                if points[:, 2].max() + path.width_mm > 0.0:
-                    tops.append(_resampled(points))
+                if points[:, 2].max() > path.width_mm:
+                    points = _resampled(points)
+                    tops.append(points[points[:, 2] > path.width_mm])
                     widest_mm = max(widest_mm, path.width_mm)
     slack_mm = 0.5 * widest_mm + 1.25 * STEP_MM  # half a step of a way and of a bead, and half of a cell's diagonal
     return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)

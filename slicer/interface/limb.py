@@ -15,7 +15,9 @@ from slicer.geometry.polygons import Polygons, offset_round, union
 
 AROUND_MM = 5.0  # support of a limb stands no farther from its shadow
 COARSE_MM = 0.05  # a shadow is simplified by this
-CELL_MM, MOST_CELLS = 0.5, 100_000  # sides of the places at which the height of the tip is asked for
+CELL_MM, COARSER = 0.5, 1.5  # sides of the places at which the height of the tip is asked for; times coarser
+MOST_PAIRS = 200_000_000  # of such a place and one up to which something stands
+LOW_MM = 0.05  # what is no higher above the base plane is the face of the cut
 PLACES_KEPT = 64
 
 
@@ -52,11 +54,15 @@ def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, 
 def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], machine: Machine) -> list[Polygons]:
     """The places of a limb's room, in its frame, where the head meets what stands with the tip at each of some heights."""
     x0, y0, x1, y1 = room_of(limb).bounds()
-    cell_mm = max(CELL_MM, float(np.sqrt((x1 - x0) * (y1 - y0) / MOST_CELLS)))
+    cell_mm = CELL_MM
+    stands = standing_beside(limb, earlier, machine, cell_mm)
+    while len(stands.points_mm) * (x1 - x0) * (y1 - y0) > MOST_PAIRS * cell_mm**2:
+        cell_mm *= COARSER
+        stands = standing_beside(limb, earlier, machine, cell_mm)
     sizes = np.ceil([(x1 - x0) / cell_mm, (y1 - y0) / cell_mm]).astype(np.int64)
     columns, rows = (corner + cell_mm * (np.arange(size) + 0.5) for corner, size in zip((x0, y0), sizes, strict=True))
     places = np.stack(np.meshgrid(columns, rows), axis=-1)
-    least_mm = standing_beside(limb, earlier, machine, cell_mm).least_tip_mm(places.reshape(-1, 2)).reshape(places.shape[:2])
+    least_mm = stands.least_tip_mm(places.reshape(-1, 2), min(tips_mm, default=0.0)).reshape(places.shape[:2])
     covered: dict[int, Polygons] = {}  # by how many cells: what a higher tip meets, a lower one meets, too
     reaches = []
     for tip_mm in tips_mm:
@@ -77,7 +83,8 @@ def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_
         corners = mesh.vertices[mesh.faces]
         corners = subdivide(np.ascontiguousarray(corners[corners[:, :, 2].max(axis=1) > 0.0]), 2.0 * cell_mm)
         points.append(corners.reshape(-1, 3))
-    tops = highest_in_cells(np.concatenate(points), cell_mm)
+    tops = np.concatenate(points)
+    tops = highest_in_cells(tops[tops[:, 2] > LOW_MM], cell_mm)
     return Standing.of(tops, 2.5 * cell_mm, machine)  # half of either cell's diagonal, and half an edge of a triangle
 
 
