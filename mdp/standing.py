@@ -113,7 +113,8 @@ def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, b
 
 def _above(corners: Floats) -> Floats:
     """The triangles that reach above the base plane."""
-    return corners[corners[:, :, 2].max(axis=1, initial=0.0) > 0.0]
+    above: Floats = corners[corners[:, :, 2].max(axis=1, initial=0.0) > 0.0]
+    return above
 
 
 def _few(corners: Floats) -> Floats:

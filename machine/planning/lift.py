@@ -9,7 +9,6 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose
 from mdp.standing import Standing, highest_in_cells
-from profiles.errors import MoveError
 from profiles.machine import Machine
 from slicer.interface.interface import frame_change
 from slicer.paths import SlicedPart
@@ -53,12 +52,3 @@ def _resampled(way_mm: Floats) -> Floats:
 def over_print_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
     """Z at which the tip passes clear of all that is printed, wherever it goes at a pose."""
     return float(printed.reach(machine, pose, UP[None])[0]) + machine.clearance_mm
-
-
-def check_height(z_mm: float, part: int, way: str, machine: Machine) -> None:
-    """Raise MoveError for a Z that the axis does not reach; way: of which part, for what."""
-    if z_mm > machine.z.limits_mm[1]:
-        raise MoveError(
-            f"part {part}: {way} needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside the part, "
-            f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm"
-        )

@@ -8,7 +8,7 @@ import numpy as np
 from machine.kinematics.collision import Printed, hull, join_hulls
 from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
-from machine.planning.lift import check_height, over_print_mm, standing_beads
+from machine.planning.lift import over_print_mm, standing_beads
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Pause, Reorient, Stroke, Travel, rows
 from machine.planning.park_position import beside, find_park_position
 from machine.planning.priming import run_in
@@ -169,15 +169,13 @@ def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate:
 def _stop(tip: Tip, pause: Pause, profile: Profile, stands: Printed | None) -> Iterator[Move]:
     """Retract and go straight up, above all of table and cradle as far as Z allows: a firmware may then move the head aside.
 
-    stands: what may stand higher than the tip; it rises above all of that. Raises MoveError where Z does not allow it.
+    stands: what may stand higher than the tip; it rises above all of that.
     """
     machine = profile.machine
     yield from retract(tip, profile)
     z = max(float(tip.at_mm[2]) + machine.lift_mm, top_z(machine, tip.pose))
     if stands is not None:
-        least = over_print_mm(machine, stands, tip.pose)
-        check_height(least, pause.part, f"the stop before layer {pause.layer}", machine)
-        z = max(z, least)
+        z = max(z, over_print_mm(machine, stands, tip.pose))  # Z reaches it: the way to the part led over it
     yield from go(tip, [*tip.at_mm[:2], min(z, machine.z.limits_mm[1])], profile)
     yield pause
 

@@ -7,11 +7,12 @@ from math import dist
 import numpy as np
 
 from machine.planning import limits
-from machine.planning.lift import check_height, least_height_mm
+from machine.planning.lift import least_height_mm
 from machine.planning.moves import Move, Retract, Travel, Wipe
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from mdp.standing import Standing
+from profiles.errors import MoveError
 from profiles.profile import Profile
 from slicer.bead import length_mm
 from slicer.paths import Path
@@ -83,7 +84,8 @@ def _way(tip: Tip, path: Path, start: Floats, shift: Floats, over: float) -> Flo
     if len(path.approach):
         between = np.column_stack([path.approach + shift[:2], np.full(len(path.approach), over)])
         points = np.array([tip.at_mm, *between, [*start[:2], over]])
-        return points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])]
+        moving: Floats = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])]
+        return moving
     points = np.array([tip.at_mm.tolist(), [*start[:2].tolist(), over]])
     return points if dist(*points.tolist()) > STANDING_MM else points[:1]
 
@@ -96,8 +98,13 @@ def _over_standing(tip: Tip, path: Path, start: Floats, shift: Floats, over: flo
     z_mm = least_height_mm(standing, way[:, :2] - shift[:2], over - float(shift[2])) + float(shift[2])
     if z_mm <= over + STANDING_MM:
         return over
-    check_height(z_mm + profile.machine.clearance_mm, part, "a way within it", profile.machine)
-    return z_mm + profile.machine.clearance_mm
+    z_mm, machine = z_mm + profile.machine.clearance_mm, profile.machine
+    if z_mm > machine.z.limits_mm[1]:
+        raise MoveError(
+            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside the part, "
+            f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm"
+        )
+    return z_mm
 
 
 def go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:
