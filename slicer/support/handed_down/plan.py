@@ -1,10 +1,10 @@
 """Plan: the support of all parts together, so that what finds no ground above its base plane stands on support printed earlier.
 
-Every place over the platform lies above the base plane of some part and below those of all later ones: there is just one
-part with which support can be printed there. So what a part's own support misses is handed down in three passes: upward, where
-support of each part may stand if that of the parts before it may (Room); downward, from the last part to the first, the support
-itself, whose feet on a base plane become patches for the parts before (HandedDown); and upward again, what of it stands on what
-was really built.
+Every place over the platform lies above the base plane of some part and below those of all later ones (that of a limb counts
+beside the limb alone): there is just one part with which support can be printed there. So what a part's own support misses is
+handed down in three passes: upward, where support of each part may stand if that of the parts before it may (Room); downward,
+from the last part to the first, the support itself, whose feet on a base plane become patches for the parts before (HandedDown);
+and upward again, what of it stands on what was really built.
 """
 
 from collections.abc import Sequence
