@@ -45,8 +45,8 @@ def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, 
     x0, y0, x1, y1 = room.bounds()
     for box in machine.head.boxes:
         low, high = (np.array(corner[:2]) for corner in (box.min_mm, box.max_mm))
-        x, y = np.array([x0, y0]) + np.minimum(low, 0.0) - clearance_mm
-        right, back = np.array([x1, y1]) + np.maximum(high, 0.0) + clearance_mm
+        x, y = np.array([x0, y0]) + low - clearance_mm
+        right, back = np.array([x1, y1]) + high + clearance_mm
         levels.append((max(box.min_mm[2] - clearance_mm, -gap_mm), Polygons.square((right - x, back - y)).translate((x, y))))
     return levels
 
