@@ -1,22 +1,37 @@
-"""Clearance: how high above the table the tip must be for the head's bodies to miss it at a pose.
+"""Clearance: how high the tip must be for the head to pass clear of the table at a pose, and of what stands beside a limb.
 
-By construction nothing printed stands above the base plane of the part being printed, so the head can only meet the table.
 A body point at b from the tip is n . b + z above the table, n the table's normal in the machine frame and z the tip's height
 above the table; with the table unbounded, z >= max over the bodies of -n . b keeps all of them clear. For one body reaching y
 across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. What of the cradle stands higher than the
 table is not under that plane: it is tried against the head wherever the tip goes.
+
+Nothing printed stands above the base plane of a part that is all that lay above it. Beside a limb other pieces stand. The head is
+taken as everything above its underside: the silhouette turned about the nozzle, and boxes, which count as far as the nozzle. A
+point that stands at a height t, r aside from the tip, asks for a tip at t - h(r), where h is the height of the underside at that
+radius. h does not fall with r, so in every layer the outline asks for more than any place inside it: only the surfaces of the
+limb and of what stands are compared, as triangles so small that it does not matter where on one a place lies.
 """
 
+from dataclasses import dataclass
 from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 
-from mdp.head import bodies, corners, directions
-from mdp.mesh import Floats
+from mdp.head import Head, bodies, corners, directions, head_of, lowest_of_hot_end
+from mdp.kernels.arrays import flags, floats, table
+from mdp.kernels.kernel import borrower, kernel
+from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
 from mdp.pose import UP, Pose, poses, rotation, shift
 from profiles.frozen import Vector
 from profiles.machine import Machine
+
+CELLS_MM = (2.0, 0.6, 0.2)  # sides of the cells in which pieces of both surfaces are compared; finer where coarse leave doubt
+MOST_TRIANGLES, MOST_PAIRS = 250_000, 2_000_000  # of one surface, and of cells of both, that are compared
+EVEN_MM = 1e-4  # what lies no higher above the base plane is the face on which the limb stands
+NOTHING = -1e9
+MOST_TRIED = 1000  # corners of either surface that are compared first
 
 
 class LowestBody(NamedTuple):
@@ -94,3 +109,230 @@ def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str,
             if float((least + body.least(tried) - reach).max()) < body.need_mm:
                 return body.name, box.name
     return None
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """points_mm (k, 3): places of the part's frame and heights up to which something stands there, the highest first; slack_mm:
+    how far it may reach beyond each; clearance_mm: what the head keeps from it."""
+
+    points_mm: Floats
+    slack_mm: float
+    head: Head
+    clearance_mm: float
+
+    @classmethod
+    def of(cls, points_mm: Floats, slack_mm: float, machine: Machine) -> "Standing":
+        """What stands at (k, 3) points of the part's frame at the pose in which it is printed."""
+        highest_first = np.argsort(-points_mm[:, 2], kind="stable")
+        return cls(np.ascontiguousarray(points_mm[highest_first]), slack_mm, head_of(machine), machine.clearance_mm)
+
+    def least_tip_mm(self, places_mm: Floats, known_mm: float = NOTHING) -> Floats:
+        """(n,) least heights of the tip over (n, 2) places; NOTHING where nothing asks for one. known_mm: a height that the tip
+        has in any case: where no more than that is asked for, less or nothing may be told."""
+        count = int(np.searchsorted(-self.points_mm[:, 2], self.slack_mm - known_mm))
+        places, points = np.ascontiguousarray(places_mm), self.points_mm[:count]
+        return _least_tip(places, points, self.slack_mm, self.head, self.clearance_mm)
+
+
+def highest_in_cells(points_mm: Floats, cell_mm: float) -> Floats:
+    """(c, 3) the middles of the cells of a lattice over X and Y in which any of (n, 3) points lie, and their greatest heights."""
+    cells, inverse = np.unique(np.floor(points_mm[:, :2] / cell_mm).astype(np.int64), axis=0, return_inverse=True)
+    highest = np.full(len(cells), -np.inf)
+    np.maximum.at(highest, inverse.ravel(), points_mm[:, 2])
+    return np.column_stack([(cells + 0.5) * cell_mm, highest])
+
+
+@borrower
+def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head, clearance: float) -> float:
+    """The height of the tip that what stands up to `top` asks for; square: of its distance aside; beyond: how much nearer it may
+    be."""
+    widest = head.silhouette[len(head.silhouette) - 1, 0] + beyond
+    if square > widest * widest:
+        return NOTHING
+    under = lowest_of_hot_end(max(np.sqrt(square) - beyond, 0.0), head.silhouette)
+    return float(top - max(under - clearance, 0.0))
+
+
+@borrower
+def _is_under(box: Floats, across: float, along: float, beyond: float) -> bool:
+    """Whether something so far aside from the tip lies under a box, or as near to that as `beyond`."""
+    inside = box[0] - beyond <= across and across <= box[3] + beyond
+    return bool(inside and box[1] - beyond <= along and along <= box[4] + beyond)
+
+
+@kernel
+def _least_tip(places: Floats, points: Floats, slack: float, head: Head, clearance: float) -> Floats:
+    least, beyond = floats(len(places), NOTHING), slack + clearance
+    for i in range(len(places)):
+        for j in range(len(points)):
+            top = points[j, 2] + slack
+            if top <= least[i]:
+                break
+            across, along = points[j, 0] - places[i, 0], points[j, 1] - places[i, 1]
+            square = across * across + along * along
+            least[i] = max(least[i], _asked_by_hot_end(square, top, beyond, head, clearance))
+            for k in range(len(head.boxes)):
+                if _is_under(head.boxes[k], across, along, beyond):
+                    least[i] = max(least[i], top - max(head.boxes[k, 2] - clearance, 0.0))
+    return least
+
+
+@dataclass(frozen=True, eq=False)
+class _Meeting:
+    """A head that passes over a limb. around_mm (2, 3): the box of the tip's places."""
+
+    head: Head
+    clearance_mm: float
+    around_mm: Floats
+
+    def close(self, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
+        """(i,) the places of the tip at which the head may meet any of (j, 3) points that stand, and (j,) those points.
+
+        Of the limb only its surface is looked at. So a box counts as far as the nozzle, under which no place inside the limb asks
+        for more than one on its outline; and it counts only for what it reaches from anywhere in the limb's box.
+        """
+        boxes, beyond = self.head.boxes, slack_mm + self.clearance_mm
+        low, high = self.around_mm[0, :2] + boxes[:, :2] - beyond, self.around_mm[1, :2] + boxes[:, 3:5] + beyond
+        places = points[:, None, :2]
+        reached = ((places >= low) & (places <= high)).all(axis=2)
+        wide = boxes.copy()
+        wide[:, :2], wide[:, 3:5] = np.minimum(boxes[:, :2], 0.0), np.maximum(boxes[:, 3:5], 0.0)
+        return _find_close(tips, points, slack_mm, Head(self.head.silhouette, wide), self.clearance_mm, reached)
+
+
+def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> bool:
+    """Whether the head passes clear of what stands while a limb is printed.
+
+    limb, standing: (m, 3, 3) corners of the faces of both surfaces in the workpiece frame; base_mm: the base plane's offset. What
+    of them lies below the base plane is left out. Surfaces that would take long to compare are not taken to be clear.
+    """
+    tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
+    if meeting.close(_few(tips), _few(stands), 0.0)[0].any():
+        return False
+    for cell_mm in CELLS_MM:
+        if max(count_divided(corners, cell_mm) for corners in (tips, stands)) > MOST_TRIANGLES:
+            return False
+        tips, stands = (_above(subdivide(corners, cell_mm)) for corners in (tips, stands))
+        if len(tips) == 0 or len(stands) == 0:
+            return True
+        (low, of_tip), (high, of_stand) = _in_cells(tips, cell_mm, 1.0), _in_cells(stands, cell_mm, -1.0)
+        if len(low) * len(high) > MOST_PAIRS:
+            return False
+        slack_mm = hypot(cell_mm, cell_mm) + 2.0 * cell_mm  # of the middles of two cells, and of two triangles
+        close_tips, close_stands = meeting.close(low, high, slack_mm)
+        tips, stands = tips[close_tips[of_tip]], stands[close_stands[of_stand]]
+    return len(tips) == 0
+
+
+def _meeting(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> tuple[Floats, Floats, _Meeting]:
+    """Both surfaces in the part's frame, and the head over the limb."""
+    turn, down = rotation(machine, pose), np.array([0.0, 0.0, base_mm])
+    tips = _above(np.ascontiguousarray(limb @ turn.T - down))
+    stands = _above(np.ascontiguousarray(standing @ turn.T - down - np.array([0.0, 0.0, EVEN_MM])))
+    places = tips.reshape(-1, 3) if len(tips) else np.zeros((1, 3))
+    around_mm = np.stack([places.min(axis=0), places.max(axis=0)])
+    return tips, stands, _Meeting(head_of(machine), machine.clearance_mm, around_mm)
+
+
+def places_met(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> Floats:
+    """(k, 3) corners of what stands that the head surely meets while a limb is printed, the highest first; see passes_clear."""
+    tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
+    if max(count_divided(corners, CELLS_MM[0]) for corners in (tips, stands)) <= MOST_TRIANGLES:
+        tips, stands = (subdivide(corners, CELLS_MM[0]) for corners in (tips, stands))
+    points = _few(stands)
+    _, met = meeting.close(_few(tips), points, 0.0)
+    places: Floats = (np.unique(points[met], axis=0) + np.array([0.0, 0.0, base_mm])) @ rotation(machine, pose)
+    return places[np.argsort(-places[:, 2], kind="stable")]
+
+
+def _above(corners: Floats) -> Floats:
+    """The triangles that reach above the base plane."""
+    above: Floats = corners[corners[:, :, 2].max(axis=1, initial=0.0) > 0.0]
+    return above
+
+
+def _few(corners: Floats) -> Floats:
+    """(k, 3) up to MOST_TRIED corners above the base plane."""
+    points = corners.reshape(-1, 3)
+    points = points[points[:, 2] >= 0.0]
+    return np.ascontiguousarray(points[:: len(points) // MOST_TRIED + 1])
+
+
+def _in_cells(corners: Floats, cell_mm: float, sign: float) -> tuple[Floats, Indices]:
+    """(c, 3) the middles of the cells in which (m, 3, 3) triangles begin and their least height in each, sign -1: the greatest,
+    and (m,) the cell of each triangle."""
+    cells = np.floor(corners[:, 0, :2] / cell_mm).astype(np.int64)
+    _, first, inverse = np.unique(cells[:, 0] * 1_000_003 + cells[:, 1], return_index=True, return_inverse=True)
+    heights = np.full(len(first), np.inf)
+    np.minimum.at(heights, inverse, (sign * np.maximum(corners[:, :, 2], 0.0)).min(axis=1))
+    return np.column_stack([(cells[first] + 0.5) * cell_mm, sign * heights]), inverse
+
+
+@kernel
+def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearance: float, reached: Mask) -> tuple[Mask, Mask]:
+    """See _Meeting.close; reached (j, b): which points may come under which box."""
+    close_tips, close_points, beyond = flags(len(tips)), flags(len(points)), slack + clearance
+    for i in range(len(tips)):
+        for j in range(len(points)):
+            top = points[j, 2]
+            if top <= tips[i, 2]:
+                continue
+            across, along = points[j, 0] - tips[i, 0], points[j, 1] - tips[i, 1]
+            meets = _asked_by_hot_end(across * across + along * along, top, beyond, head, clearance) > tips[i, 2]
+            for k in range(len(head.boxes)):
+                if reached[j, k] and top - max(head.boxes[k, 2] - clearance, 0.0) > tips[i, 2]:
+                    meets = meets or _is_under(head.boxes[k], across, along, beyond)
+            if meets:
+                close_tips[i], close_points[j] = True, True
+    return close_tips, close_points
+
+
+@kernel
+def count_divided(corners: Floats, longest: float) -> int:
+    """How many triangles `subdivide` makes."""
+    count = 0
+    for f in range(len(corners)):
+        count += _divisions(corners[f], longest) ** 2
+    return count
+
+
+@kernel
+def subdivide(corners: Floats, longest: float) -> Floats:
+    """(k, 3, 3) the triangles that (m, 3, 3) triangles are divided into, each like it, so that no edge is longer than that."""
+    count = 0
+    for f in range(len(corners)):
+        count += _divisions(corners[f], longest) ** 2
+    parts, at = table(9 * count, 1), 0
+    for f in range(len(corners)):
+        n = _divisions(corners[f], longest)
+        for i in range(n):
+            for j in range(n - i):
+                at = _put(parts, at, corners[f], (i, j, i + 1, j, i, j + 1, n))
+                if i + j < n - 1:
+                    at = _put(parts, at, corners[f], (i + 1, j, i + 1, j + 1, i, j + 1, n))
+    return parts.reshape(count, 3, 3)
+
+
+@borrower
+def _put(parts: Floats, at: int, corners: Floats, places: tuple[int, int, int, int, int, int, int]) -> int:
+    """Put a triangle at a place of a list of numbers: its corners lie so many nth parts along two edges; the next place."""
+    for corner in range(3):
+        i, j, n = places[2 * corner], places[2 * corner + 1], places[6]
+        for axis in range(3):
+            p, q, r = corners[0, axis], corners[1, axis], corners[2, axis]
+            parts[at, 0] = p + (i * (q - p) + j * (r - p)) / n
+            at += 1
+    return at
+
+
+@borrower
+def _divisions(corners: Floats, most: float) -> int:
+    """Into how many pieces the edges of a triangle are divided."""
+    longest = 0.0
+    for k in range(3):
+        square = 0.0
+        for axis in range(3):
+            square += (corners[k, axis] - corners[k - 1, axis]) ** 2
+        longest = max(longest, square)
+    return max(1, int(np.ceil(np.sqrt(longest) / most)))

@@ -7,9 +7,12 @@ from math import dist
 import numpy as np
 
 from machine.planning import limits
+from machine.planning.lift import least_height_mm
 from machine.planning.moves import Move, Retract, Travel, Wipe
+from mdp.clearance import Standing
 from mdp.mesh import Floats
 from mdp.pose import Pose
+from profiles.errors import MoveError
 from profiles.profile import Profile
 from slicer.bead import length_mm
 from slicer.paths import Path
@@ -24,7 +27,8 @@ class Tip:
     """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back.
 
     trail: (n, 3) a way that a wipe may go over; printed: strokes (n, 3) after it, their paths and shifts from the part frame,
-    none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond their own.
+    none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond their own. limb: the
+    number of the part that is printed and what stands beside it, None where nothing can.
     """
 
     at_mm: Floats
@@ -34,6 +38,7 @@ class Tip:
     run_in_mm: float = 0.0
     trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     printed: list[tuple[Floats, Path, Floats]] = field(default_factory=list)
+    limb: tuple[int, Standing] | None = None
 
     def forget(self) -> None:
         """Nothing of what was printed is to be wiped over any more."""
@@ -50,27 +55,56 @@ class Tip:
 
 
 def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile) -> Iterator[Move]:
-    """To a path's start: up to the layer first, then along the approach; or pulled back and lifted, straight."""
+    """To a path's start: up to the layer first, then along the approach; or pulled back and lifted, straight.
+
+    Beside what stands higher than a limb that is printed it is lifted as far as the head needs, and pulled back first.
+    """
     if dist(start.tolist(), tip.at_mm.tolist()) <= STANDING_MM:
         return
     if path.retract:
         yield from retract(tip, profile)
     lift = profile.process.lift_mm if path.retract else 0.0
     over = max(float(start[2]), min(float(start[2]) + lift, profile.machine.z.limits_mm[1]))
+    if tip.limb is not None:
+        if _over_standing(tip, path, start, shift, over, profile) > over and not path.retract:
+            yield from retract(tip, profile)
+        over = _over_standing(tip, path, start, shift, over, profile)
     if abs(over - float(tip.at_mm[2])) > STANDING_MM:
         yield from go(tip, [*tip.at_mm[:2], over], profile)
-    if len(path.approach):
-        between = np.column_stack([path.approach + shift[:2], np.full(len(path.approach), over)])
-        points = np.array([tip.at_mm, *between, [*start[:2], over]])
-        points = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])]
-    else:
-        points = np.array([tip.at_mm.tolist(), [*start[:2].tolist(), over]])
-        points = points if dist(*points.tolist()) > STANDING_MM else points[:1]
+    points = _way(tip, path, start, shift, over)
     if len(points) > 1:
         tip.at_mm = points[-1]
         yield Travel(points, travel_speed(profile), travel_mm_s2(profile))
     yield from go(tip, list(start), profile)
     tip.at_mm = start
+
+
+def _way(tip: Tip, path: Path, start: Floats, shift: Floats, over: float) -> Floats:
+    """(n, 3) from where the tip is along the approach to above a path's start; one point where it is there."""
+    if len(path.approach):
+        between = np.column_stack([path.approach + shift[:2], np.full(len(path.approach), over)])
+        points = np.array([tip.at_mm, *between, [*start[:2], over]])
+        moving: Floats = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])]
+        return moving
+    points = np.array([tip.at_mm.tolist(), [*start[:2].tolist(), over]])
+    return points if dist(*points.tolist()) > STANDING_MM else points[:1]
+
+
+def _over_standing(tip: Tip, path: Path, start: Floats, shift: Floats, over: float, profile: Profile) -> float:
+    """Z at which the head passes clear of what stands beside a limb on the way to a path's start: `over` or, where that does not
+    do, with the clearance beneath the nozzle, too."""
+    assert tip.limb is not None
+    (part, standing), way = tip.limb, _way(tip, path, start, shift, over)
+    z_mm = least_height_mm(standing, way[:, :2] - shift[:2], over - float(shift[2])) + float(shift[2])
+    if z_mm <= over + STANDING_MM:
+        return over
+    z_mm, machine = z_mm + profile.machine.clearance_mm, profile.machine
+    if z_mm > machine.z.limits_mm[1]:
+        raise MoveError(
+            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside the part, "
+            f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm"
+        )
+    return z_mm
 
 
 def go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:

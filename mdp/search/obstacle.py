@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdp.clearance import lowest_body
+from mdp.clearance import lowest_body, places_met
 from mdp.cut import Solid, above, below, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
@@ -14,7 +14,6 @@ from mdp.ranking.candidates import COPLANAR_MM, Reason
 from mdp.search.by_hand import Refusal, name_limbs
 from mdp.search.node import Node
 from mdp.search.problem import Problem
-from mdp.standing import places_met
 from mdp.sweep.limbs import limb_faces
 from mdp.sweep.slivers import SLIVER_COSINE
 from mdp.zone import Zone

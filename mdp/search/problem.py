@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from mdp.clearance import allowed_poses
+from mdp.clearance import allowed_poses, passes_clear
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
 from mdp.cost.model_need import ModelNeed, ModelSurface
 from mdp.cut import Solid, below, corners_above, cut, solid_of
@@ -36,7 +36,6 @@ from mdp.ranking.candidates import (
 )
 from mdp.search.front import Worth
 from mdp.search.node import Cut, Node
-from mdp.standing import passes_clear
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
 from mdp.sweep.cylinders import bores_of
@@ -267,7 +266,8 @@ class Problem:
         cut."""
         mesh = node.remainder.mesh
         if plane.limbs_mm is not None:
-            mesh = Mesh(mesh.vertices, mesh.faces[limb_faces(node.remainder, plane)])
+            used, faces = np.unique(mesh.faces[limb_faces(node.remainder, plane)], return_inverse=True)
+            mesh = Mesh(mesh.vertices[used], faces.reshape(-1, 3))
         return corners_above(mesh, plane)
 
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:

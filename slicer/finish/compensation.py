@@ -2,18 +2,24 @@
 
 Plastic bulges and shrinks where it meets air. A cut face meets plastic: what lies beside it, of a part printed later, stays where
 it is, or the parts would leave a gap or be pressed into each other. Nor does what is added beside the end of a cut reach over the
-later part's base plane, above which the head moves.
+later part's base plane, above which the head moves; over that of a limb only beside the limb.
 """
 
 from collections.abc import Sequence
+
+import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, area_mm2, closing, contours, half_plane, islands, offset, union
-from slicer.interface.interface import plane_in_frame_of, sections_of
+from slicer.heights import Heights
+from slicer.interface.base_plane import BasePlane
+from slicer.interface.interface import frame_change, plane_in_frame_of, sections_of
+from slicer.interface.limb import shadow_of
 
 TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
+BESIDE_MM = 1.0  # so near to a limb the head moves above its base plane
 
 
 def reach_mm(process: Process) -> float:
@@ -28,15 +34,30 @@ def compensate(
     if process.outline_compensation_mm == 0.0 and process.hole_compensation_mm == 0.0:
         return list(outlines)
     beside = sections_of(later, part, cuts_mm) if later else [Polygons()] * len(outlines)
-    planes = [plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in later]
+    planes = [plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in later if upper.base.limbs_mm is None]
     below = [[(-x, -y, distance - z * cut_mm) for x, y, z, distance in planes] for cut_mm in cuts_mm.tolist()]
-    return [compensated(*layer, process=process) for layer in zip(outlines, beside, below, strict=True)]
+    over = _over_limbs(part, [upper for upper in later if upper.base.limbs_mm is not None], cuts_mm, reach_mm(process))
+    return [compensated(*layer, process=process) for layer in zip(outlines, beside, below, over, strict=True)]
 
 
-def compensated(own: Polygons, others: Polygons, below: Sequence[Sequence[float]], *, process: Process) -> Polygons:
+def _over_limbs(part: Part, limbs: Sequence[Part], cuts_mm: Floats, grown_mm: float) -> list[Polygons]:
+    """What of a part's layers lies above the base plane of a later limb, beside it."""
+    over = [Polygons()] * len(cuts_mm)
+    far_mm = 2.0 * float(np.linalg.norm(part.in_part_frame().vertices, axis=1).max())
+    for limb in limbs:
+        places = offset(shadow_of(limb), grown_mm + BESIDE_MM)
+        plane = BasePlane(*frame_change(part, limb), Heights(cuts_mm, np.zeros(len(cuts_mm)), cuts_mm), far_mm, places)
+        over = [union([before, plane.band(layer, 0.0, np.inf)]) for layer, before in enumerate(over)]
+    return over
+
+
+def compensated(
+    own: Polygons, others: Polygons, below: Sequence[Sequence[float]], over: Polygons | None = None, *, process: Process
+) -> Polygons:
     """A part's section, which others of its model touch, with the sides compensated that no other touches.
 
-    below: a, b, c of every later part's base plane; what is added stays where a x + b y + c > 0.
+    below: a, b, c of the base plane of every later part that is no limb; what is added stays where a x + b y + c > 0. over: where
+    nothing is added either.
     """
     if own.is_empty():
         return own
@@ -45,6 +66,8 @@ def compensated(own: Polygons, others: Polygons, below: Sequence[Sequence[float]
     added = Polygons() if grown == 0.0 else offset(own, grown) - whole
     for a, b, c in below:
         added = half_plane(added, a, b, c)
+    if over is not None and not over.is_empty():
+        added = added - over
     return (own + added) ^ _resized(whole, process)
 
 

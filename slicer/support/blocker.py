@@ -8,9 +8,12 @@ from mdp.clearance import least_tip_height_mm
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.pose import UP
-from slicer.geometry.polygons import Polygons, half_plane, union
+from profiles.machine import Machine
+from slicer.geometry.polygons import Polygons, half_plane, offset, union
 from slicer.heights import Heights
-from slicer.interface.interface import plane_in_frame_of
+from slicer.interface.base_plane import BasePlane
+from slicer.interface.interface import frame_change, plane_in_frame_of, sections_of
+from slicer.interface.limb import head_room, out_of_reach, room_of
 from slicer.sections import Sections
 from slicer.support.reachable import EVEN_MM
 from slicer.zones import no_support_areas
@@ -30,10 +33,16 @@ def blocked_areas(sections: Sections, heights: Heights, gap_mm: float, far_mm: f
 
     heights: of the lowest layers; gap_mm: what it keeps from later parts' base planes; far_mm: how far from the origin all ends.
     """
-    blocked = above_base_planes(sections.part, sections.later, heights, gap_mm, far_mm)
+    blocked = above_base_planes(sections.part, sections.later, heights, gap_mm, far_mm, sections.profile.machine)
+    if sections.part.base.limbs_mm is not None and sections.earlier:
+        blocked = _united(blocked, beside_standing(sections, heights, far_mm))
     if not sections.part.no_support.anywhere:
         return blocked
-    return [union(areas) for areas in zip(blocked, shut_areas(sections, heights), strict=True)]
+    return _united(blocked, shut_areas(sections, heights))
+
+
+def _united(some: Sequence[Polygons], others: Sequence[Polygons]) -> list[Polygons]:
+    return [union(areas) for areas in zip(some, others, strict=True)]
 
 
 def shut_areas(sections: Sections, heights: Heights) -> list[Polygons]:
@@ -44,13 +53,41 @@ def shut_areas(sections: Sections, heights: Heights) -> list[Polygons]:
     return [union(unwanted[max(lowest - 1, 0) : k + 1]) for k, lowest in enumerate(near.tolist())]
 
 
-def above_base_planes(part: Part, later: Sequence[Part], heights: Heights, gap_mm: float, far_mm: float) -> list[Polygons]:
+def above_base_planes(
+    part: Part, later: Sequence[Part], heights: Heights, gap_mm: float, far_mm: float, machine: Machine
+) -> list[Polygons]:
     """For each layer what lies above the base plane of any later part, taken as lower by gap_mm.
 
-    While a part is printed the head moves above its base plane, so nothing may stand there, be it near that part or not.
+    While a part is printed the head moves above its base plane, so nothing may stand there, be it near that part or not; while
+    a limb is, nothing that the head could meet.
     """
-    planes = [plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm - gap_mm) for upper in later]
-    return _above_planes(planes, heights, far_mm)
+    limbs = [upper for upper in later if upper.base.limbs_mm is not None]
+    whole = [upper for upper in later if upper.base.limbs_mm is None]
+    planes = [plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm - gap_mm) for upper in whole]
+    blocked = _above_planes(planes, heights, far_mm)
+    for limb in limbs:
+        to_limb = frame_change(part, limb)
+        for low_mm, places in head_room(limb, machine, gap_mm):
+            plane = BasePlane(*to_limb, heights, far_mm, places)
+            blocked = _united(blocked, [plane.band(layer, low_mm, np.inf) for layer in range(len(blocked))])
+    return blocked
+
+
+def beside_standing(sections: Sections, heights: Heights, far_mm: float) -> list[Polygons]:
+    """For each layer of a limb where earlier parts stand or the head would meet them, and what is too far from the limb.
+
+    Support keeps its gaps to what stands.
+    """
+    part, process, machine = sections.part, sections.support_process, sections.profile.machine
+    gap_mm = max(process.support_gap_mm, process.support_bottom_gap_mm)
+    stands = sections_of(sections.earlier, part, heights.cut_mm)
+    outside = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True) - room_of(part)
+    reaches = out_of_reach(part, sections.earlier, heights.tip_mm.tolist(), machine)
+    low = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm)
+    high = np.searchsorted(heights.bottom_mm, heights.tip_mm + gap_mm)
+    near = [union(stands[a:b]) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+    beside = [offset(area, process.support_distance_mm) if not area.is_empty() else area for area in near]
+    return [union([outside, *areas]) for areas in zip(beside, reaches, strict=True)]
 
 
 def near_table(sections: Sections, heights: Heights, far_mm: float) -> list[Polygons]:
@@ -63,8 +100,8 @@ def _above_planes(planes: Sequence[Floats], heights: Heights, far_mm: float) -> 
     """For each layer what of it lies above any plane: (4,) unit normal and offset."""
     layers: list[list[Polygons]] = [[] for _ in heights.tip_mm]
     everywhere = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True)
-    for x, y, z, offset in planes:
-        below_mm = offset - np.maximum(z * heights.bottom_mm, z * heights.tip_mm)
+    for x, y, z, offset_mm in planes:
+        below_mm = offset_mm - np.maximum(z * heights.bottom_mm, z * heights.tip_mm)
         level = np.hypot(x, y) < LEVEL
         for layer, rest in zip(layers, below_mm.tolist(), strict=True):
             if rest < 0.0 or not level:

@@ -36,13 +36,15 @@ class ReachableAreas:
     """Where support of a part may stand; per layer, of as many of its lowest ones as are of use: the lean from the layer below,
     mm, what is placeable, and what is reachable.
 
-    placeable: places of the ground beneath that a branch may end on: what is solid, grown by BEYOND of the radius.
+    placeable: places of the ground beneath that a branch may end on: what is solid, grown by BEYOND of the radius. shut: of a
+    limb, where the head cannot print support.
     """
 
     sections: Sections
     lean_mm: Floats
     placeable: tuple[Polygons, ...]
     reachable: tuple[Polygons, ...]
+    shut: Sequence[Polygons] = ()
 
     @property
     def process(self) -> Process:
@@ -162,4 +164,5 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
             if m and not reachable[-1].is_empty():
                 start = dilate(reachable[-1], (1.0 - SPARE) * float(lean_mm[m])) + start
         reachable.append(start if start.is_empty() else (start - obstacles).simplify(FINE_MM))
-    return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable))
+    is_limb = sections.part.base.limbs_mm is not None
+    return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable), shut=blocked if is_limb else ())

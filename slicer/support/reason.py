@@ -9,7 +9,7 @@ from slicer.geometry.polygons import Polygons, contours, islands, offset, union
 from slicer.overhangs import seen_from_above
 from slicer.paths import Unsupported
 from slicer.sections import Sections
-from slicer.support.blocker import above_base_planes, support_reach_mm
+from slicer.support.blocker import above_base_planes, beside_standing, support_reach_mm
 from slicer.support.reachable import EVEN_MM
 from slicer.support.support import Supports
 
@@ -44,9 +44,13 @@ def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
         return "the plate ends before"
     under, far_mm = heights[top : top + 1], support_reach_mm(sections)
     for upper in sections.later:
-        above = above_base_planes(sections.part, [upper], under, process.support_distance_mm, far_mm)[0]
+        gap_mm, machine = process.support_distance_mm, sections.profile.machine
+        above = above_base_planes(sections.part, [upper], under, gap_mm, far_mm, machine)[0]
         if (hanging ^ above).area() >= least_mm2:
             return f"support would stand where the head prints part {upper.index}"
+    is_limb = sections.part.base.limbs_mm is not None and bool(sections.earlier)
+    if is_limb and (hanging ^ beside_standing(sections, under, far_mm)[0]).area() >= least_mm2:
+        return "support would stand where the head meets what is printed before"
     room_mm = process.support_gap_mm + process.support_bottom_gap_mm + process.layer_height_mm
     lowest = int(np.searchsorted(heights.tip_mm, drop - room_mm + EVEN_MM))
     if (hanging ^ union(list(sections.outlines[lowest : max(layer - 1, 0)]))).area() >= least_mm2:
@@ -68,7 +72,8 @@ def _part_at_table(hanging: Polygons, z_mm: float, sections: Sections) -> int | 
     below, under = (np.append(middle, base_mm + z) @ sections.part.rotation for z in (z_mm, 0.0))
     if not sections.on_platform and below[2] < least_tip_height_mm(machine, sections.part.pose):
         return sections.part.index
-    lower = next((part for part in reversed(sections.earlier) if part.base.heights_mm(under[None])[0] > 0.0), None)
+    earlier = [part for part in reversed(sections.earlier) if part.base.limbs_mm is None]
+    lower = next((part for part in earlier if part.base.heights_mm(under[None])[0] > 0.0), None)
     if lower is None or lower.index == 1 or under[2] >= least_tip_height_mm(machine, lower.pose):
         return None
     return lower.index

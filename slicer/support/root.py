@@ -46,4 +46,4 @@ def _blocked_area(root: Polygons, areas: ReachableAreas, m: int) -> Polygons:
     window = bounding_box(root, distance_mm + 1.0)
     beside = offset((outlines[m] ^ window).simplify(COARSE_MM), distance_mm + COARSE_MM)
     near = [*outlines[areas.next_below(m) : m], *outlines[m + 1 : areas.next_above(m)]]
-    return union([beside, *(outline ^ window for outline in near)])
+    return union([beside, *(outline ^ window for outline in near), *areas.shut[m : m + 1]])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union
-from slicer.support.handed_down.base_plane import BasePlane
+from slicer.interface.base_plane import BasePlane
 
 DEEP_MM = 1.0  # support begins within this below a plane: as much as keeps a wall along a steep plane upright
 NEAR_MM = 0.35  # what ends nearer to a plane carries what begins on it: a step of a slope and the space beside a disc

@@ -1,10 +1,10 @@
 """Plan: the support of all parts together, so that what finds no ground above its base plane stands on support printed earlier.
 
-Every place over the platform lies above the base plane of some part and below those of all later ones: there is just one
-part with which support can be printed there. So what a part's own support misses is handed down in three passes: upward, where
-support of each part may stand if that of the parts before it may (Room); downward, from the last part to the first, the support
-itself, whose feet on a base plane become patches for the parts before (HandedDown); and upward again, what of it stands on what
-was really built.
+Every place over the platform lies above the base plane of some part and below those of all later ones (that of a limb counts
+beside the limb alone): there is just one part with which support can be printed there. So what a part's own support misses is
+handed down in three passes: upward, where support of each part may stand if that of the parts before it may (Room); downward,
+from the last part to the first, the support itself, whose feet on a base plane become patches for the parts before (HandedDown);
+and upward again, what of it stands on what was really built.
 """
 
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ import numpy as np
 from mdp.mesh import Floats
 from mdp.pose import shift
 from slicer.geometry.polygons import Polygons, offset, union
+from slicer.interface.base_plane import BasePlane
 from slicer.interface.interface import frame_change
 from slicer.overhangs import LEAST_MM2
 from slicer.sections import Sections
 from slicer.support.blocker import blocked_areas, near_table, support_reach_mm
-from slicer.support.handed_down.base_plane import BasePlane
 from slicer.support.handed_down.patch import NEAR_MM, Patch, keep_off, upper_side
 from slicer.support.missed import find_missed
 from slicer.support.reachable import ReachableAreas, reachable_areas

@@ -52,7 +52,7 @@ def test_where_a_later_part_s_base_plane_is_too_near_a_layer_is_blocked(
     part, tips = whole(box()), np.arange(1, 21) * 1.0
     normal = random_direction(height, around) * (1.0, 1.0, -1.0 if downward else 1.0)
     later = Part(2, part.mesh, Plane(normal, offset), part.pose, part.rotation, 0.0, 0.0)
-    blocked = above_base_planes(part, [later], Heights(tips, np.ones(20), tips - 0.5), gap, 40.0)
+    blocked = above_base_planes(part, [later], Heights(tips, np.ones(20), tips - 0.5), gap, 40.0, profile().machine)
     points = np.random.default_rng(height).uniform(-39.0, 39.0, (300, 2))
     for area, tip in zip(blocked, tips, strict=True):
         highest = np.maximum(*(points @ normal[:2] + normal[2] * z for z in (tip - 1.0, tip))) - (offset - gap)
@@ -61,9 +61,8 @@ def test_where_a_later_part_s_base_plane_is_too_near_a_layer_is_blocked(
 
 
 def test_without_later_parts_nothing_is_blocked() -> None:
-    assert [
-        area.is_empty() for area in above_base_planes(whole(box()), [], Heights(np.ones(1), np.ones(1), np.ones(1)), 0.2, 40.0)
-    ]
+    heights = Heights(np.ones(1), np.ones(1), np.ones(1))
+    assert [area.is_empty() for area in above_base_planes(whole(box()), [], heights, 0.2, 40.0, profile().machine)]
 
 
 @settings(max_examples=15)

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mdp.clearance import Standing, passes_clear
 from mdp.mesh import Floats
 from mdp.pose import level
-from mdp.standing import Standing, passes_clear
 from profiles.profile import load
 from tests import shapes
 

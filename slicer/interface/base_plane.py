@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.geometry.polygons import Polygons, contours
+from slicer.geometry.polygons import Polygons, contours, offset_round
 from slicer.heights import Heights
 from slicer.interface.interface import frame_change
+from slicer.interface.limb import room_of
 from slicer.sections import Sections
 
 LEVEL = 1e-9  # a plane whose normal is nearer to upright than this meets a layer nowhere or everywhere
@@ -19,18 +20,21 @@ class BasePlane:
     """turn (3, 3) and shift (3,) carry a point of the earlier part's frame into the later part's: turn @ x + shift.
 
     heights: of the earlier part's layers. Of a layer's two sides the one that comes nearer to the plane from below stands for it.
-    far_mm: how far from the origin of the earlier frame its layers reach.
+    far_mm: how far from the origin of the earlier frame its layers reach. places: those on the plane that count where the later
+    part is a limb; None: all.
     """
 
     turn: Floats
     shift: Floats
     heights: Heights
     far_mm: float
+    places: Polygons | None = None
 
     @classmethod
     def seen_from(cls, earlier: Sections, later: Sections, far_mm: float) -> "BasePlane":
-        """The base plane of a later part."""
-        return cls(*frame_change(earlier.part, later.part), earlier.heights, far_mm)
+        """The base plane of a later part, as far as it or its support is printed over it."""
+        places = None if later.part.base.limbs_mm is None else room_of(later.part)
+        return cls(*frame_change(earlier.part, later.part), earlier.heights, far_mm, places)
 
     @property
     def cosine(self) -> float:
@@ -57,7 +61,14 @@ class BasePlane:
         return range(int(np.searchsorted(self.heights.tip_mm, low)), int(np.searchsorted(self.heights.bottom_mm, high)))
 
     def band(self, layer: int, low_mm: float, high_mm: float) -> Polygons:
-        """What of a layer lies low_mm to high_mm above the plane (below it: negative)."""
+        """What of a layer lies low_mm to high_mm above the plane (below it: negative), over or under the places that count."""
+        whole = self._whole_band(layer, low_mm, high_mm)
+        if self.places is None or whole.is_empty():
+            return whole
+        narrow_mm = max(LEAST_COSINE - abs(self.cosine), 0.0) * self.far_mm  # by which the shadow of a steep plane may be off
+        return whole ^ self.shadow(offset_round(self.places, narrow_mm) if narrow_mm else self.places, layer)
+
+    def _whole_band(self, layer: int, low_mm: float, high_mm: float) -> Polygons:
         normal, at = self.turn[2, :2], float(self.turn[2, 2] * self.z_mm(layer) + self.shift[2])
         across, far_mm = float(np.hypot(*normal)), self.far_mm
         if across < LEVEL:

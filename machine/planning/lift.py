@@ -1,0 +1,54 @@
+"""Lift: how high the tip must be for the head to pass clear of what stands beside a limb while that is printed."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from machine.kinematics.collision import Printed
+from mdp.clearance import Standing, highest_in_cells
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose
+from profiles.machine import Machine
+from slicer.interface.interface import frame_change
+from slicer.paths import SlicedPart
+
+STEP_MM = 0.5  # between places of a way, and of a bead, that are looked at; sides of the cells of which the highest counts
+
+
+def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> Standing:
+    """What stands above the base plane of a limb, in its frame, of the beads of parts that are printed.
+
+    Beads that end less than their width above the plane are the steps of the face on which the limb stands.
+    """
+    tops, widest_mm = [np.zeros((0, 3))], 0.0
+    for part, piece in printed:
+        turn, shift = frame_change(part, limb)
+        for layer in piece.layers:
+            for path in layer.paths:
+                points = np.column_stack([path.points, layer.z_mm + path.z_mm]) @ turn.T + shift
+                if points[:, 2].max() > path.width_mm:
+                    points = _resampled(points)
+                    tops.append(points[points[:, 2] > path.width_mm])
+                    widest_mm = max(widest_mm, path.width_mm)
+    slack_mm = 0.5 * widest_mm + 1.25 * STEP_MM  # half a step of a way and of a bead, and half of a cell's diagonal
+    return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
+
+
+def least_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> float:
+    """The height, no less than that given, at which the tip may go along a way (n, 2) of the limb's frame."""
+    return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm), height_mm).max()))
+
+
+def _resampled(way_mm: Floats) -> Floats:
+    """Points on a way (n, d), its own among them, no farther apart than STEP_MM."""
+    steps = np.diff(way_mm, axis=0)
+    counts = np.maximum(np.ceil(np.linalg.norm(steps, axis=1) / STEP_MM), 1).astype(np.int64)
+    share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / np.repeat(counts, counts)
+    points: Floats = np.repeat(way_mm[:-1], counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
+    return np.concatenate([points, way_mm[-1:]])
+
+
+def over_print_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
+    """Z at which the tip passes clear of all that is printed, wherever it goes at a pose."""
+    return float(printed.reach(machine, pose, UP[None])[0]) + machine.clearance_mm
