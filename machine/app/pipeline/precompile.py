@@ -9,6 +9,7 @@ import gc
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from queue import Queue
 from threading import Thread
 
@@ -21,6 +22,7 @@ from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
+from mdp.clearance import passes_clear
 from mdp.cost.cost import CostTerms, measure_seam
 from mdp.cost.forecast import Surface
 from mdp.cost.hidden import hidden_shares
@@ -35,6 +37,7 @@ from mdp.pose import level, poses, rotation
 from mdp.search.search import decompose
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.hopeless import Savers, hopeless_faces
+from mdp.sweep.limbs import LimbGrid, find_limbs, limb_reach, sum_limbs
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from slicer.slice import slice_part
@@ -89,6 +92,18 @@ def _search() -> None:
     terms = CostTerms(45.0, False)
     Surface.of(remainder, terms).left_mm2([PLANE])
     ModelForecast.of(remainder, remainder.mesh.areas_mm2, terms).parts([PLANE])
+    _limbs(remainder)
+
+
+def _limbs(remainder: Remainder) -> None:
+    """The kernels of cuts that take single limbs off."""
+    row = np.zeros(1)
+    find_limbs(remainder, LimbGrid(LEANING[None], 1.0, row, row, np.zeros((1, 0, 2)), 0.8, 20.0, 5.0, 100.0, 4.0, 2.0), -0.7)
+    limb = replace(PLANE, limbs_mm=remainder.mesh.vertices[:1])
+    sum_limbs(remainder, [limb], -0.7, 2.0)
+    limb_reach(remainder, limb)
+    profile, corners = load(), remainder.mesh.vertices[remainder.mesh.faces]
+    passes_clear(profile.machine, level(profile.machine), corners, corners + np.array([60.0, 0.0, 0.0]), 0.0)
 
 
 def _slice() -> None:
