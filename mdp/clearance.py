@@ -195,7 +195,7 @@ class _Meeting:
         boxes, beyond = self.head.boxes, slack_mm + self.clearance_mm
         low, high = self.around_mm[0, :2] + boxes[:, :2] - beyond, self.around_mm[1, :2] + boxes[:, 3:5] + beyond
         places = points[:, None, :2]
-        reached = ((places >= low) & (places <= high)).all(axis=2)
+        reached: Mask = np.all((places >= low) & (places <= high), axis=2)
         wide = boxes.copy()
         wide[:, :2], wide[:, 3:5] = np.minimum(boxes[:, :2], 0.0), np.maximum(boxes[:, 3:5], 0.0)
         return _find_close(tips, points, slack_mm, Head(self.head.silhouette, wide), self.clearance_mm, reached)

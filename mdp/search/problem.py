@@ -42,7 +42,7 @@ from mdp.sweep.cylinders import bores_of
 from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.limbs import LimbGrid, LimbSums, limb_faces, limb_vertices, sum_limbs
 from mdp.sweep.slivers import sliver_mm
-from mdp.sweep.sweep import gains
+from mdp.sweep.sweep import Gains, gains
 from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -267,7 +267,7 @@ class Problem:
         mesh = node.remainder.mesh
         if plane.limbs_mm is not None:
             used, faces = np.unique(mesh.faces[limb_faces(node.remainder, plane)], return_inverse=True)
-            mesh = Mesh(mesh.vertices[used], faces.reshape(-1, 3))
+            mesh = Mesh(mesh.vertices[used], faces.reshape(-1, 3).astype(np.int32))
         return corners_above(mesh, plane)
 
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
@@ -337,17 +337,16 @@ class Problem:
 
     def _cost(self, node: Node, plane: Plane) -> CutCost:
         """What a cut costs for ever."""
-        if plane.limbs_mm is not None:
-            swept = self.limb_sums(node, [plane])
-            residual = residual_mm2(swept, self.terms)
-            costs = (residual, lost_mm2(swept, residual), swept.stairs_mm2, seam_mm2(swept, self.terms))
-            return CutCost(*(float(cost[0]) for cost in costs))
-        step_mm = self.step_mm(plane.offset_mm)
-        swept = gains(node.remainder, plane.normal[None], step_mm, threshold(self.terms.angle_deg))
-        column = round(plane.offset_mm / step_mm) - int(swept.first[0])
+        swept: Gains | LimbSums
+        if plane.limbs_mm is None:
+            step_mm = self.step_mm(plane.offset_mm)
+            swept = gains(node.remainder, plane.normal[None], step_mm, threshold(self.terms.angle_deg))
+            place = round(plane.offset_mm / step_mm) - int(swept.first[0])
+        else:
+            swept, place = self.limb_sums(node, [plane]), 0
         residual = residual_mm2(swept, self.terms)
         costs = (residual, lost_mm2(swept, residual), swept.stairs_mm2, seam_mm2(swept, self.terms))
-        return CutCost(*(float(cost[0, column]) for cost in costs))
+        return CutCost(*(float(cost.ravel()[place]) for cost in costs))
 
     def step_mm(self, offset_mm: float) -> float:
         """Step of a grid of offsets that an offset lies on, near that of the candidates' grid."""

@@ -91,7 +91,7 @@ class LimbRows(NamedTuple):
     offset."""
 
     first: Ints
-    count: Ints
+    filled: Ints
     column: Ints
     key: Floats
     tops: Ints
@@ -112,18 +112,18 @@ def find_limbs(remainder: Remainder, grid: LimbGrid, risky_below: float) -> Limb
     count = len(grid.directions)
     rows = LimbRows(
         first=np.zeros(count, np.int32),
-        count=np.zeros(count, np.int32),
+        filled=np.zeros(count, np.int32),
         column=np.zeros((count, MOST_ROWS), np.int32),
         key=np.zeros((count, MOST_ROWS)),
         tops=np.full((count, MOST_ROWS, MOST_JOINED), NONE, np.int32),
     )
     in_threads(_find_limbs, count, scars_of(remainder, grid.directions, risky_below), remainder.topology, grid, rows)
-    used = np.arange(MOST_ROWS) < rows.count[:, None]
+    used = np.arange(MOST_ROWS) < rows.filled[:, None]
     direction, place = np.nonzero(used)
     order = np.lexsort((place, direction, rows.key[used]))
-    direction, place = direction[order].astype(np.int32), place[order]
+    direction, place = direction[order], place[order]
     offset: Floats = (rows.first[direction] + rows.column[direction, place]) * np.float64(grid.step_mm)
-    return LimbCandidates(direction, offset, rows.tops[direction, place])
+    return LimbCandidates(direction.astype(np.int32), offset, rows.tops[direction, place])
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,7 +373,7 @@ def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
 @borrower
 def _keep_row(rows: LimbRows, row: int, key: float, column: int, tops: Ints) -> None:
     """Note a candidate: the best of its limbs within a span of offsets; of a full table the worst one makes room."""
-    count, place, worst = rows.count[row], NONE, 0
+    count, place, worst = rows.filled[row], NONE, 0
     for k in range(count):
         same = rows.column[row, k] // SPAN == column // SPAN
         for limb in range(len(tops)):
@@ -385,7 +385,7 @@ def _keep_row(rows: LimbRows, row: int, key: float, column: int, tops: Ints) -> 
     if place == NONE:
         if count < MOST_ROWS:
             place = count
-            rows.count[row] += 1
+            rows.filled[row] += 1
         else:
             place = worst
             if key >= rows.key[row, worst]:
