@@ -10,7 +10,7 @@ import numpy as np
 from mdp.clearance import allowed_poses, passes_clear
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
 from mdp.cost.model_need import ModelNeed, ModelSurface
-from mdp.cut import Solid, below, corners_above, cut, solid_of
+from mdp.cut import Solid, below, corners_above, cut, mesh_of, solid_of
 from mdp.directions.flats import Flats
 from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Ints, Mesh
@@ -316,7 +316,7 @@ class Problem:
         if not self.is_clear(node, plane):
             return None
         limbs, rest = cut(node.solid, plane)
-        if limbs.is_empty() or rest.is_empty() or _floats(rest):
+        if limbs.is_empty() or rest.is_empty() or _floats(rest, plane):
             return None
         return Node(rest, (*node.cuts, Cut(plane, node.solid, self._cost(node, plane))), self.terms, node.places, node)
 
@@ -365,9 +365,14 @@ class Problem:
         return nodes
 
 
-def _floats(solid: Solid) -> bool:
-    """Whether a piece of a solid does not reach the platform."""
-    return any(piece.volume() > 0.0 and piece.bounding_box()[2] > PLATFORM_TOLERANCE_MM for piece in solid.decompose())
+def _floats(rest: Solid, plane: Plane) -> bool:
+    """Whether a piece of what limbs leave reaches neither the platform nor, where faces lie in the plane, that from above."""
+    for piece in rest.decompose():
+        if piece.volume() > 0.0 and piece.bounding_box()[2] > PLATFORM_TOLERANCE_MM:
+            lowest_mm = float(plane.heights_mm(mesh_of(piece).vertices).min())
+            if abs(lowest_mm) > BASE_TOLERANCE_MM:
+                return True
+    return False
 
 
 def without_limits(machine: Machine) -> Machine:

@@ -82,6 +82,14 @@ def test_a_limb_too_near_to_a_tower_is_refused_and_the_place_of_the_tower_is_sho
     assert np.array(trial.obstacle.places_mm)[:, 1].min() > 7.9
 
 
+def test_a_limb_may_be_cut_off_in_the_plane_of_the_plate_that_the_others_stand_on() -> None:
+    mesh = shapes.bar_beside_a_tower(gap=27.0)
+    at_the_plate = PlannedPart((0.0, 0.0, 1.0), 4.0, limbs_mm=((0.0, 33.0, 75.0),))
+    anything = _profile(fragile_mm=0.0, clearance=False)
+    parts = cut_by_plan(mesh, "bar", anything, PlanFile("plan.toml", parts=(at_the_plate,))).parts
+    assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 71)
+
+
 def test_a_plan_with_limbs_but_without_a_plane_is_refused(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text("version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\nlimbs_mm = [[0, 0, 1]]\n")
     with pytest.raises(PlanError, match="part 2: limbs_mm needs both normal and offset_mm"):
