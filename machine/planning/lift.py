@@ -1,6 +1,7 @@
 """Lift: how high the tip must be for the head to pass clear of what stands beside a limb while that is printed."""
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 
@@ -31,7 +32,7 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
                     points = _resampled(points)
                     tops.append(points[points[:, 2] > path.width_mm])
                     widest_mm = max(widest_mm, path.width_mm)
-    slack_mm = 0.5 * widest_mm + 1.25 * STEP_MM  # half a step of a way and of a bead, and half of a cell's diagonal
+    slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of a way and of a bead, and half of a cell's diagonal
     return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
 
 

@@ -52,7 +52,7 @@ def plan(
         begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported)
         target = _first_point(piece) + shift
         stands = join_hulls(printed) if _is_limb(part) else None
-        over = join_hulls(printed) if any(_is_limb(piece) for piece, _ in done) else stands
+        over = join_hulls(printed) if any(_is_limb(earlier) for earlier, _ in done) else stands
         if printed:
             moves += _reach(tip, begin, target, join_hulls(printed), profile, over)
         else:
@@ -67,7 +67,7 @@ def plan(
         printed.append(_printed(piece, part, shift, profile))
         done.append((part, piece))
     if pieces:
-        over = join_hulls(printed) if any(_is_limb(piece) for piece, _ in done) else None
+        over = join_hulls(printed) if any(_is_limb(earlier) for earlier, _ in done) else None
         moves += _finish(tip, pieces[-1].index, join_hulls(printed), profile, over)
     program = MachineProgram(decomposition.name, tuple(moves))
     limits.check(program, rows(program, machine.tilt.zero_deg, machine.turn.zero_deg), machine)

@@ -131,7 +131,7 @@ class Surface:
         for plane in planes:
             cut = cylinders_cut(self.remainder, left, plane)
             crossed += float(crossings(cut, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])
-            left = tuple(cylinder for cylinder in left if cylinder.reaches_below(plane))
+            left = tuple(cylinder for cylinder in left if cylinder not in cut or cylinder.reaches_below(plane))
         return self.terms.feature_mm2 * crossed
 
 

@@ -188,14 +188,15 @@ class Beam:
         trace.add([offer(signatures[ranked.table], tables[ranked.table], ranked) for ranked in offered], children)
 
 
-def search_limbs(problem: Problem, table: CandidateTable) -> list[Node]:
+def search_limbs(problem: Problem, first: Branch) -> list[Node]:
     """The best node after every stage of a search that may cut single limbs off; none where no limb is worth a cut.
 
-    table: the candidates of the node that the search begins with.
+    first: the node that the search begins with.
     """
-    limbs = _find_limbs(problem)
+    limbs = [] if problem.full(first.node) or problem.late() else _find_limbs(problem)
     if not limbs:
         return []
+    table = first.table
     rows = [row for trade_off in LIMB_TRADE_OFFS for row in islice(table.rows_by_trade_off(trade_off), MOST_PLANES)]
     directions = problem.limits.directions[np.unique(table.scored.direction[rows])]
     limits, seen, found = problem.bounds_along(directions), set[tuple[float, ...]](), list[Node]()
@@ -299,6 +300,6 @@ def _find_limbs(problem: Problem) -> list[Plane]:
         if problem.allowed(node, plane) and problem.is_clear(node, plane):
             others.append(plane)
             planes.append(plane)
-        if len(planes) == MOST_LIMBS or checked == MOST_CHECKED:
+        if len(planes) == MOST_LIMBS or checked == MOST_CHECKED or problem.late():
             break
     return planes

@@ -15,7 +15,7 @@ from mdp.clearance import find_obstacle, lowest_body
 from mdp.cut import above, divide, mesh_of, passing_places
 from mdp.directions.frame import frame_across
 from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text
-from mdp.overhang import threshold
+from mdp.overhang import BASE_TOLERANCE_MM, threshold
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
 from mdp.pose import poses
@@ -114,13 +114,15 @@ def name_limbs(node: Node, plane: Plane) -> Plane | Refusal:
     if standing.is_empty():
         return replace(plane, limbs_mm=None)
     surface = mesh_of(limbs)
-    if all((surface.vertices == point).all(axis=1).any() for point in plane.limbs_mm):
+    high = surface.vertices[plane.heights_mm(surface.vertices) > BASE_TOLERANCE_MM]
+    if all((high == point).all(axis=1).any() for point in plane.limbs_mm):
         return plane
     away_mm = [surface.distance_mm(point) for point in plane.limbs_mm]
     if max(away_mm) > FARTHEST_MM:
         place = ", ".join(f"{x:.4g}" for x in plane.limbs_mm[int(np.argmax(away_mm))])
         return Refusal(f"no piece above its plane lies at {place}: the nearest one is {max(away_mm):.3g} mm away")
-    tops = [piece.vertices[np.argmax(piece.vertices @ plane.normal)] for piece in map(mesh_of, limbs.decompose())]
+    bodies = [mesh_of(piece) for piece in limbs.decompose() if piece.volume() > 0.0]  # the others are voids
+    tops = [body.vertices[np.argmax(body.vertices @ plane.normal)] for body in bodies]
     return replace(plane, limbs_mm=np.array(tops))
 
 
@@ -220,10 +222,12 @@ def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     why = _refusal(problem, node, plane)
     if why is not None or not problem.settings.clearance:
         return why
+    hindrance = _find_hindrance(problem, node, plane)
+    if hindrance is not None:
+        return Refusal(hindrance, Reason.REACH)
     if plane.limbs_mm is not None and not problem.is_clear(node, plane):
         return Refusal(REASONS[Reason.STANDING], Reason.STANDING)
-    hindrance = _find_hindrance(problem, node, plane)
-    return None if hindrance is None else Refusal(hindrance, Reason.REACH)
+    return None
 
 
 def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:

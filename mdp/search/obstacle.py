@@ -43,6 +43,10 @@ class Obstacle:
 
 def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -> Obstacle | None:
     """Where a plane that may not cut a node is in the way; None: nobody knows."""
+    named = name_limbs(node, plane)
+    if isinstance(named, Refusal):
+        return None
+    plane = named
     match refusal.reason:
         case Reason.CLEARANCE:
             return Obstacle(touch=_touch(problem, node, plane))
@@ -72,10 +76,7 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
 
 def _standing(problem: Problem, node: Node, plane: Plane) -> Obstacle | None:
     """The places of what stands above a plane that ask for a higher tip than the limbs beside them have."""
-    named = name_limbs(node, plane)
-    if isinstance(named, Refusal):
-        return None
-    mesh, limb = node.remainder.mesh, limb_faces(node.remainder, named)
+    mesh, limb = node.remainder.mesh, limb_faces(node.remainder, plane)
     corners = mesh.vertices[mesh.faces]
     for pose in poses(problem.machine, plane.normal)[:1]:
         places = places_met(problem.machine, pose, corners[limb], corners[~limb], plane.offset_mm)
@@ -91,6 +92,8 @@ def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
         return None
     _, body, point, pose = min(options, key=lambda option: option[0])
     printed = problem.corners_cut(node, plane)
+    if len(printed) == 0:
+        return None
     tip, turned = printed[int(np.argmin(printed[:, 2]))], rotation(machine, pose)
     x, y, _ = tip + np.array(point) @ turned
     return Touch(body, _vector(tip), tuple(_vector(row) for row in turned), (float(x), float(y), 0.0))

@@ -10,18 +10,18 @@ from functools import partial
 from itertools import product
 from math import cos, radians, sin
 
-import numpy as np
-
 from mdp.cost.forecast import Surface
 from mdp.cost.symmetry import Mirror
+from mdp.cut import passing_places
 from mdp.directions.frame import frame_across
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
 from mdp.ranking.ranking import rank_by_trade_off
 from mdp.search.front import EQUAL
 from mdp.search.node import Node
 from mdp.search.problem import Problem
+from mdp.sweep.limbs import limb_faces
 
 STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are about 4.5 apart
 ROUNDS = 4  # moves by one step before the next smaller one
@@ -206,9 +206,13 @@ def _neighbours(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) ->
 
 
 def _middle(node: Node) -> Floats:
-    """(3,) middle of the corners of a node's last cut face."""
+    """(3,) middle of the corners of a node's last cut face, of a limb's that of its section."""
     base, points = node.cuts[-1].base, node.remainder.mesh.vertices
+    if base.limbs_mm is not None and node.parent is not None:
+        before = node.parent.remainder
+        mesh = Mesh(before.mesh.vertices, before.mesh.faces[limb_faces(before, base)])
+        middle: Floats = passing_places(mesh, base).mean(axis=0)
+        return middle
     heights = base.heights_mm(points)
-    top = heights.max() if base.limbs_mm is None else 0.0
-    middle: Floats = points[np.abs(heights - top) <= BASE_TOLERANCE_MM].mean(axis=0)
-    return middle
+    corners: Floats = points[heights >= heights.max() - BASE_TOLERANCE_MM]
+    return corners.mean(axis=0)

@@ -220,7 +220,6 @@ class Problem:
         return LimbGrid(
             directions=limits.directions,
             step_mm=step_mm,
-            least_offset_mm=np.full(len(limits.directions), -np.inf),
             least_height_mm=limits.least_height_mm,
             keep_mm=limits.keep_mm,
             seam_mm=self.terms.seam_mm,
@@ -366,7 +365,8 @@ class Problem:
 
 
 def _floats(rest: Solid, plane: Plane) -> bool:
-    """Whether a piece of what limbs leave reaches neither the platform nor, where faces lie in the plane, that from above."""
+    """Whether a piece of what limbs leave hangs in the air. One that begins exactly in the plane stands on what lies below: where
+    a face of the solid lies in the plane, the union leaves it a piece of its own."""
     for piece in rest.decompose():
         if piece.volume() > 0.0 and piece.bounding_box()[2] > PLATFORM_TOLERANCE_MM:
             lowest_mm = float(plane.heights_mm(mesh_of(piece).vertices).min())

@@ -31,6 +31,7 @@ from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.polish import make_regular, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
+from mdp.sweep.limbs import cylinders_cut
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
@@ -165,8 +166,8 @@ def _feature_notes(node: Node) -> tuple[str, ...]:
     """The bores that the cuts of parts pass askew."""
     notes, step = [], node
     while step.parent is not None:
-        plane, before = step.cuts[-1].base, step.parent.remainder.cylinders
-        crossed = [cylinder for cylinder in before if cylinder.is_crossed(plane)]
+        plane, before = step.cuts[-1].base, step.parent.remainder
+        crossed = [cylinder for cylinder in cylinders_cut(before, before.cylinders, plane) if cylinder.is_crossed(plane)]
         if crossed:
             names = ", ".join(dict.fromkeys(cylinder.in_words for cylinder in crossed))
             notes.append(f"part {len(node.cuts) - len(step.cuts) + 2}: it is cut askew through {names}")
@@ -187,7 +188,7 @@ def _search_beam(
             beam.advance()
             held = sum(node is not None for node in beam.nodes)
             _report(problem, report, stage, held, beam.best)
-        limbs = search_limbs(problem, beam.first.table) if problem.settings.single_limb else []
+        limbs = search_limbs(problem, beam.first) if problem.settings.single_limb else []
         best = _polish_finalists(problem, beam, limbs, partial(_report, problem, report, stage, 1))
         if problem.settings.polish and problem.terms.seam_mm > 0.0:
             _prefer_regular(problem, beam.front)

@@ -141,10 +141,10 @@ class Trials:
         return None
 
     def _named(self, order: Sequence[Plane]) -> list[Plane]:
-        """Planes in the order of their cuts, their limbs named by vertices of the model."""
+        """Planes in the order of their cuts, their limbs named by vertices where they can be."""
         made = [node.cuts[-1].base for _, node in self._cut[: len(order)]]
-        others = [name_limbs(self._node, plane) for plane in order[len(made) :]]
-        return [*made, *(plane for plane in others if isinstance(plane, Plane))]
+        others = [(plane, name_limbs(self._node, plane)) for plane in order[len(made) :]]
+        return [*made, *(plane if isinstance(named, Refusal) else named for plane, named in others)]
 
     def _look(self, plane: Plane) -> Refusal | None:
         """Why a plane cannot cut what is left; nothing is cut."""

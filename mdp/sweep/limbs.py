@@ -21,7 +21,7 @@ from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.stairs import step_share
-from mdp.support_need.patches import CARRIES_ITSELF, UNSUPPORTABLE
+from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE
 from mdp.sweep.components import Topology, anchor_of, before
 from mdp.sweep.cylinders import Cylinder, crossings
 from mdp.sweep.facets import Rings
@@ -58,13 +58,12 @@ class Pieces(NamedTuple):
 
 class LimbGrid(NamedTuple):
     """Where limbs are looked for and what they must respect. directions (k, 3), step_mm of their offsets; for each direction
-    (k,) least_offset_mm, least_height_mm, the least z of what is cut off, and keep_mm (k, s, 2) spans that planes keep out of;
+    (k,) least_height_mm, the least z of what is cut off, and keep_mm (k, s, 2) spans that planes keep out of;
     seam_mm, cut_mm2: see CostTerms; least_gain_mm2, least_volume_mm3; least_interface_mm2: the area that a limb stands on at
     least, any when it is lower than crumb steps."""
 
     directions: Floats
     step_mm: float
-    least_offset_mm: Floats
     least_height_mm: Floats
     keep_mm: Floats
     seam_mm: float
@@ -77,12 +76,13 @@ class LimbGrid(NamedTuple):
 
 class PointedPlanes(NamedTuple):
     """Planes: (k, 3) normals, (k,) offsets, and (k, MOST_JOINED, 3) a point of each limb, infinite: fewer; crumb_mm: a limb lower
-    than this may stand on any area."""
+    than this may stand on any area; farthest_mm2: the square of the distance at which a vertex still stands for a point."""
 
     normals: Floats
     offsets_mm: Floats
     points: Floats
     crumb_mm: float
+    farthest_mm2: float
 
 
 class LimbRows(NamedTuple):
@@ -147,7 +147,7 @@ class LimbSums:
 
 def sum_limbs(remainder: Remainder, planes: Sequence[Plane], risky_below: float, crumb_mm: float) -> LimbSums:
     """What cutting off the limbs of planes would do, nothing is cut. The points of a limb are vertices of it."""
-    pointed = _pointed(planes, crumb_mm)
+    pointed = _pointed(planes, crumb_mm, SAME_MM2)
     sums = np.zeros((len(planes), len(SUMS) + 4))
     scars = scars_of(remainder, pointed.normals, risky_below)
     in_threads(_sum_limbs, len(planes), scars, remainder.topology, pointed, sums)
@@ -173,13 +173,15 @@ def _count_crossed(remainder: Remainder, plane: Plane) -> float:
     return float(crossings(cut, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0]) if cut else 0.0
 
 
-def _pointed(planes: Sequence[Plane], crumb_mm: float) -> PointedPlanes:
+def _pointed(planes: Sequence[Plane], crumb_mm: float, farthest_mm2: float) -> PointedPlanes:
     points = np.full((len(planes), MOST_JOINED, 3), np.inf)
     for row, plane in enumerate(planes):
         if plane.limbs_mm is not None:
             points[row, : len(plane.limbs_mm)] = plane.limbs_mm
     normals = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
-    return PointedPlanes(normals, np.array([plane.offset_mm for plane in planes], dtype=np.float64), points, crumb_mm)
+    return PointedPlanes(
+        normals, np.array([plane.offset_mm for plane in planes], dtype=np.float64), points, crumb_mm, farthest_mm2
+    )
 
 
 def limb_faces(remainder: Remainder, plane: Plane) -> Mask:
@@ -191,11 +193,12 @@ def limb_faces(remainder: Remainder, plane: Plane) -> Mask:
 
 
 def limb_vertices(remainder: Remainder, plane: Plane) -> Mask:
-    """(n,) the vertices of a solid that a plane cuts off, in the order of its facets."""
+    """(n,) the vertices of a solid that a plane cuts off, in the order of its facets. A limb has the vertex that is nearest to
+    its point."""
     if plane.limbs_mm is None:
         above: Mask = plane.heights_mm(remainder.facets.mesh.vertices) > 0.0
         return above
-    return _mark_limbs(scars_of(remainder, plane.normal[None], 0.0), remainder.topology, _pointed([plane], 0.0))
+    return _mark_limbs(scars_of(remainder, plane.normal[None], 0.0), remainder.topology, _pointed([plane], 0.0, np.inf))
 
 
 def limb_reach(remainder: Remainder, plane: Plane) -> Mask:
@@ -291,7 +294,7 @@ def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
         weights[f, UP] = area if surface.risky[f] else 0.0
         weights[f, RESIDUAL] = 0.0
         if cosine < surface.risky_below:
-            kind = classes[row, sources[f]] if sources[f] >= 0 else 1
+            kind = classes[row, sources[f]] if sources[f] >= 0 else NEEDS_SUPPORT
             if kind != CARRIES_ITSELF:
                 weights[f, RESIDUAL] = area * (needs.weight if kind == UNSUPPORTABLE else 1.0)
         weights[f, SECTION] = rims.areas_mm2[f] * cosine
@@ -329,7 +332,7 @@ def _cross(column: int, heights: Floats, weights: Floats, topology: Topology, pi
         if lowest > c:
             _add(whole, own, weights, f)
             whole[own, MOMENT] += weights[f, SECTION] * (p + q + r) / 3.0
-            whole[own, RIM] = 0.0
+            whole[own, RIM] = 0.0  # only faces that cross have a rim
             continue
         active[still] = f
         still += 1
@@ -469,8 +472,6 @@ def _find_limbs(begin_row: int, end_row: int, scars: Scars, topology: Topology, 
         face_starts, faces = counting_sort(room.face_over, n + 1)
         for column in range(n - 1, -1, -1):
             offset_mm = (first + column) * step_mm
-            if offset_mm < grid.least_offset_mm[row]:
-                break
             _enter(vertices[starts[column + 1] : starts[column + 2]], heights, room.cosines, topology, pieces)
             for at in range(face_starts[column + 1], face_starts[column + 2]):
                 pieces.active[pieces.counts[1]] = faces[at]
@@ -508,7 +509,7 @@ def _mark_limbs(scars: Scars, topology: Topology, planes: PointedPlanes) -> Mask
     heights, room, chosen, marked = (
         floats(size, 0.0),
         _make_room(size, scars.overhangs.corners.shape[1]),
-        ints(6, NONE),
+        ints(MOST_JOINED, NONE),
         flags(size),
     )
     many = _find_chosen(scars, 0, topology, planes, heights, room, chosen)
@@ -573,7 +574,7 @@ def _find_chosen(
     many = 0
     for limb in range(planes.points.shape[1]):
         if np.isfinite(planes.points[row, limb, 0]):
-            v = _nearest(planes.points[row, limb], points, pieces.parent)
+            v = _nearest(planes.points[row, limb], points, pieces.parent, planes.farthest_mm2)
             if v < 0:
                 return 0
             own, known = root(pieces.parent, v), False
@@ -586,9 +587,9 @@ def _find_chosen(
 
 
 @borrower
-def _nearest(point: Floats, points: Floats, parent: Ints) -> int:
-    """The vertex above the plane at a point; NONE: there is none."""
-    nearest, least = NONE, SAME_MM2
+def _nearest(point: Floats, points: Floats, parent: Ints, farthest_mm2: float) -> int:
+    """The vertex above the plane that is nearest to a point; NONE: there is none as near as that."""
+    nearest, least = NONE, farthest_mm2
     for v in range(len(parent)):
         if parent[v] >= 0:
             x, y, z = points[0, v] - point[0], points[1, v] - point[1], points[2, v] - point[2]

@@ -85,7 +85,8 @@ def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_
         points.append(corners.reshape(-1, 3))
     tops = np.concatenate(points)
     tops = highest_in_cells(tops[tops[:, 2] > LOW_MM], cell_mm)
-    return Standing.of(tops, 2.5 * cell_mm, machine)  # half of either cell's diagonal, and half an edge of a triangle
+    # Half of either cell's diagonal, and how far the middle of a triangle with such edges is from its corners.
+    return Standing.of(tops, 2.6 * cell_mm, machine)
 
 
 def _rectangles(met: Mask, x0: float, middle_mm: float, cell_mm: float) -> list[Polygons]:

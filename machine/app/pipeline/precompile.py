@@ -98,7 +98,7 @@ def _search() -> None:
 def _limbs(remainder: Remainder) -> None:
     """The kernels of cuts that take single limbs off."""
     row = np.zeros(1)
-    find_limbs(remainder, LimbGrid(LEANING[None], 1.0, row, row, np.zeros((1, 0, 2)), 0.8, 20.0, 5.0, 100.0, 4.0, 2.0), -0.7)
+    find_limbs(remainder, LimbGrid(LEANING[None], 1.0, row, np.zeros((1, 0, 2)), 0.8, 20.0, 5.0, 100.0, 4.0, 2.0), -0.7)
     limb = replace(PLANE, limbs_mm=remainder.mesh.vertices[:1])
     sum_limbs(remainder, [limb], -0.7, 2.0)
     limb_reach(remainder, limb)

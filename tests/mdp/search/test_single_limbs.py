@@ -4,9 +4,11 @@ stands."""
 from dataclasses import replace
 from pathlib import Path
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.cut import solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
@@ -88,6 +90,56 @@ def test_a_limb_may_be_cut_off_in_the_plane_of_the_plate_that_the_others_stand_o
     anything = _profile(fragile_mm=0.0, clearance=False)
     parts = cut_by_plan(mesh, "bar", anything, PlanFile("plan.toml", parts=(at_the_plate,))).parts
     assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 71)
+
+
+def test_a_limb_that_begins_too_near_to_the_table_is_refused_with_the_head_that_would_touch_it() -> None:
+    plate = m3.Manifold.cube((80, 80, 4), True).translate((0, 0, 2)) + m3.Manifold.cube((12, 12, 20)).translate((-25, -6, 0))
+    low = plate + m3.Manifold.cube((41, 12, 8)).translate((-14, -6, 6)) + m3.Manifold.cube((6, 6, 40)).translate((20, 34, 0))
+    bar = PlannedPart(ALONG, 0.0, limbs_mm=((27.0, 0.0, 10.0),)).plane
+    assert bar is not None
+    trial = Trials(shapes.from_manifold(low), _profile()).attempt([bar])
+    assert "would meet the table" in trial.refused
+    assert trial.obstacle is not None
+    assert trial.obstacle.touch is not None
+
+
+def test_a_limb_out_of_reach_of_the_axes_is_refused_for_that_and_not_for_what_stands() -> None:
+    profile, limits = _profile(), {"limits_mm": (-20.0, 20.0)}
+    axes = {axis: getattr(profile.machine, axis).model_copy(update=limits) for axis in ("x", "y")}
+    narrow = profile.model_copy(update={"machine": profile.machine.model_copy(update=axes)})
+    with pytest.raises(PlanError, match="would go from"):
+        cut_by_plan(shapes.bar_beside_a_tower(), "bar", narrow, PlanFile("p", parts=(BAR,)))
+
+
+def test_a_point_at_the_foot_of_a_limb_means_that_limb() -> None:
+    foot = PlannedPart((0.0, 0.0, 1.0), 40.0, limbs_mm=((-6.0, 33.0, 40.0),))
+    anything = _profile(fragile_mm=0.0, clearance=False)
+    parts = cut_by_plan(shapes.bar_beside_a_tower(gap=27.0), "bar", anything, PlanFile("p", parts=(foot,))).parts
+    assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 35)
+
+
+def test_a_limb_with_many_voids_is_one_limb() -> None:
+    voids = [m3.Manifold.cube((2, 2, 2)).translate((-1, 38, 20 + 7 * k)) for k in range(7)]
+    hollow = shapes.from_manifold(solid_of(shapes.bar_beside_a_tower(gap=27.0)) - m3.Manifold.batch_boolean(voids, m3.OpType.Add))
+    tower = PlannedPart((0.0, 0.0, 1.0), 10.0, limbs_mm=((0.0, 39.0, 75.0),))
+    anything = _profile(fragile_mm=0.0, clearance=False, nozzle_load_n=0.0)
+    parts = cut_by_plan(hollow, "bar", anything, PlanFile("p", parts=(tower,))).parts
+    assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 65 - 7 * 8)
+
+
+def test_a_limb_whose_end_is_a_part_of_its_own_is_told_with_its_own_figures() -> None:
+    trials = Trials(shapes.bar_beside_a_tower(), _profile(nozzle_load_n=0.0, fragile_mm=0.0))
+    rest, end = replace(BAR, limbs_mm=((14.0, 0.0, 50.0),)).plane, replace(BAR, offset_mm=48.0, limbs_mm=()).plane
+    assert rest is not None
+    assert end is not None
+    trial = trials.attempt([rest, end])
+    assert trial.refused == ""
+    assert [part is not None and part.volume_mm3 > 500.0 and part.rim_mm > 20.0 for part in trial.parts] == [True, True]
+
+
+@pytest.mark.parametrize("limits", [{"most_parts": 1}, {"time_limit_s": 0.0}])
+def test_no_limb_is_looked_for_where_no_cut_may_be_made(limits: dict[str, object]) -> None:
+    assert len(decompose(shapes.bar_beside_a_tower(), "bar", _profile(**limits)).parts) == 1
 
 
 def test_a_plan_with_limbs_but_without_a_plane_is_refused(tmp_path: Path) -> None:

@@ -27,7 +27,6 @@ def _grid(directions: Floats, least_gain_mm2: float = 1.0, keep_mm: Floats | Non
     return LimbGrid(
         directions=directions,
         step_mm=STEP_MM,
-        least_offset_mm=np.full(count, -np.inf),
         least_height_mm=np.full(count, -1e9),
         keep_mm=np.zeros((count, 0, 2)) if keep_mm is None else keep_mm,
         seam_mm=0.0,
