@@ -37,11 +37,12 @@ from mdp.sweep.limbs import find_limbs
 # each: 4 is best on average, no value is best on most models.
 TRADE_OFFS = (None, 4.0, 1.0, 8.0, 2.0, 0.5, 16.0, 0.0)
 RECORDED = 50  # candidates of a stage that are put on record, the B of the 2020 paper
-EVERY = 4  # sampled directions to one in which limbs are looked for
+EVERY = 6  # sampled directions to one in which limbs are looked for
 WORTH = 0.005  # share of the uncut model's cost that a limb must save
-MOST_LIMBS, MOST_CHECKED = 24, 40  # planes of limbs that are kept, and that are checked for it
+MOST_LIMBS, MOST_CHECKED = 16, 32  # planes of limbs that are kept, and that are checked for it
 MOST_PLANES = 16  # planes of the beam's ranking that are looked at, by each trade-off
 LIMB_TRADE_OFFS = (4.0, 1.0)  # a slot each
+PATIENCE = 2  # stages without a better node after which limbs are left alone
 MOST_TRIED = 16  # limbs, and planes, that a slot tries at a node before it gives up
 
 
@@ -211,6 +212,8 @@ def search_limbs(problem: Problem, first: Branch) -> list[Node]:
         nodes = children
         best = min((best, *nodes), key=lambda node: node.cost_mm2)
         found.append(best)
+        if len(found) > PATIENCE and found[-1 - PATIENCE] is best:
+            break
     return found
 
 

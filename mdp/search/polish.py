@@ -210,9 +210,9 @@ def _middle(node: Node) -> Floats:
     base, points = node.cuts[-1].base, node.remainder.mesh.vertices
     if base.limbs_mm is not None and node.parent is not None:
         before = node.parent.remainder
-        mesh = Mesh(before.mesh.vertices, before.mesh.faces[limb_faces(before, base)])
-        middle: Floats = passing_places(mesh, base).mean(axis=0)
-        return middle
-    heights = base.heights_mm(points)
-    corners: Floats = points[heights >= heights.max() - BASE_TOLERANCE_MM]
-    return corners.mean(axis=0)
+        corners = passing_places(Mesh(before.mesh.vertices, before.mesh.faces[limb_faces(before, base)]), base)
+    else:
+        heights = base.heights_mm(points)
+        corners = points[heights >= heights.max() - BASE_TOLERANCE_MM]
+    middle: Floats = corners.mean(axis=0)
+    return middle
