@@ -5,11 +5,11 @@ above the table; with the table unbounded, z >= max over the bodies of -n . b ke
 across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. What of the cradle stands higher than the
 table is not under that plane: it is tried against the head wherever the tip goes.
 
-Nothing printed stands above the base plane of a part that is all that lay above it. Beside a limb other pieces stand. The head is
-taken as everything above its underside: the silhouette turned about the nozzle, and boxes, which count as far as the nozzle. A
-point that stands at a height t, r aside from the tip, asks for a tip at t - h(r), where h is the height of the underside at that
-radius. h does not fall with r, so in every layer the outline asks for more than any place inside it: only the surfaces of the
-limb and of what stands are compared, as triangles so small that it does not matter where on one a place lies.
+A part cut off by a whole plane has nothing printed above its base plane. A limb has: other pieces stand beside it. The head is
+modelled as everything above its underside: the silhouette turned about the nozzle, and boxes that are extended to the nozzle. A
+printed point at height t and distance r from the nozzle axis requires the tip to be at t - h(r) or higher, where h(r) is the
+height of the underside. h never decreases with r, so within a layer the outline is the worst case and it is enough to compare
+the two surfaces. Both are divided into triangles so small that the slack covers every point of them.
 """
 
 from dataclasses import dataclass
@@ -27,11 +27,12 @@ from mdp.pose import UP, Pose, poses, rotation, shift
 from profiles.frozen import Vector
 from profiles.machine import Machine
 
-CELLS_MM = (2.0, 0.6, 0.2)  # sides of the cells in which pieces of both surfaces are compared; finer where coarse leave doubt
-MOST_TRIANGLES, MOST_PAIRS = 250_000, 2_000_000  # of one surface, and of cells of both, that are compared
-EVEN_MM = 1e-4  # what lies no higher above the base plane is the face on which the limb stands
+CELLS_MM = (2.0, 0.6, 0.2)  # cell sizes, coarse to fine: only pairs that may collide are compared again
+MOST_TRIANGLES, MOST_PAIRS = 250_000, 2_000_000  # per surface, and pairs of cells; more are refused
+EVEN_MM = 1e-4  # up to this height above the base plane is the cut face itself
 NOTHING = -1e9
-MOST_TRIED = 1000  # corners of either surface that are compared first
+Share = tuple[int, int]
+MOST_TRIED = 1000  # corners per surface for the first, quick test
 
 
 class LowestBody(NamedTuple):
@@ -113,8 +114,8 @@ def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str,
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """points_mm (k, 3): places of the part's frame and heights up to which something stands there, the highest first; slack_mm:
-    how far it may reach beyond each; clearance_mm: what the head keeps from it."""
+    """What stands beside a limb, and the head that must pass it. points_mm (k, 3): x, y and top of each printed column in the
+    part's frame, highest first; slack_mm: how far a column may extend beyond its point; clearance_mm: the distance to keep."""
 
     points_mm: Floats
     slack_mm: float
@@ -123,30 +124,39 @@ class Standing:
 
     @classmethod
     def of(cls, points_mm: Floats, slack_mm: float, machine: Machine) -> "Standing":
-        """What stands at (k, 3) points of the part's frame at the pose in which it is printed."""
+        """The standing columns for (k, 3) points of the part's frame."""
         highest_first = np.argsort(-points_mm[:, 2], kind="stable")
         return cls(np.ascontiguousarray(points_mm[highest_first]), slack_mm, head_of(machine), machine.clearance_mm)
 
     def least_tip_mm(self, places_mm: Floats, known_mm: float = NOTHING) -> Floats:
-        """(n,) least heights of the tip over (n, 2) places; NOTHING where nothing asks for one. known_mm: a height that the tip
-        has in any case: where no more than that is asked for, less or nothing may be told."""
+        """(n,) the lowest safe heights of the tip at (n, 2) places; NOTHING where any height is safe.
+
+        known_mm: a height that the tip has anyway; results at or below it may come out too low.
+        """
         count = int(np.searchsorted(-self.points_mm[:, 2], self.slack_mm - known_mm))
         places, points = np.ascontiguousarray(places_mm), self.points_mm[:count]
         return _least_tip(places, points, self.slack_mm, self.head, self.clearance_mm)
 
 
 def highest_in_cells(points_mm: Floats, cell_mm: float) -> Floats:
-    """(c, 3) the middles of the cells of a lattice over X and Y in which any of (n, 3) points lie, and their greatest heights."""
-    cells, inverse = np.unique(np.floor(points_mm[:, :2] / cell_mm).astype(np.int64), axis=0, return_inverse=True)
-    highest = np.full(len(cells), -np.inf)
-    np.maximum.at(highest, inverse.ravel(), points_mm[:, 2])
-    return np.column_stack([(cells + 0.5) * cell_mm, highest])
+    """(c, 3) the highest of (n, 3) points in each cell of a lattice over X and Y, moved to the middle of the cell."""
+    return _per_cell(points_mm[:, :2], points_mm[:, 2], cell_mm, np.maximum)[0]
+
+
+def _per_cell(places: Floats, heights: Floats, cell_mm: float, extreme: np.ufunc) -> tuple[Floats, Indices]:
+    """(c, 3) the middles of the cells that hold any of (n, 2) places with the extreme (np.minimum, np.maximum) of their heights,
+    and (n,) the cell of each place."""
+    cells = np.floor(places / cell_mm).astype(np.int64)
+    _, first, of_place = np.unique(cells[:, 0] * 1_000_003 + cells[:, 1], return_index=True, return_inverse=True)
+    reached = heights[first]
+    extreme.at(reached, of_place, heights)
+    return np.column_stack([(cells[first] + 0.5) * cell_mm, reached]), of_place
 
 
 @borrower
 def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head, clearance: float) -> float:
-    """The height of the tip that what stands up to `top` asks for; square: of its distance aside; beyond: how much nearer it may
-    be."""
+    """The lowest safe height of the tip beside a column that ends at `top`. square: of the distance to its point; beyond: how
+    much nearer the column may be."""
     widest = head.silhouette[len(head.silhouette) - 1, 0] + beyond
     if square > widest * widest:
         return NOTHING
@@ -156,7 +166,7 @@ def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head, clea
 
 @borrower
 def _is_under(box: Floats, across: float, along: float, beyond: float) -> bool:
-    """Whether something so far aside from the tip lies under a box, or as near to that as `beyond`."""
+    """Whether a point at that offset from the tip lies under a box enlarged by `beyond`."""
     inside = box[0] - beyond <= across and across <= box[3] + beyond
     return bool(inside and box[1] - beyond <= along and along <= box[4] + beyond)
 
@@ -180,17 +190,17 @@ def _least_tip(places: Floats, points: Floats, slack: float, head: Head, clearan
 
 @dataclass(frozen=True, eq=False)
 class _Meeting:
-    """A head that passes over a limb. around_mm (2, 3): the box of the tip's places."""
+    """A head that prints a limb. around_mm (2, 3): the bounding box of the limb, where the tip goes."""
 
     head: Head
     clearance_mm: float
     around_mm: Floats
 
     def close(self, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
-        """(i,) the places of the tip at which the head may meet any of (j, 3) points that stand, and (j,) those points.
+        """(i,) which tips may make the head hit any of (j, 3) standing points, and (j,) which of those points are hit.
 
-        Of the limb only its surface is looked at. So a box counts as far as the nozzle, under which no place inside the limb asks
-        for more than one on its outline; and it counts only for what it reaches from anywhere in the limb's box.
+        The tips lie on the limb's surface only. Extending every box to the nozzle makes the outline the worst case inside the
+        limb, too; a box is tested only against points that it can reach from somewhere in the limb's bounding box.
         """
         boxes, beyond = self.head.boxes, slack_mm + self.clearance_mm
         low, high = self.around_mm[0, :2] + boxes[:, :2] - beyond, self.around_mm[1, :2] + boxes[:, 3:5] + beyond
@@ -202,10 +212,10 @@ class _Meeting:
 
 
 def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> bool:
-    """Whether the head passes clear of what stands while a limb is printed.
+    """Whether the head clears everything that stands while a limb is printed.
 
-    limb, standing: (m, 3, 3) corners of the faces of both surfaces in the workpiece frame; base_mm: the base plane's offset. What
-    of them lies below the base plane is left out. Surfaces that would take long to compare are not taken to be clear.
+    limb, standing: (m, 3, 3) corners of the faces of both surfaces in the workpiece frame; base_mm: the base plane's offset.
+    Triangles below the base plane are ignored. False also where there are too many triangles to compare.
     """
     tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
     if meeting.close(_few(tips), _few(stands), 0.0)[0].any():
@@ -216,17 +226,18 @@ def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, b
         tips, stands = (_above(subdivide(corners, cell_mm)) for corners in (tips, stands))
         if len(tips) == 0 or len(stands) == 0:
             return True
-        (low, of_tip), (high, of_stand) = _in_cells(tips, cell_mm, 1.0), _in_cells(stands, cell_mm, -1.0)
+        low, of_tip = _per_cell(tips[:, 0, :2], np.maximum(tips[:, :, 2], 0.0).min(axis=1), cell_mm, np.minimum)
+        high, of_stand = _per_cell(stands[:, 0, :2], stands[:, :, 2].max(axis=1), cell_mm, np.maximum)
         if len(low) * len(high) > MOST_PAIRS:
             return False
-        slack_mm = hypot(cell_mm, cell_mm) + 2.0 * cell_mm  # of the middles of two cells, and of two triangles
+        slack_mm = hypot(cell_mm, cell_mm) + 2.0 * cell_mm  # two half diagonals of cells and two edges of triangles
         close_tips, close_stands = meeting.close(low, high, slack_mm)
         tips, stands = tips[close_tips[of_tip]], stands[close_stands[of_stand]]
     return len(tips) == 0
 
 
 def _meeting(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> tuple[Floats, Floats, _Meeting]:
-    """Both surfaces in the part's frame, and the head over the limb."""
+    """Both surfaces above the base plane in the part's frame, and the head over the limb."""
     turn, down = rotation(machine, pose), np.array([0.0, 0.0, base_mm])
     tips = _above(np.ascontiguousarray(limb @ turn.T - down))
     stands = _above(np.ascontiguousarray(standing @ turn.T - down - np.array([0.0, 0.0, EVEN_MM])))
@@ -236,7 +247,7 @@ def _meeting(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_
 
 
 def places_met(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> Floats:
-    """(k, 3) corners of what stands that the head surely meets while a limb is printed, the highest first; see passes_clear."""
+    """(k, 3) points of what stands that the head certainly hits while a limb is printed, highest first; see passes_clear."""
     tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
     if max(count_divided(corners, CELLS_MM[0]) for corners in (tips, stands)) <= MOST_TRIANGLES:
         tips, stands = (subdivide(corners, CELLS_MM[0]) for corners in (tips, stands))
@@ -253,25 +264,15 @@ def _above(corners: Floats) -> Floats:
 
 
 def _few(corners: Floats) -> Floats:
-    """(k, 3) up to MOST_TRIED corners above the base plane."""
+    """(k, 3) an even sample of about MOST_TRIED corners above the base plane."""
     points = corners.reshape(-1, 3)
     points = points[points[:, 2] >= 0.0]
     return np.ascontiguousarray(points[:: len(points) // MOST_TRIED + 1])
 
 
-def _in_cells(corners: Floats, cell_mm: float, sign: float) -> tuple[Floats, Indices]:
-    """(c, 3) the middles of the cells in which (m, 3, 3) triangles begin and their least height in each, sign -1: the greatest,
-    and (m,) the cell of each triangle."""
-    cells = np.floor(corners[:, 0, :2] / cell_mm).astype(np.int64)
-    _, first, inverse = np.unique(cells[:, 0] * 1_000_003 + cells[:, 1], return_index=True, return_inverse=True)
-    heights = np.full(len(first), np.inf)
-    np.minimum.at(heights, inverse, (sign * np.maximum(corners[:, :, 2], 0.0)).min(axis=1))
-    return np.column_stack([(cells[first] + 0.5) * cell_mm, sign * heights]), inverse
-
-
 @kernel
 def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearance: float, reached: Mask) -> tuple[Mask, Mask]:
-    """See _Meeting.close; reached (j, b): which points may come under which box."""
+    """See _Meeting.close; reached (j, b): which points each box can reach."""
     close_tips, close_points, beyond = flags(len(tips)), flags(len(points)), slack + clearance
     for i in range(len(tips)):
         for j in range(len(points)):
@@ -291,6 +292,11 @@ def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearanc
 @kernel
 def count_divided(corners: Floats, longest: float) -> int:
     """How many triangles `subdivide` makes."""
+    return _count_divided(corners, longest)
+
+
+@borrower
+def _count_divided(corners: Floats, longest: float) -> int:
     count = 0
     for f in range(len(corners)):
         count += _divisions(corners[f], longest) ** 2
@@ -299,36 +305,33 @@ def count_divided(corners: Floats, longest: float) -> int:
 
 @kernel
 def subdivide(corners: Floats, longest: float) -> Floats:
-    """(k, 3, 3) the triangles that (m, 3, 3) triangles are divided into, each like it, so that no edge is longer than that."""
-    count = 0
-    for f in range(len(corners)):
-        count += _divisions(corners[f], longest) ** 2
-    parts, at = table(9 * count, 1), 0
+    """(k, 3, 3) similar triangles that (m, 3, 3) triangles are divided into, so that no edge is longer than `longest`."""
+    count, at = _count_divided(corners, longest), 0
+    points = table(3 * count, 3)
     for f in range(len(corners)):
         n = _divisions(corners[f], longest)
         for i in range(n):
             for j in range(n - i):
-                at = _put(parts, at, corners[f], (i, j, i + 1, j, i, j + 1, n))
+                at = _put(points, at, corners[f], ((i, j), (i + 1, j), (i, j + 1)), n)
                 if i + j < n - 1:
-                    at = _put(parts, at, corners[f], (i + 1, j, i + 1, j + 1, i, j + 1, n))
-    return parts.reshape(count, 3, 3)
+                    at = _put(points, at, corners[f], ((i + 1, j), (i + 1, j + 1), (i, j + 1)), n)
+    return points.reshape(count, 3, 3)
 
 
 @borrower
-def _put(parts: Floats, at: int, corners: Floats, places: tuple[int, int, int, int, int, int, int]) -> int:
-    """Put a triangle at a place of a list of numbers: its corners lie so many nth parts along two edges; the next place."""
-    for corner in range(3):
-        i, j, n = places[2 * corner], places[2 * corner + 1], places[6]
+def _put(points: Floats, at: int, corners: Floats, shares: tuple[Share, Share, Share], n: int) -> int:
+    """Write a triangle into three rows and return the next row. shares: its corners in nth parts of two edges of `corners`."""
+    for i, j in shares:
         for axis in range(3):
             p, q, r = corners[0, axis], corners[1, axis], corners[2, axis]
-            parts[at, 0] = p + (i * (q - p) + j * (r - p)) / n
-            at += 1
+            points[at, axis] = p + (i * (q - p) + j * (r - p)) / n
+        at += 1
     return at
 
 
 @borrower
 def _divisions(corners: Floats, most: float) -> int:
-    """Into how many pieces the edges of a triangle are divided."""
+    """How many pieces each edge of a triangle is divided into."""
     longest = 0.0
     for k in range(3):
         square = 0.0

@@ -14,6 +14,7 @@ from typing import Any
 
 import manifold3d as m3
 import numpy as np
+from bench_export import OURS
 
 from mdp.cut import mesh_of
 from mdp.save import stl
@@ -22,14 +23,14 @@ SIDES = 64
 
 
 def tube(points: np.ndarray, radius_mm: float) -> m3.Manifold:
-    """A round rod along (n, 3) points, balls at its bends."""
+    """Round rods between consecutive (n, 3) points."""
     pieces = []
     for a, b in pairwise(points):
         length = float(np.linalg.norm(b - a))
         x, y, z = (b - a) / length
         rod = m3.Manifold.cylinder(length, radius_mm, radius_mm, SIDES)
         turned = rod.rotate((0.0, float(np.degrees(np.arccos(z))), float(np.degrees(np.arctan2(y, x)))))
-        pieces += [turned.translate(tuple(map(float, a)))]
+        pieces.append(turned.translate(tuple(map(float, a))))
     return m3.Manifold.batch_boolean(pieces, m3.OpType.Add)
 
 
@@ -64,12 +65,15 @@ SHAPES: dict[str, Callable[[], m3.Manifold]] = {
 
 
 def exported(model: Path, *options: str) -> dict[str, Any]:
-    """What `export --json` tells of a model."""
-    told = model.with_suffix(".json")
-    written = ["-o", str(model.with_suffix(".gcode")), "--force", "--json", str(told)]
-    start = [sys.executable, "-c", "import sys; from machine.app.start import main; sys.exit(main())"]
-    subprocess.run([*start, "export", str(model), *written, "--as-is", *options], check=False, capture_output=True)
-    values: dict[str, Any] = json.loads(told.read_text())
+    """What `export --json` reports of a model. Ends the program with the export's own message where it writes no report."""
+    report = model.with_suffix(".json")
+    report.unlink(missing_ok=True)
+    written = ["-o", str(model.with_suffix(".gcode")), "--force", "--json", str(report)]
+    command = [*OURS, "export", str(model), *written, "--as-is", *options]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if not report.exists():
+        sys.exit(f"{model.name}: {done.stderr.strip()}")
+    values: dict[str, Any] = json.loads(report.read_text())
     return values
 
 

@@ -1,4 +1,4 @@
-"""Lift: how high the tip must be for the head to pass clear of what stands beside a limb while that is printed."""
+"""Lift: how high the tip must be for the head to clear what stands beside a limb that is being printed."""
 
 from collections.abc import Sequence
 from math import sqrt
@@ -14,13 +14,13 @@ from profiles.machine import Machine
 from slicer.interface.interface import frame_change
 from slicer.paths import SlicedPart
 
-STEP_MM = 0.5  # between places of a way, and of a bead, that are looked at; sides of the cells of which the highest counts
+STEP_MM = 0.5  # between the points that sample ways and beads, and size of the cells in which only the highest point counts
 
 
 def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> Standing:
-    """What stands above the base plane of a limb, in its frame, of the beads of parts that are printed.
+    """The printed beads that stand above the base plane of a limb, in its frame.
 
-    Beads that end less than their width above the plane are the steps of the face on which the limb stands.
+    Beads less than their width above the plane are left out: they are the steps of the cut face on which the limb stands.
     """
     tops, widest_mm = [np.zeros((0, 3))], 0.0
     for part, piece in printed:
@@ -32,17 +32,17 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
                     points = _resampled(points)
                     tops.append(points[points[:, 2] > path.width_mm])
                     widest_mm = max(widest_mm, path.width_mm)
-    slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of a way and of a bead, and half of a cell's diagonal
+    slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of way and of bead, half a cell's diagonal
     return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
 
 
-def least_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> float:
-    """The height, no less than that given, at which the tip may go along a way (n, 2) of the limb's frame."""
+def clear_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> float:
+    """The least height of at least height_mm at which the tip may go along a way (n, 2) in the limb's frame."""
     return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm), height_mm).max()))
 
 
 def _resampled(way_mm: Floats) -> Floats:
-    """Points on a way (n, d), its own among them, no farther apart than STEP_MM."""
+    """A way (n, d) with points added so that they are at most STEP_MM apart."""
     steps = np.diff(way_mm, axis=0)
     counts = np.maximum(np.ceil(np.linalg.norm(steps, axis=1) / STEP_MM), 1).astype(np.int64)
     share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / np.repeat(counts, counts)
@@ -51,5 +51,5 @@ def _resampled(way_mm: Floats) -> Floats:
 
 
 def over_print_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
-    """Z at which the tip passes clear of all that is printed, wherever it goes at a pose."""
+    """Z at which the tip clears all that is printed, wherever it goes at a pose."""
     return float(printed.reach(machine, pose, UP[None])[0]) + machine.clearance_mm

@@ -43,6 +43,7 @@ def plan(
     moves: list[Move] = []
     printed: list[Printed] = []
     done: list[tuple[Part, SlicedPart]] = []
+    has_limbs = False  # from the first limb on, earlier parts may stand higher than the tip
     begins_level = bool(pieces) and parts[pieces[0].index].pose == tip.pose  # the line is on the plate as it was homed
     lanes = purge_lanes(decomposition.parts, pieces, profile) if begins_level else None
     stopped = stops_by_layer(stops, pieces)
@@ -51,31 +52,28 @@ def plan(
         shift = part_shift(machine, part.pose, part.base.offset_mm)
         begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported)
         target = _first_point(piece) + shift
-        stands = join_hulls(printed) if _is_limb(part) else None
-        over = join_hulls(printed) if any(_is_limb(earlier) for earlier, _ in done) else stands
+        is_limb = part.base.limbs_mm is not None
+        has_limbs, earlier = has_limbs or is_limb, join_hulls(printed)
+        standing = earlier if has_limbs else None
         if printed:
-            moves += _reach(tip, begin, target, join_hulls(printed), profile, over)
+            moves += _reach(tip, begin, target, earlier, profile, standing)
         else:
             moves += _begin(tip, begin, target, lanes, profile)
-        tip.limb = (part.index, standing_beads(part, done, machine)) if _is_limb(part) else None
+        tip.limb = (part.index, standing_beads(part, done, machine)) if is_limb else None
         for number, layer in enumerate(piece.layers, start=1):
             if (part.index, number) in stopped:
-                moves += _stop(tip, Pause(part.index, number, stopped[part.index, number]), profile, stands)
+                moves += _stop(tip, Pause(part.index, number, stopped[part.index, number]), profile, standing)
             if layer.paths:
                 begin_layer = BeginLayer(part.index, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
                 moves += [begin_layer, *_layer(tip, layer, shift, profile, on_plate=part.index == number == 1)]
         printed.append(_printed(piece, part, shift, profile))
         done.append((part, piece))
     if pieces:
-        over = join_hulls(printed) if any(_is_limb(earlier) for earlier, _ in done) else None
-        moves += _finish(tip, pieces[-1].index, join_hulls(printed), profile, over)
+        earlier = join_hulls(printed)
+        moves += _finish(tip, pieces[-1].index, earlier, profile, earlier if has_limbs else None)
     program = MachineProgram(decomposition.name, tuple(moves))
     limits.check(program, rows(program, machine.tilt.zero_deg, machine.turn.zero_deg), machine)
     return program
-
-
-def _is_limb(part: Part) -> bool:
-    return part.base.limbs_mm is not None
 
 
 def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None, profile: Profile) -> Iterator[Move]:
@@ -109,10 +107,12 @@ def _purge(tip: Tip, lanes: Floats, profile: Profile) -> Iterator[Move]:
     tip.at_mm, tip.trail = lanes[-1], wipe_trail(lanes, width_mm)
 
 
-def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile: Profile, over: Printed | None) -> Iterator[Move]:
-    """Retract, lift, turn the table, cross over to above the target, go down; over: what may stand higher than both places."""
+def _reach(
+    tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile: Profile, standing: Printed | None
+) -> Iterator[Move]:
+    """Retract, lift, turn the table, cross over to above the target, go down; standing: what may be higher than both places."""
     yield from retract(tip, profile)
-    way = _route(_turn(tip, part.pose, target, over, profile), part.index, printed, profile)
+    way = _route(_turn(tip, part.pose, target, standing, profile), part.index, printed, profile)
     yield from _to_stand(tip, way, profile)
     if tip.pose != part.pose:
         yield _reorient(tip, part.pose, profile)
@@ -134,10 +134,11 @@ def _to_stand(tip: Tip, way: Route, profile: Profile) -> Iterator[Move]:
     yield from go(tip, [*way.over_mm, way.z_mm], profile)
 
 
-def _turn(tip: Tip, pose: Pose, target: Floats | None, over: Printed | None, profile: Profile) -> Turn:
-    if over is None:
+def _turn(tip: Tip, pose: Pose, target: Floats | None, standing: Printed | None, profile: Profile) -> Turn:
+    """A turn of the table that leads over all that may stand."""
+    if standing is None:
         return Turn(tip.pose, pose, tip.at_mm, target)
-    before, after = (over_print_mm(profile.machine, over, turned) for turned in (tip.pose, pose))
+    before, after = (over_print_mm(profile.machine, standing, turned) for turned in (tip.pose, pose))
     return Turn(tip.pose, pose, tip.at_mm, target, (before, after))
 
 
@@ -166,16 +167,16 @@ def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate:
         tip.at_mm = points[-1]
 
 
-def _stop(tip: Tip, pause: Pause, profile: Profile, stands: Printed | None) -> Iterator[Move]:
+def _stop(tip: Tip, pause: Pause, profile: Profile, standing: Printed | None) -> Iterator[Move]:
     """Retract and go straight up, above all of table and cradle as far as Z allows: a firmware may then move the head aside.
 
-    stands: what may stand higher than the tip; it rises above all of that.
+    standing: what may be higher than the tip, which rises above all of it.
     """
     machine = profile.machine
     yield from retract(tip, profile)
     z = max(float(tip.at_mm[2]) + machine.lift_mm, top_z(machine, tip.pose))
-    if stands is not None:
-        z = max(z, over_print_mm(machine, stands, tip.pose))  # Z reaches it: the way to the part led over it
+    if standing is not None:
+        z = max(z, over_print_mm(machine, standing, tip.pose))  # Z reaches it: the way to the part led over it
     yield from go(tip, [*tip.at_mm[:2], min(z, machine.z.limits_mm[1])], profile)
     yield pause
 
@@ -215,16 +216,16 @@ def _coasted(points: Floats, length: Floats, coast_mm: float) -> tuple[Floats, F
     return points, length, np.where(np.arange(len(length)) <= k, length, 0.0)
 
 
-def _finish(tip: Tip, part: int, printed: Printed, profile: Profile, over: Printed | None) -> Iterator[Move]:
+def _finish(tip: Tip, part: int, printed: Printed, profile: Profile, standing: Printed | None) -> Iterator[Move]:
     """Retract, bring the table back to level, and go aside: a hot tip drips where it stands, and the print is to be taken off.
 
-    over: what may stand higher than the tip.
+    standing: what may be higher than the tip.
     """
     machine = profile.machine
     yield from retract(tip, profile)
     home = level(machine)
     if tip.pose != home:
-        way = _route(_turn(tip, home, None, over, profile), part, printed, profile)
+        way = _route(_turn(tip, home, None, standing, profile), part, printed, profile)
         yield from _to_stand(tip, way, profile)
         yield _reorient(tip, home, profile)
     park = find_park_position(machine, printed, tip.at_mm, home, beside(machine, printed, tip.at_mm, home))

@@ -44,14 +44,14 @@ class Speeds:
 class Turn:
     """A turn of the table on the way of the tip from one place to another, machine X Y Z; target_mm None: the turn is its end.
 
-    over_mm: least Z of ways across before and after the turn, where something printed may stand higher than both places.
+    least_z_mm: least Z of the ways across before and after the turn, where something printed may be higher than both places.
     """
 
     start: Pose
     end: Pose
     at_mm: Floats
     target_mm: Floats | None
-    over_mm: tuple[float, float] = (-inf, -inf)
+    least_z_mm: tuple[float, float] = (-inf, -inf)
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Spe
                 break
         else:
             best = candidate if _ways_clear(candidate, turn, machine) else best
-        lowest = min(lowest, max(least, *turn.over_mm))
+        lowest = min(lowest, max(least, *turn.least_z_mm))
     if best is not None:
         return best
     where = f"turning the table to {machine.tilt.letter}{turn.end.tilt_deg:.3f} {machine.turn.letter}{turn.end.turn_deg:.3f}"
@@ -170,10 +170,10 @@ def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Spe
 
 def _at(over: tuple[float, float], least_z: float, turn: Turn, machine: Machine, speeds: Speeds) -> Route:
     """The route that stands at a place as low as it may; the print just left and the one to come are crossed with clearance."""
-    z = max(least_z, turn.over_mm[0], min(float(turn.at_mm[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+    z = max(least_z, turn.least_z_mm[0], min(float(turn.at_mm[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
     across = z
     if turn.target_mm is not None:
-        across = max(z, turn.over_mm[1], min(float(turn.target_mm[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+        across = max(z, turn.least_z_mm[1], min(float(turn.target_mm[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
     seconds = way_s(turn, over, (z, across), machine, speeds) if across < inf else inf
     return Route(over, z, across, seconds)
 
@@ -206,8 +206,8 @@ def way_s(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float], mach
 def _ways_clear(candidate: Route, turn: Turn, machine: Machine) -> bool:
     """True when the ways to the stand, at the first pose, and from it, at the second, keep off table and cradle.
 
-    Of what is printed nothing stands higher than the ways across in either pose, nor under the head where the tip goes straight
-    up and down: the ways need not be tried against it.
+    What is printed need not be tested: in either pose the ways across lie above it, and nothing is under the head where the tip
+    goes straight up or down.
     """
     start, end, at, target = turn.start, turn.end, turn.at_mm, turn.target_mm
     stand = np.array([*candidate.over_mm, candidate.z_mm])

@@ -7,7 +7,7 @@ from math import dist
 import numpy as np
 
 from machine.planning import limits
-from machine.planning.lift import least_height_mm
+from machine.planning.lift import clear_height_mm
 from machine.planning.moves import Move, Retract, Travel, Wipe
 from mdp.clearance import Standing
 from mdp.mesh import Floats
@@ -27,8 +27,8 @@ class Tip:
     """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back.
 
     trail: (n, 3) a way that a wipe may go over; printed: strokes (n, 3) after it, their paths and shifts from the part frame,
-    none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond their own. limb: the
-    number of the part that is printed and what stands beside it, None where nothing can.
+    none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond their own. limb: while a
+    limb is printed, its part number and what stands beside it.
     """
 
     at_mm: Floats
@@ -57,7 +57,7 @@ class Tip:
 def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile) -> Iterator[Move]:
     """To a path's start: up to the layer first, then along the approach; or pulled back and lifted, straight.
 
-    Beside what stands higher than a limb that is printed it is lifted as far as the head needs, and pulled back first.
+    Within a limb the filament is pulled back and the tip lifted wherever the head would meet what stands beside the limb.
     """
     if dist(start.tolist(), tip.at_mm.tolist()) <= STANDING_MM:
         return
@@ -66,9 +66,11 @@ def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile
     lift = profile.process.lift_mm if path.retract else 0.0
     over = max(float(start[2]), min(float(start[2]) + lift, profile.machine.z.limits_mm[1]))
     if tip.limb is not None:
-        if _over_standing(tip, path, start, shift, over, profile) > over and not path.retract:
-            yield from retract(tip, profile)
-        over = _over_standing(tip, path, start, shift, over, profile)
+        clear = _over_standing(tip, path, start, shift, over, profile)
+        if clear > over and not path.retract:
+            yield from retract(tip, profile)  # a wipe moves the tip
+            clear = _over_standing(tip, path, start, shift, over, profile)
+        over = clear
     if abs(over - float(tip.at_mm[2])) > STANDING_MM:
         yield from go(tip, [*tip.at_mm[:2], over], profile)
     points = _way(tip, path, start, shift, over)
@@ -80,7 +82,7 @@ def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile
 
 
 def _way(tip: Tip, path: Path, start: Floats, shift: Floats, over: float) -> Floats:
-    """(n, 3) from where the tip is along the approach to above a path's start; one point where it is there."""
+    """(n, 3) from the tip along the approach to above a path's start; a single point where the tip is there already."""
     if len(path.approach):
         between = np.column_stack([path.approach + shift[:2], np.full(len(path.approach), over)])
         points = np.array([tip.at_mm, *between, [*start[:2], over]])
@@ -91,11 +93,11 @@ def _way(tip: Tip, path: Path, start: Floats, shift: Floats, over: float) -> Flo
 
 
 def _over_standing(tip: Tip, path: Path, start: Floats, shift: Floats, over: float, profile: Profile) -> float:
-    """Z at which the head passes clear of what stands beside a limb on the way to a path's start: `over` or, where that does not
-    do, with the clearance beneath the nozzle, too."""
+    """Z at which the head clears what stands beside a limb on the way to a path's start: `over` where that is enough, else the
+    least height that is, with the clearance beneath the nozzle, too."""
     assert tip.limb is not None
     (part, standing), way = tip.limb, _way(tip, path, start, shift, over)
-    z_mm = least_height_mm(standing, way[:, :2] - shift[:2], over - float(shift[2])) + float(shift[2])
+    z_mm = clear_height_mm(standing, way[:, :2] - shift[:2], over - float(shift[2])) + float(shift[2])
     if z_mm <= over + STANDING_MM:
         return over
     z_mm, machine = z_mm + profile.machine.clearance_mm, profile.machine

@@ -17,6 +17,7 @@ from mdp.directions.spread import spread
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
+from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.limbs import LimbSums
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import Patches, Zone, spans_mm
@@ -25,7 +26,6 @@ from profiles.search import Search
 
 # A plane is never laid into a face that overhangs along its direction: that would look like resting on the cut, over air.
 COPLANAR_MM = 1e-4
-LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
 
 
 class Reason(IntEnum):

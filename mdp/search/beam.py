@@ -5,9 +5,9 @@ of its own between what is made safe and what is left risky for ever, and each t
 lower slots. So a wider beam holds the narrower ones and never ends worse, and the slots do not fill with what one ranking finds
 nearly equal; a learned ranker that chose for all of them won less.
 
-The cuts of these slots take all that lies above their planes. Letting cuts of single limbs compete with them for the slots can
-end worse, so limbs have slots of their own (search_limbs), which choose among few planes: the limbs that would save something of
-the uncut model, the head being clear of what stands there, and the planes that the beam's ranking puts first.
+The cuts of these slots take all that lies above their planes. When cuts of single limbs compete with them for the slots, the
+result can be worse, so limbs have slots of their own (search_limbs). Those choose among few planes: limbs of the uncut model that
+save enough and that the head can print beside what stands, and the planes that rank first in the beam.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,13 +37,13 @@ from mdp.sweep.limbs import find_limbs
 # each: 4 is best on average, no value is best on most models.
 TRADE_OFFS = (None, 4.0, 1.0, 8.0, 2.0, 0.5, 16.0, 0.0)
 RECORDED = 50  # candidates of a stage that are put on record, the B of the 2020 paper
-EVERY = 6  # sampled directions to one in which limbs are looked for
+EVERY = 6  # limbs are searched along every sixth of the sampled directions
 WORTH = 0.005  # share of the uncut model's cost that a limb must save
-MOST_LIMBS, MOST_CHECKED = 16, 32  # planes of limbs that are kept, and that are checked for it
-MOST_PLANES = 16  # planes of the beam's ranking that are looked at, by each trade-off
+MOST_LIMBS, MOST_CHECKED = 16, 32  # planes of limbs that are kept, and that are checked to find them
+MOST_PLANES = 16  # planes of the beam's ranking, by each trade-off, whose directions are used
 LIMB_TRADE_OFFS = (4.0, 1.0)  # a slot each
-PATIENCE = 2  # stages without a better node after which limbs are left alone
-MOST_TRIED = 16  # limbs, and planes, that a slot tries at a node before it gives up
+PATIENCE = 2  # stages without a better node after which the search for limbs ends
+MOST_TRIED = 16  # limbs, and planes, that a slot tries at a node
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +190,7 @@ class Beam:
 
 
 def search_limbs(problem: Problem, first: Branch) -> list[Node]:
-    """The best node after every stage of a search that may cut single limbs off; none where no limb is worth a cut.
+    """The best node after each stage of a search that may cut off single limbs; empty where no limb is worth a cut.
 
     first: the node that the search begins with.
     """
@@ -219,7 +219,7 @@ def search_limbs(problem: Problem, first: Branch) -> list[Node]:
 
 @dataclass(frozen=True, eq=False)
 class _Ranked:
-    """A cut that may be made: key, the less the better; row of the node's table, None: of limbs."""
+    """A possible cut. key: lower is better; row: of the node's table, None for limbs."""
 
     key: float
     node: Node
@@ -230,7 +230,7 @@ class _Ranked:
 
 @dataclass(frozen=True, eq=False)
 class _Offers:
-    """What may be cut off a node: limbs with what each gains, loses and costs for ever, (r,), and a table of planes."""
+    """What may be cut off a node: limbs, with (r,) gain, loss and cost for ever of each, and a table of planes."""
 
     problem: Problem
     node: Node
@@ -248,8 +248,8 @@ class _Offers:
         return cls(problem, node, limbs, gain, lost_mm2(sums, residual), residual, table)
 
     def rank(self, trade_off: float, bound_mm2: float) -> Iterator[_Ranked]:
-        """The cuts by what they and those before gain, less trade_off times what they lose; those that would leave bound_mm2 or
-        more for ever are left out."""
+        """The cuts, best first, by trade_off times the loss less the gain, over all cuts so far. Cuts that would leave at least
+        bound_mm2 for ever are left out."""
         node, scored = self.node, self.table.scored
         before = trade_off * node.lost_mm2 - (self.problem.root.cost_mm2 - node.cost_mm2)
         keys = before + trade_off * self.lost_mm2 - self.gain_mm2
@@ -271,7 +271,7 @@ class _Offers:
 
 
 def _cut(problem: Problem, ranked: _Ranked, seen: set[tuple[float, ...]]) -> Node | None:
-    """The node after a cut, where it can be made and leads to none that was seen."""
+    """The node after a cut; None where it cannot be made or its solid was seen before."""
     if ranked.row is not None:
         child = problem.cut(ranked.node, ranked.plane, ranked.table.scored.cost(ranked.row))
     elif problem.allowed(ranked.node, ranked.plane):
@@ -285,13 +285,11 @@ def _cut(problem: Problem, ranked: _Ranked, seen: set[tuple[float, ...]]) -> Nod
 
 
 def _find_limbs(problem: Problem) -> list[Plane]:
-    """The limbs that save most of the uncut model and can be cut off it, of near-equal planes of one limb the best."""
-    node, limits = problem.start, problem.limits
-    grid = problem.limb_grid(problem.bounds_along(limits.directions[::EVERY]), WORTH * problem.root.cost_mm2)
-    candidates, vertices = (
-        find_limbs(node.remainder, grid, threshold(problem.terms.angle_deg)),
-        node.remainder.facets.mesh.vertices,
-    )
+    """The limbs of the uncut model that save most and can be cut off; of near-equal planes of one limb only the best."""
+    node = problem.start
+    grid = problem.limb_grid(problem.bounds_along(problem.limits.directions[::EVERY]), WORTH * problem.root.cost_mm2)
+    candidates = find_limbs(node.remainder, grid, threshold(problem.terms.angle_deg))
+    vertices = node.remainder.facets.mesh.vertices
     planes, by_limb, checked = list[Plane](), dict[tuple[int, ...], list[Plane]](), 0
     for row in range(len(candidates.offset_mm)):
         tops = candidates.tops[row][candidates.tops[row] >= 0]

@@ -22,6 +22,7 @@ from mdp.pose import poses
 from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, gain_mm2, residual_mm2
 from mdp.search.node import Node
 from mdp.search.problem import FINEST, Problem
+from mdp.sweep.limbs import limb_mesh
 from mdp.sweep.sweep import gains
 from mdp.zone import FARTHEST_MM, Grown, Painted
 from profiles.errors import PlanError
@@ -32,7 +33,7 @@ LEANS_DEG = (0.0, 1.0, 3.0)
 MOST_PLACES = 400  # along a normal that are looked at for the nearest one to a plane
 FARTHER_LEANS_DEG = (*LEANS_DEG, 10.0, 30.0)  # on a model with steps all the way up only these miss them
 OUT_OF_REACH = "what it stands on is out of reach"
-LIMB_SHIFT_MM = 0.5  # between the places along a normal that are looked at for limbs, each of them by itself
+LIMB_SHIFT_MM = 0.5  # between the offsets that are tried for limbs, each with a check of its own
 MOST_SHOWN = 8  # colours in a message
 
 
@@ -95,17 +96,20 @@ def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     named = name_limbs(node, plane)
     if isinstance(named, Refusal):
         return named
-    why = refusal(problem, node, named)
-    child = problem.cut(node, named) if why is None else None
+    why = _unfit(problem, node, named)
+    if why is not None:
+        return why
+    child = problem.cut(node, named)
     if child is not None:
         return child
-    floats = Refusal(REASONS[Reason.FLOATING], Reason.FLOATING)
-    return why or (Refusal(OUT_OF_REACH, Reason.REACH) if named.limbs_mm is None else floats)
+    if named.limbs_mm is None:
+        return Refusal(OUT_OF_REACH, Reason.REACH)
+    return _in_the_way(problem, node, named) or Refusal(REASONS[Reason.FLOATING], Reason.FLOATING)
 
 
 def name_limbs(node: Node, plane: Plane) -> Plane | Refusal:
-    """A plane whose limbs are named by vertices, those farthest from it where they are not; without limbs where they are all that
-    lies above it. A limb is the piece above the plane that is nearest to its point."""
+    """A plane whose limbs are named by vertices. A point stands for the nearest piece above the plane; unless all points are
+    vertices, each piece is named by its farthest vertex. Where the limbs are all that lies above, the plane has none."""
     if plane.limbs_mm is None:
         return plane
     limbs, standing = divide(above(node.solid, plane), plane.limbs_mm)
@@ -160,8 +164,8 @@ def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
 
 
 def _beside_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The planes around that of limbs that nothing is found against, the nearest first, then leaning ones."""
-    passed = passing_places(node.remainder.mesh, plane)
+    """The same for the plane of limbs: shifted ones, the nearest first, then those that lean about the section of the limbs."""
+    passed = passing_places(limb_mesh(node.remainder, plane), plane)
     middle = passed.mean(axis=0) if len(passed) else plane.offset_mm * plane.normal
     shifts = sorted(range(-MOST_SHIFTS, MOST_SHIFTS + 1), key=abs)
     for lean_deg in LEANS_DEG:
@@ -194,7 +198,7 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
 
 
 def _planes_near_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The same for the plane of limbs, along its normal only."""
+    """The same for the plane of limbs, but along its normal only."""
     heights = node.remainder.mesh.vertices @ plane.normal
     low, high = float(heights.min()), float(heights.max())
     offsets = np.arange(low, high, max(LIMB_SHIFT_MM, (high - low) / MOST_PLACES))
@@ -219,15 +223,23 @@ def _leaning(normal: Floats, lean_deg: float) -> Floats:
 
 def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     """Why a person's plane cannot cut a node, None: it can. Nothing is cut."""
+    return _unfit(problem, node, plane) or _in_the_way(problem, node, plane)
+
+
+def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
+    """A refusal where the head would meet what stands beside the limbs of a plane."""
+    if plane.limbs_mm is None or problem.is_clear(node, plane):
+        return None
+    return Refusal(REASONS[Reason.STANDING], Reason.STANDING)
+
+
+def _unfit(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
+    """Why a plane cannot cut a node, what stands beside limbs left aside."""
     why = _refusal(problem, node, plane)
     if why is not None or not problem.settings.clearance:
         return why
     hindrance = _find_hindrance(problem, node, plane)
-    if hindrance is not None:
-        return Refusal(hindrance, Reason.REACH)
-    if plane.limbs_mm is not None and not problem.is_clear(node, plane):
-        return Refusal(REASONS[Reason.STANDING], Reason.STANDING)
-    return None
+    return None if hindrance is None else Refusal(hindrance, Reason.REACH)
 
 
 def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:
@@ -252,7 +264,8 @@ def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
         checked = problem.check_plane(node, plane, limits)
         reason, fragile_mm = Reason(int(checked.reason[0])), float(checked.fragile_mm[0])
     else:
-        reason, fragile_mm = problem.check_limbs(node, plane, limits), problem.sliver_mm(node, plane)
+        reason = problem.check_limbs(node, plane, limits)
+        fragile_mm = problem.sliver_mm(node, plane) if reason == Reason.FRAGILE else np.inf
     if reason == Reason.WEAK:
         stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
         return Refusal(f"{REASONS[reason]}: {problem.settings.nozzle_load_n:g} N at its top are {stress}", reason)

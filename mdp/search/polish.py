@@ -10,18 +10,20 @@ from functools import partial
 from itertools import product
 from math import cos, radians, sin
 
+import numpy as np
+
 from mdp.cost.forecast import Surface
 from mdp.cost.symmetry import Mirror
 from mdp.cut import passing_places
 from mdp.directions.frame import frame_across
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
 from mdp.ranking.ranking import rank_by_trade_off
 from mdp.search.front import EQUAL
 from mdp.search.node import Node
 from mdp.search.problem import Problem
-from mdp.sweep.limbs import limb_faces
+from mdp.sweep.limbs import limb_mesh
 
 STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are about 4.5 apart
 ROUNDS = 4  # moves by one step before the next smaller one
@@ -108,11 +110,21 @@ def _stand_upright(chain: Chain, position: int, mirror: Mirror) -> Iterator[list
 def _pair(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
     """The planes from a position on, one that is nearly the first one's image made its image, or the other way round."""
     here, *later = chain.planes[position:]
-    image = mirror.image(here)
+    vertices = chain.nodes[position].remainder.mesh.vertices
+    image = _image(mirror, here, vertices)
     for number, partner in enumerate(later):
         if float(partner.normal @ image.normal) > PARTNER_COSINE and abs(partner.offset_mm - image.offset_mm) < PARTNER_MM:
             yield [here, *later[:number], image, *later[number + 1 :]]
-            yield [mirror.image(partner), *later]
+            yield [_image(mirror, partner, vertices), *later]
+
+
+def _image(mirror: Mirror, plane: Plane, vertices: Floats) -> Plane:
+    """A plane's mirror image; its limbs are named by the vertices nearest to the images of their points."""
+    image = mirror.image(plane)
+    if image.limbs_mm is None:
+        return image
+    nearest = [int(np.argmin(np.linalg.norm(vertices - point, axis=1))) for point in image.limbs_mm]
+    return replace(image, limbs_mm=vertices[nearest])
 
 
 def _drop_cuts(problem: Problem, best: Chain) -> Chain:
@@ -209,8 +221,7 @@ def _middle(node: Node) -> Floats:
     """(3,) middle of the corners of a node's last cut face, of a limb's that of its section."""
     base, points = node.cuts[-1].base, node.remainder.mesh.vertices
     if base.limbs_mm is not None and node.parent is not None:
-        before = node.parent.remainder
-        corners = passing_places(Mesh(before.mesh.vertices, before.mesh.faces[limb_faces(before, base)]), base)
+        corners = passing_places(limb_mesh(node.parent.remainder, base), base)
     else:
         heights = base.heights_mm(points)
         corners = points[heights >= heights.max() - BASE_TOLERANCE_MM]

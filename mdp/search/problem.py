@@ -20,7 +20,6 @@ from mdp.pose import Pose
 from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import (
     COPLANAR_MM,
-    LEAST_CONTACT_AREA_MM2,
     Bounds,
     Feasibility,
     Reason,
@@ -38,9 +37,10 @@ from mdp.search.front import Worth
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
+from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.cylinders import bores_of
 from mdp.sweep.hopeless import Savers, hopeless_faces
-from mdp.sweep.limbs import LimbGrid, LimbSums, limb_faces, limb_vertices, sum_limbs
+from mdp.sweep.limbs import LimbGrid, LimbSums, limb_faces, limb_mesh, limb_vertices, sum_limbs
 from mdp.sweep.slivers import sliver_mm
 from mdp.sweep.sweep import Gains, gains
 from mdp.zone import NO_ZONES, Zones
@@ -215,7 +215,7 @@ class Problem:
         )
 
     def limb_grid(self, limits: Bounds, least_gain_mm2: float) -> LimbGrid:
-        """Where the search looks for limbs along directions with these limits."""
+        """Where the search looks for limbs: along the directions of some bounds, with the least gain that a limb must bring."""
         step_mm = self.settings.offset_step_mm
         return LimbGrid(
             directions=limits.directions,
@@ -231,12 +231,12 @@ class Problem:
         )
 
     def limb_sums(self, node: Node, planes: Sequence[Plane]) -> LimbSums:
-        """What cutting off the limbs of planes would do to a node; nothing is cut."""
+        """What cutting off the limbs of planes would do to a node. Nothing is cut."""
         return sum_limbs(node.remainder, planes, threshold(self.terms.angle_deg), sqrt(self.settings.least_interface_mm2))
 
     def check_limbs(self, node: Node, plane: Plane, limits: Bounds) -> Reason:
-        """Why the limbs of a plane cannot be cut off a node; limits: those of its direction. What would float and which poses
-        serve is known only after the cut."""
+        """Why the limbs of a plane cannot be cut off a node; limits: those of its direction. Whether the rest would float, and
+        whether the head passes clear, is not checked here."""
         sums, offset_mm, keep_mm = self.limb_sums(node, [plane]), plane.offset_mm, limits.keep_mm[0]
         least_mm2 = max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2)
         if not sums.exists[0] or sums.contact_mm2[0] < least_mm2:
@@ -256,18 +256,14 @@ class Problem:
         return Reason.FEASIBLE
 
     def sliver_mm(self, node: Node, plane: Plane) -> float:
-        """How thin a sliver the cut of a plane's limbs would leave."""
+        """Thickness of the thinnest sliver that cutting off the limbs of a plane would leave."""
         limb = limb_vertices(node.remainder, plane)
         return sliver_mm(node.remainder.facets, limb, plane, frame_across(plane.normal))
 
     def corners_cut(self, node: Node, plane: Plane) -> Floats:
         """(n, 3) the corners of what a plane would cut off a node: vertices, and where edges pass through the plane. Nothing is
         cut."""
-        mesh = node.remainder.mesh
-        if plane.limbs_mm is not None:
-            used, faces = np.unique(mesh.faces[limb_faces(node.remainder, plane)], return_inverse=True)
-            mesh = Mesh(mesh.vertices[used], faces.reshape(-1, 3).astype(np.int32))
-        return corners_above(mesh, plane)
+        return corners_above(node.remainder.mesh if plane.limbs_mm is None else limb_mesh(node.remainder, plane), plane)
 
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
         """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
@@ -311,7 +307,7 @@ class Problem:
         return child
 
     def _cut_limbs(self, node: Node, plane: Plane) -> Node | None:
-        """The node after limbs are cut off, where nothing would float and the head passes clear of what stands."""
+        """The node after limbs are cut off; None where something would float or the head would hit what stands."""
         if not self.is_clear(node, plane):
             return None
         limbs, rest = cut(node.solid, plane)
@@ -320,15 +316,14 @@ class Problem:
         return Node(rest, (*node.cuts, Cut(plane, node.solid, self._cost(node, plane))), self.terms, node.places, node)
 
     def is_clear(self, node: Node, plane: Plane) -> bool:
-        """Whether the limbs of a plane can be printed at some pose, the head clear of what stands beside them."""
+        """Whether there is a pose at which the head clears what stands beside the limbs of a plane."""
         if not self.settings.clearance:
             return True
         poses = allowed_poses(self.machine, plane.normal, self.corners_cut(node, plane) + self.place_mm)
-        return any(True for _ in self.clear_poses(node, plane, poses))
+        return next(self.clear_poses(node, plane, poses), None) is not None
 
     def clear_poses(self, node: Node, plane: Plane, poses: Sequence[Pose]) -> Iterator[Pose]:
-        """Those of some poses at which the head passes clear of what stands while the limbs of a plane, cut off a node, are
-        printed."""
+        """Those of some poses at which the head clears what stands while the limbs that a plane cuts off a node are printed."""
         mesh, limb = node.remainder.mesh, limb_faces(node.remainder, plane)
         corners = mesh.vertices[mesh.faces]
         stands = corners[(plane.heights_mm(mesh.vertices) > 0.0)[mesh.faces].any(axis=1) & ~limb]
@@ -365,8 +360,8 @@ class Problem:
 
 
 def _floats(rest: Solid, plane: Plane) -> bool:
-    """Whether a piece of what limbs leave hangs in the air. One that begins exactly in the plane stands on what lies below: where
-    a face of the solid lies in the plane, the union leaves it a piece of its own."""
+    """Whether a piece of what is left after limbs are cut off hangs in the air. A piece that begins exactly in the plane does
+    not: where a face of the solid lies in the plane, the union keeps apart what touches there."""
     for piece in rest.decompose():
         if piece.volume() > 0.0 and piece.bounding_box()[2] > PLATFORM_TOLERANCE_MM:
             lowest_mm = float(plane.heights_mm(mesh_of(piece).vertices).min())

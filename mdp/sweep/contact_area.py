@@ -26,6 +26,8 @@ from mdp.sweep.facets import Rows
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.topology.union_find import root, singletons
 
+LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
+
 
 @part
 def find_contact_areas(rows: Rows, topology: Topology, view: View, crumb: float, wanted: Ints, contact_area: Floats) -> None:

@@ -19,7 +19,7 @@ from slicer.interface.interface import frame_change, plane_in_frame_of, sections
 from slicer.interface.limb import shadow_of
 
 TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
-BESIDE_MM = 1.0  # so near to a limb the head moves above its base plane
+BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base plane
 
 
 def reach_mm(process: Process) -> float:
@@ -41,7 +41,7 @@ def compensate(
 
 
 def _over_limbs(part: Part, limbs: Sequence[Part], cuts_mm: Floats, grown_mm: float) -> list[Polygons]:
-    """What of a part's layers lies above the base plane of a later limb, beside it."""
+    """For each layer of a part the area above the base plane of a later limb, near that limb."""
     over = [Polygons()] * len(cuts_mm)
     far_mm = 2.0 * float(np.linalg.norm(part.in_part_frame().vertices, axis=1).max())
     for limb in limbs:
@@ -56,8 +56,8 @@ def compensated(
 ) -> Polygons:
     """A part's section, which others of its model touch, with the sides compensated that no other touches.
 
-    below: a, b, c of the base plane of every later part that is no limb; what is added stays where a x + b y + c > 0. over: where
-    nothing is added either.
+    below: a, b, c of the base plane of each later part that is not a limb; material is added only where a x + b y + c > 0, and
+    not within `over`.
     """
     if own.is_empty():
         return own

@@ -20,8 +20,8 @@ class BasePlane:
     """turn (3, 3) and shift (3,) carry a point of the earlier part's frame into the later part's: turn @ x + shift.
 
     heights: of the earlier part's layers. Of a layer's two sides the one that comes nearer to the plane from below stands for it.
-    far_mm: how far from the origin of the earlier frame its layers reach. places: those on the plane that count where the later
-    part is a limb; None: all.
+    far_mm: how far from the origin of the earlier frame its layers reach. places: the area of the plane that counts, where the
+    later part is a limb; None: all of it.
     """
 
     turn: Floats

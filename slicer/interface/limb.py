@@ -1,4 +1,4 @@
-"""Limb: a part above whose base plane earlier parts stand: where it and its support are, and where the head is that prints it."""
+"""Limb: a part beside which earlier parts stand above its base plane: where it and its support are, and where the head goes."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -13,30 +13,30 @@ from mdp.overhang import Mask
 from profiles.machine import Machine
 from slicer.geometry.polygons import Polygons, offset_round, union
 
-AROUND_MM = 5.0  # support of a limb stands no farther from its shadow
-COARSE_MM = 0.05  # a shadow is simplified by this
-CELL_MM, COARSER = 0.5, 1.5  # sides of the places at which the height of the tip is asked for; times coarser
-MOST_PAIRS = 200_000_000  # of such a place and one up to which something stands
-LOW_MM = 0.05  # what is no higher above the base plane is the face of the cut
+AROUND_MM = 5.0  # support of a limb stays within this distance of its shadow
+COARSE_MM = 0.05  # tolerance to which a shadow is simplified
+CELL_MM, COARSER = 0.5, 1.5  # grid on which the height of the tip is computed, and the factor by which it is coarsened
+MOST_PAIRS = 200_000_000  # of a grid cell and a point that stands
+LOW_MM = 0.05  # up to this height above the base plane is the cut face itself
 PLACES_KEPT = 64
 
 
 @lru_cache(PLACES_KEPT)
 def shadow_of(limb: Part) -> Polygons:
-    """A limb seen along its direction, in its frame."""
+    """The outline of a limb seen along its direction, in its frame."""
     return solid_of(limb.in_part_frame()).project().simplify(COARSE_MM)
 
 
 @lru_cache(PLACES_KEPT)
 def room_of(limb: Part) -> Polygons:
-    """The places on a limb's base plane over which it and its support are printed."""
+    """The area of a limb's base plane over which it and its support are printed."""
     return offset_round(shadow_of(limb), AROUND_MM)
 
 
 def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, Polygons]]:
-    """Heights over a limb's base plane, and the places on it over which nothing may stand above them while it is printed.
+    """Heights above a limb's base plane, each with the area in which nothing may stand higher while the limb is printed.
 
-    The tip is taken to be as low as the base plane over all of the limb's room; what is lower than gap_mm under it stays.
+    The tip is assumed to reach down to the base plane everywhere in the limb's room. Nothing below -gap_mm is forbidden.
     """
     room, clearance_mm, profile = room_of(limb), machine.clearance_mm, machine.head.silhouette_mm
     rings = [(-gap_mm, profile[0][0])]
@@ -52,7 +52,7 @@ def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, 
 
 
 def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], machine: Machine) -> list[Polygons]:
-    """The places of a limb's room, in its frame, where the head meets what stands with the tip at each of some heights."""
+    """For each height of the tip the area of a limb's room, in its frame, where the head would meet what stands."""
     x0, y0, x1, y1 = room_of(limb).bounds()
     cell_mm = CELL_MM
     stands = standing_beside(limb, earlier, machine, cell_mm)
@@ -63,7 +63,7 @@ def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], 
     columns, rows = (corner + cell_mm * (np.arange(size) + 0.5) for corner, size in zip((x0, y0), sizes, strict=True))
     places = np.stack(np.meshgrid(columns, rows), axis=-1)
     least_mm = stands.least_tip_mm(places.reshape(-1, 2), min(tips_mm, default=0.0)).reshape(places.shape[:2])
-    covered: dict[int, Polygons] = {}  # by how many cells: what a higher tip meets, a lower one meets, too
+    covered: dict[int, Polygons] = {}  # by the count of cells: those of a higher tip are among those of a lower one
     reaches = []
     for tip_mm in tips_mm:
         met = least_mm > tip_mm
@@ -76,7 +76,7 @@ def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], 
 
 
 def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_mm: float) -> Standing:
-    """What of earlier parts' models stands above a limb's base plane; cell_mm: between the places that are asked for."""
+    """What of earlier parts' models stands above a limb's base plane; cell_mm: the grid on which it will be asked."""
     points = [np.zeros((0, 3))]
     for part in earlier:
         mesh = part.mesh.transform(limb.rotation, (0.0, 0.0, -limb.base.offset_mm))
@@ -85,12 +85,12 @@ def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_
         points.append(corners.reshape(-1, 3))
     tops = np.concatenate(points)
     tops = highest_in_cells(tops[tops[:, 2] > LOW_MM], cell_mm)
-    # Half of either cell's diagonal, and how far the middle of a triangle with such edges is from its corners.
+    # Half the diagonal of either cell, and the distance from the middle of such a triangle to its corners.
     return Standing.of(tops, 2.6 * cell_mm, machine)
 
 
 def _rectangles(met: Mask, x0: float, middle_mm: float, cell_mm: float) -> list[Polygons]:
-    """Rectangles over the cells of a row in which something is met."""
+    """Rectangles over the marked cells of a row."""
     steps = np.diff(np.concatenate([[0], met.astype(np.int8), [0]]))
     pairs = zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True)
     low = middle_mm - 0.5 * cell_mm

@@ -13,7 +13,7 @@ from slicer.interface.limb import shadow_of
 from slicer.sections import Sections
 
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
-NEAR_MM = 3.0  # beside a limb's base: as far as the shell on the face of its cut reaches
+NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
 
 
 def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, float]:
@@ -43,7 +43,7 @@ def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, fl
 
 
 def _near_limbs(sections: Sections) -> dict[int, BasePlane]:
-    """Of every later part that is a limb its base plane near it, by its index."""
+    """The base planes of later limbs, limited to their surroundings, by part index."""
     part, far_mm = sections.part, 2.0 * float(np.linalg.norm(sections.mesh.vertices, axis=1).max())
     limbs = [upper for upper in sections.later if upper.base.limbs_mm is not None]
     places = {limb.index: offset(shadow_of(limb), NEAR_MM) for limb in limbs}
@@ -51,8 +51,10 @@ def _near_limbs(sections: Sections) -> dict[int, BasePlane]:
 
 
 def _nearest_areas(whole: Polygons, distances: Sequence[Floats], near: Sequence[Polygons | None]) -> list[float]:
-    """mm2 of the whole where each of several linear functions a x + b y + c of it is the least, among those that count there.
-    near: where each counts, None: everywhere."""
+    """mm2 of an area where each of several linear functions a x + b y + c is the least of those that count there.
+
+    near: where each counts, None: everywhere.
+    """
     if len(distances) == 1:
         return [whole.area() if near[0] is None else (whole ^ near[0]).area()]
     areas = []

@@ -58,8 +58,8 @@ def above_base_planes(
 ) -> list[Polygons]:
     """For each layer what lies above the base plane of any later part, taken as lower by gap_mm.
 
-    While a part is printed the head moves above its base plane, so nothing may stand there, be it near that part or not; while
-    a limb is, nothing that the head could meet.
+    While a part is printed the head moves above its base plane, so nothing may stand there, near that part or not. A limb only
+    forbids what the head could meet.
     """
     limbs = [upper for upper in later if upper.base.limbs_mm is not None]
     whole = [upper for upper in later if upper.base.limbs_mm is None]
@@ -74,10 +74,7 @@ def above_base_planes(
 
 
 def beside_standing(sections: Sections, heights: Heights, far_mm: float) -> list[Polygons]:
-    """For each layer of a limb where earlier parts stand or the head would meet them, and what is too far from the limb.
-
-    Support keeps its gaps to what stands.
-    """
+    """For each layer of a limb the area that is too near to earlier parts, out of the head's reach or too far from the limb."""
     part, process, machine = sections.part, sections.support_process, sections.profile.machine
     gap_mm = max(process.support_gap_mm, process.support_bottom_gap_mm)
     stands = sections_of(sections.earlier, part, heights.cut_mm)

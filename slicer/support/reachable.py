@@ -36,7 +36,7 @@ class ReachableAreas:
     """Where support of a part may stand; per layer, of as many of its lowest ones as are of use: the lean from the layer below,
     mm, what is placeable, and what is reachable.
 
-    placeable: places of the ground beneath that a branch may end on: what is solid, grown by BEYOND of the radius. shut: of a
+    placeable: places of the ground beneath that a branch may end on: what is solid, grown by BEYOND of the radius. shut: for a
     limb, where the head cannot print support.
     """
 

@@ -32,8 +32,8 @@ def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
     down = [f"G0 Z{near:.3f} F{rise:.0f}", f"G1 Z{goal[2]:.3f} F{SLOWLY * rise:.0f}"]
     if hypot(way.end.tilt_deg - way.start.tilt_deg, way.end.turn_deg - way.start.turn_deg) > STILL_DEG:
         speeds = Speeds(machine.z.speed_mm_s, process.travel_speed_mm_s)
-        over = over_print_mm(machine, printed, way.start), over_print_mm(machine, printed, way.end)
-        path = route(replace(way, over_mm=over), 0, printed, machine, speeds)
+        least_z_mm = over_print_mm(machine, printed, way.start), over_print_mm(machine, printed, way.end)
+        path = route(replace(way, least_z_mm=least_z_mm), 0, printed, machine, speeds)
         return [
             f"G0 Z{path.z_mm:.3f} F{rise:.0f}",
             f"G0 X{path.over_mm[0]:.3f} Y{path.over_mm[1]:.3f} F{across:.0f}",

@@ -8,6 +8,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.cost.symmetry import find_mirrors
 from mdp.cut import solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
@@ -15,11 +16,14 @@ from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.search.by_plan import cut_by_plan
+from mdp.search.polish import make_regular
+from mdp.search.problem import Problem
 from mdp.search.search import decompose
 from mdp.search.trial import Trials
 from profiles.errors import PlanError
 from profiles.profile import Profile, load
 from tests import shapes
+from tests.limbs import limb
 
 ALONG = (0.84, 0.0, (1.0 - 0.84**2) ** 0.5)
 TIP = (27.0, 0.0, 54.0)  # at the end of the bar
@@ -170,3 +174,18 @@ def test_a_limb_moved_by_a_trial_keeps_its_point_and_its_figures_are_those_of_th
     nearest = trials.nearest([replace(plane, offset_mm=plane.offset_mm - 12.0)], 2)
     assert nearest is not None
     assert nearest.limbs_mm is not None
+
+
+def test_limbs_that_are_nearly_each_other_s_mirror_image_become_it() -> None:
+    solid = m3.Manifold.cube((110.0, 30.0, 4.0), True).translate((0.0, 0.0, 2.0))
+    for x in (-35.0, 0.0, 35.0):  # with 33 sides no vertex lies at the image of another one
+        post, cap = m3.Manifold.cylinder(20.0, 4.0, 4.0, 33), m3.Manifold.cylinder(4.0, 9.0, 9.0, 33)
+        solid += post.translate((x, 0.0, 2.0)) + cap.translate((x, 0.0, 20.0))
+    mesh = shapes.from_manifold(solid)
+    problem = Problem(mesh, _profile())
+    planes = [limb(mesh, [(x, 0.0, 24.0)], (0.0, 0.0, z)) for x, z in ((-35.0, 10.0), (35.0, 10.3))]
+    nodes = problem.replay(problem.root, planes)
+    assert nodes is not None
+    even = make_regular(problem, nodes[-1], find_mirrors(mesh))
+    assert [cut.base.offset_mm for cut in even.cuts] == [10.0, 10.0]
+    assert even.remainder.mesh.volume_mm3 == pytest.approx(nodes[-1].remainder.mesh.volume_mm3, abs=20.0)

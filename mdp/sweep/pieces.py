@@ -1,0 +1,251 @@
+"""Pieces: the connected pieces of a solid above a plane that moves down through it, and the sums over each (numba kernels).
+
+Vertices that come to lie above the plane join their neighbours above it (union-find). A face that comes to lie wholly above adds
+its sums to those of its piece; faces that cross the plane add the shares above it at every offset anew. The first vertex of a
+void has solid above it and joins the surface that a ray into the solid hits. The work along a direction is therefore linear in
+vertices, faces and crossings, as in the sweep.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.arrays import floats, ints, table
+from mdp.kernels.kernel import borrower, inlined, part
+from mdp.kernels.sorting import counting_sort
+from mdp.mesh import Floats, Ints
+from mdp.stairs import step_share
+from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE
+from mdp.sweep.components import Topology, anchor_of, before
+from mdp.sweep.integrals import OffsetGrid, column_over, moment_above, share_above
+from mdp.sweep.rims import chord_at, weigh_chord
+from mdp.sweep.sweep import Scars
+from mdp.topology.union_find import root
+
+NONE = -1
+SUMS = UP, RESIDUAL, STAIRS_UP, STAIRS, SECTION, MOMENT, RIM = 0, 1, 2, 3, 4, 5, 6
+AREAS = 5  # the first five sums are areas: a face that crosses the plane adds the share above it
+
+
+class Pieces(NamedTuple):
+    """The pieces above a plane. Of each vertex: heights (n,) along the direction in steps; over (n,) the last column that it lies
+    above; cosines (n,) of its normal with the direction; parent (n,) see union_find, NONE while it lies below the plane.
+
+    Of each face: face_over (m,) the last column that it reaches above; weights (m, 7) what it adds to the SUMS.
+    Of the vertex that stands for a piece: whole (n, 7) the SUMS of its faces wholly above; crossing (n, 7) those of the shares of
+    faces that cross the plane; top (n,) its highest vertex; low (n, 2) its least z, among vertices and on the plane.
+    live: vertices that stand for a piece, or did once; active: the faces that cross the plane; counts (2,): of live and active.
+    """
+
+    heights: Floats
+    over: Ints
+    cosines: Floats
+    parent: Ints
+    face_over: Ints
+    weights: Floats
+    whole: Floats
+    crossing: Floats
+    top: Ints
+    low: Floats
+    live: Ints
+    active: Ints
+    counts: Ints
+
+
+class Order(NamedTuple):
+    """Vertices and faces in the order in which the plane passes them, and where those of each column start."""
+
+    starts: NDArray[np.int64]
+    vertices: NDArray[np.int64]
+    face_starts: NDArray[np.int64]
+    faces: NDArray[np.int64]
+
+
+@part
+def make_pieces(size: int, faces: int) -> Pieces:
+    """Room for the pieces of a solid with that many vertices and faces."""
+    return Pieces(
+        floats(size, 0.0),
+        ints(size, 0),
+        floats(size, 0.0),
+        ints(size, NONE),
+        ints(faces, 0),
+        table(faces, len(SUMS)),
+        table(size, len(SUMS)),
+        table(size, len(SUMS)),
+        ints(size, 0),
+        table(size, 2),
+        ints(size, 0),
+        ints(faces, 0),
+        ints(2, 0),
+    )
+
+
+@part
+def begin(pieces: Pieces, scars: Scars, row: int, grid: OffsetGrid, topology: Topology) -> Order:
+    """Lay out vertices and faces along a direction, the plane above all of them. grid.heights are those of the pieces."""
+    normals, corners, d = topology.vertex_normals, scars.overhangs.corners, grid.direction
+    for v in range(len(pieces.over)):
+        pieces.over[v] = min(column_over(grid.heights[v]), grid.columns)
+        pieces.cosines[v] = normals[v, 0] * d[0] + normals[v, 1] * d[1] + normals[v, 2] * d[2]
+        pieces.parent[v] = NONE
+    for f in range(len(pieces.face_over)):
+        pieces.face_over[f] = max(pieces.over[corners[0, f]], pieces.over[corners[1, f]], pieces.over[corners[2, f]])
+    pieces.counts[0] = pieces.counts[1] = 0
+    _weigh_faces(scars, row, d, pieces.weights)
+    starts, vertices = counting_sort(pieces.over, grid.columns + 1)
+    face_starts, faces = counting_sort(pieces.face_over, grid.columns + 1)
+    return Order(starts, vertices, face_starts, faces)
+
+
+@part
+def descend(pieces: Pieces, column: int, order: Order, topology: Topology) -> None:
+    """Move the plane down to a column from the one above it."""
+    _enter(pieces, order.vertices[order.starts[column + 1] : order.starts[column + 2]], topology)
+    for at in range(order.face_starts[column + 1], order.face_starts[column + 2]):
+        pieces.active[pieces.counts[1]] = order.faces[at]
+        pieces.counts[1] += 1
+    _cross(pieces, column, topology)
+
+
+@inlined
+def value(pieces: Pieces, piece: int, which: int) -> float:
+    """One of the SUMS of a piece; for MOMENT see `volume`."""
+    total: float = pieces.whole[piece, which] + pieces.crossing[piece, which]
+    return total
+
+
+@borrower
+def volume(pieces: Pieces, piece: int, column: int) -> float:
+    """Volume of a piece above a column, in steps times mm2."""
+    return float(value(pieces, piece, MOMENT) - column * pieces.whole[piece, SECTION])
+
+
+@inlined
+def _add(sums: Floats, a: int, other: Floats, b: int) -> None:
+    for which in range(len(SUMS)):
+        sums[a, which] += other[b, which]
+
+
+@borrower
+def _join(pieces: Pieces, a: int, b: int) -> None:
+    """Join the pieces of two vertices; the lesser of the vertices that stand for them stands for both."""
+    p, q = root(pieces.parent, a), root(pieces.parent, b)
+    if p == q:
+        return
+    if q < p:
+        p, q = q, p
+    pieces.parent[q] = p
+    _add(pieces.whole, p, pieces.whole, q)
+    pieces.low[p, 0] = min(pieces.low[p, 0], pieces.low[q, 0])
+    if before(pieces.heights, pieces.top[q], pieces.top[p], True):
+        pieces.top[p] = pieces.top[q]
+
+
+@part
+def _enter(pieces: Pieces, vertices: NDArray[np.int64], topology: Topology) -> None:
+    """Begin a piece at each vertex that comes to lie above the plane, and join it to its neighbours there."""
+    starts, neighbours = topology.rings.starts, topology.rings.neighbours
+    for v in vertices:
+        pieces.parent[v], pieces.top[v] = v, v
+        pieces.low[v, 0] = topology.triangles.vertices[v, 2]
+        for which in range(len(SUMS)):
+            pieces.whole[v, which] = 0.0
+        pieces.live[pieces.counts[0]] = v
+        pieces.counts[0] += 1
+    for v in vertices:
+        highest = True
+        for at in range(starts[v], starts[v + 1]):
+            w = neighbours[at]
+            if pieces.parent[w] >= 0:
+                highest = highest and not before(pieces.heights, w, v, True)
+                _join(pieces, v, w)
+        if highest and pieces.cosines[v] < 0.0:
+            face = anchor_of(topology, int(v))
+            if face >= 0:
+                for corner in range(3):
+                    w = topology.triangles.faces[face, corner]
+                    if pieces.parent[w] >= 0:
+                        _join(pieces, v, w)
+
+
+@part
+def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
+    """What each face, when it lies wholly above, adds to the SUMS of its piece; MOMENT is left out, RIM is a weight."""
+    surface, needs, rims = scars.overhangs, scars.needs, scars.rims
+    normals, classes, sources = surface.normals, needs.classes, needs.sources
+    for f in range(len(surface.areas_mm2)):
+        cosine = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
+        area = surface.areas_mm2[f]
+        weights[f, UP] = area if surface.risky[f] else 0.0
+        weights[f, RESIDUAL] = 0.0
+        if cosine < surface.risky_below:
+            kind = classes[row, sources[f]] if sources[f] >= 0 else NEEDS_SUPPORT
+            if kind != CARRIES_ITSELF:
+                weights[f, RESIDUAL] = area * (needs.weight if kind == UNSUPPORTABLE else 1.0)
+        weights[f, SECTION] = rims.areas_mm2[f] * cosine
+        weights[f, STAIRS_UP], weights[f, STAIRS], weights[f, RIM] = 0.0, 0.0, 0.0
+        if len(rims.weights) > 0:
+            weights[f, RIM] = 2.0 * rims.areas_mm2[f] * rims.weights[f] * weigh_chord(cosine, rims.feather)
+        if len(rims.stair_areas_mm2) > 0:
+            weights[f, STAIRS_UP] = rims.stairs_up_mm2[f]
+            weights[f, STAIRS] = rims.stair_areas_mm2[f] * step_share(cosine)
+
+
+@borrower
+def _cross(pieces: Pieces, column: int, topology: Topology) -> None:
+    """Add the faces that have come to lie wholly above a column to their pieces, and the shares of those that cross it."""
+    faces, points, heights, c = topology.triangles.faces, topology.triangles.vertices, pieces.heights, float(column)
+    _forget_crossing(pieces)
+    still = 0
+    for at in range(pieces.counts[1]):
+        f = pieces.active[at]
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        p, q, r = heights[i], heights[j], heights[k]
+        lowest, highest = min(p, q, r), max(p, q, r)
+        own = root(pieces.parent, i if p == highest else (j if q == highest else k))
+        if lowest > c:
+            _add(pieces.whole, own, pieces.weights, f)
+            pieces.whole[own, MOMENT] += pieces.weights[f, SECTION] * (p + q + r) / 3.0
+            pieces.whole[own, RIM] = 0.0  # only faces that cross have a rim
+            continue
+        pieces.active[still] = f
+        still += 1
+        _add_share(pieces, own, f, c, (lowest, max(min(p, q), min(max(p, q), r)), highest))
+        for corner in range(3):
+            v, w = faces[f, corner], faces[f, corner - 2]
+            if (heights[v] > c) != (heights[w] > c):
+                at_z = points[v, 2] + (c - heights[v]) / (heights[w] - heights[v]) * (points[w, 2] - points[v, 2])
+                pieces.low[own, 1] = min(pieces.low[own, 1], at_z)
+    pieces.counts[1] = still
+
+
+@borrower
+def _forget_crossing(pieces: Pieces) -> None:
+    """Clear what the pieces have from faces that cross, and drop the vertices that stand for a piece no longer."""
+    still = 0
+    for at in range(pieces.counts[0]):
+        v = pieces.live[at]
+        if pieces.parent[v] == v:
+            pieces.live[still] = v
+            still += 1
+            pieces.low[v, 1] = np.inf
+            for which in range(len(SUMS)):
+                pieces.crossing[v, which] = 0.0
+    pieces.counts[0] = still
+
+
+@borrower
+def _add_share(pieces: Pieces, piece: int, f: int, c: float, heights: tuple[float, float, float]) -> None:
+    """Add the share of a face above c to its piece. heights: of its corners, the lowest first."""
+    lowest, middle, highest = heights
+    extent = highest - lowest
+    lower, upper = (middle - lowest) * extent, (highest - middle) * extent
+    rise, fall = 1.0 / lower if lower > 0.0 else 0.0, 1.0 / upper if upper > 0.0 else 0.0
+    crossing, weights = pieces.crossing, pieces.weights
+    share = share_above(c, lowest, middle, highest, rise, fall)
+    for which in range(AREAS):
+        crossing[piece, which] += weights[f, which] * share
+    crossing[piece, MOMENT] += weights[f, SECTION] * moment_above(c, lowest, middle, highest, rise, fall)
+    crossing[piece, RIM] += weights[f, RIM] * chord_at(c, lowest, middle, highest, rise, fall)
