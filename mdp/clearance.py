@@ -28,7 +28,7 @@ from profiles.frozen import Vector
 from profiles.machine import Machine
 
 CELLS_MM = (2.0, 0.6, 0.2)  # cell sizes, coarse to fine: only pairs that may collide are compared again
-MOST_TRIANGLES, MOST_PAIRS = 250_000, 2_000_000  # per surface, and pairs of cells; more are refused
+MOST_TRIANGLES, MOST_PAIRS = 250_000, 20_000_000  # per surface, and pairs of cells; more are refused
 EVEN_MM = 1e-4  # up to this height above the base plane is the cut face itself
 NOTHING = -1e9
 Share = tuple[int, int]
@@ -196,6 +196,17 @@ class _Meeting:
     clearance_mm: float
     around_mm: Floats
 
+    def within_reach(self, points: Floats, slack_mm: float) -> Mask:
+        """(j,) which of (j, 3) standing points the head might hit with the tip on the limb's base plane in its bounding box."""
+        outside = np.maximum(np.maximum(self.around_mm[0] - points, points - self.around_mm[1]), 0.0)
+        boxes, beyond = self.head.boxes, slack_mm + self.clearance_mm
+        low, high = self.around_mm[0, :2] + boxes[:, :2] - beyond, self.around_mm[1, :2] + boxes[:, 3:5] + beyond
+        under = np.all((points[:, None, :2] >= low) & (points[:, None, :2] <= high), axis=2)
+        met = under & (points[:, None, 2] > np.maximum(boxes[:, 2] - self.clearance_mm, 0.0))
+        squares, tops = (outside[:, :2] ** 2).sum(axis=1), np.ascontiguousarray(points[:, 2])
+        reached: Mask = _under_hot_end(squares, tops, beyond, self.head, self.clearance_mm) | met.any(axis=1)
+        return reached
+
     def close(self, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
         """(i,) which tips may make the head hit any of (j, 3) standing points, and (j,) which of those points are hit.
 
@@ -228,10 +239,12 @@ def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, b
             return True
         low, of_tip = _per_cell(tips[:, 0, :2], np.maximum(tips[:, :, 2], 0.0).min(axis=1), cell_mm, np.minimum)
         high, of_stand = _per_cell(stands[:, 0, :2], stands[:, :, 2].max(axis=1), cell_mm, np.maximum)
-        if len(low) * len(high) > MOST_PAIRS:
-            return False
         slack_mm = hypot(cell_mm, cell_mm) + 2.0 * cell_mm  # two half diagonals of cells and two edges of triangles
-        close_tips, close_stands = meeting.close(low, high, slack_mm)
+        near = meeting.within_reach(high, slack_mm)
+        if len(low) * int(near.sum()) > MOST_PAIRS:
+            return False
+        close_stands = np.zeros(len(high), np.bool_)
+        close_tips, close_stands[near] = meeting.close(low, high[near], slack_mm)
         tips, stands = tips[close_tips[of_tip]], stands[close_stands[of_stand]]
     return len(tips) == 0
 
@@ -287,6 +300,15 @@ def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearanc
             if meets:
                 close_tips[i], close_points[j] = True, True
     return close_tips, close_points
+
+
+@kernel
+def _under_hot_end(squares: Floats, tops: Floats, beyond: float, head: Head, clearance: float) -> Mask:
+    """(n,) whether columns at (n,) squared distances from the nearest place of the tip reach the hot end, the tip at height 0."""
+    met = flags(len(tops))
+    for i in range(len(tops)):
+        met[i] = _asked_by_hot_end(squares[i], tops[i], beyond, head, clearance) > 0.0
+    return met
 
 
 @kernel

@@ -1,11 +1,13 @@
 """Heights: where the layers of a part lie and where its mesh is cut for them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, floor
 
 import numpy as np
 
+from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from profiles.errors import SliceError
 from profiles.process import Process
@@ -13,6 +15,7 @@ from profiles.profile import Profile
 from slicer.adaptive_heights import adaptive_heights
 
 LEAST_SHARE = 0.25  # by which a layer may differ from its neighbours: thinner than this share of them it comes out unevenly
+LEVEL = 1e-9  # of the cosine between two directions that are the same
 MOST_LAYERS = 50_000  # ten metres of 0.2 mm; beyond that a unit or the scale is wrong
 
 
@@ -37,17 +40,33 @@ class Heights:
         return Heights(*(np.concatenate(pair) for pair in pairs))
 
 
-def layer_heights(mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0) -> Heights:
+NO_LAYERS = Heights(np.zeros(0), np.zeros(0), np.zeros(0))
+
+
+def layer_heights(
+    mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0, limb_planes_mm: Sequence[float] = ()
+) -> Heights:
     """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
 
-    A pedestal is sliced for itself and ends pedestal_gap_mm below the model. Raises SliceError as equal_heights().
+    A pedestal is sliced for itself and ends pedestal_gap_mm below the model. A layer ends in each of the limb planes: heights,
+    lowest first, at which the part goes on beside limbs that are printed later. Raises SliceError as equal_heights().
     """
-    process, nozzle_mm, top = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
-    roof_mm = pedestal_mm - process.pedestal_gap_mm
-    if pedestal_mm < top and roof_mm >= process.least_layer_height_mm:
-        pedestal = equal_heights(roof_mm, process, True, nozzle_mm)
-        return pedestal + _heights_from(mesh, process, nozzle_mm, _Bottom(pedestal_mm, process.first_layer_height_mm))
-    return _heights_from(mesh, process, nozzle_mm, _bottom(process, on_platform))
+    process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
+    roof_mm, bottom, heights = pedestal_mm - process.pedestal_gap_mm, _bottom(process, on_platform), NO_LAYERS
+    if pedestal_mm < top_mm and roof_mm >= process.least_layer_height_mm:
+        heights = equal_heights(roof_mm, process, True, nozzle_mm)
+        bottom = _Bottom(pedestal_mm, process.first_layer_height_mm)
+    for plane_mm in limb_planes_mm:
+        if plane_mm - bottom.from_mm >= bottom.first_mm and top_mm - plane_mm >= process.layer_height_mm:
+            heights += _heights_from(mesh, plane_mm, process, nozzle_mm, bottom)
+            bottom = _Bottom(plane_mm, process.layer_height_mm)
+    return heights + _heights_from(mesh, top_mm, process, nozzle_mm, bottom)
+
+
+def limb_planes_mm(part: Part, later: Sequence[Part]) -> list[float]:
+    """Heights above a part's base plane of the planes, level there, from which later limbs are printed, lowest first."""
+    limbs = [limb.base for limb in later if limb.base.limbs_mm is not None]
+    return sorted({base.offset_mm - part.base.offset_mm for base in limbs if float(base.normal @ part.base.normal) > 1.0 - LEVEL})
 
 
 def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm: float) -> Heights:
@@ -88,9 +107,9 @@ def interface_height_mm(process: Process) -> float:
     return max((1.0 - process.interface_overlap) * process.layer_height_mm, least)
 
 
-def _heights_from(mesh: Mesh, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
-    """Layers from the bottom up to the mesh's top."""
-    top, least = float(mesh.bounds_mm[1, 2]), process.least_layer_height_mm
+def _heights_from(mesh: Mesh, top: float, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
+    """Layers from the bottom up to a top."""
+    least = process.least_layer_height_mm
     _check(top, process)
     adaptive = process.adaptive_cusp_mm > 0.0 and top - bottom.from_mm > bottom.first_mm + least
     thick = adaptive_heights(mesh, process, bottom.from_mm + bottom.first_mm, top) if adaptive else []

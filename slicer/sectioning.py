@@ -13,7 +13,7 @@ from slicer.finish.compensation import compensate, compensate_elephant_foot
 from slicer.finish.vase import vase_profile
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset, opening
-from slicer.heights import layer_heights
+from slicer.heights import layer_heights, limb_planes_mm
 from slicer.interface.interface import plastic_below
 from slicer.interface.interlock import cut_grooves
 from slicer.interface.pins import NONE, Pins, cut_pins
@@ -34,7 +34,7 @@ def section_part(
     of_print, profile = profile, vase_profile(profile.of_part(part.index))
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    heights = layer_heights(mesh, profile, on_platform, pedestal_mm)
+    heights = layer_heights(mesh, profile, on_platform, pedestal_mm, limb_planes_mm(part, later))
     pedestal = pedestal_layers(heights.tip_mm, pedestal_mm)
     whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, heights.cut_mm)]
     nozzle_mm = profile.machine.head.nozzle_mm

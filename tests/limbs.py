@@ -53,10 +53,15 @@ def posts(*at_mm: float, height_mm: float = 20.0, bar_mm: float = 0.0) -> Mesh:
     return from_manifold(solid)
 
 
-def outer_posts(profile: Profile) -> Decomposition:
-    """Three posts up to 24 mm, the outer two printed together from 6 mm on while the middle one stands."""
+def outer_posts(profile: Profile, base_mm: float = 6.0) -> Decomposition:
+    """Three posts up to 24 mm, the outer two printed together from a height on while the middle one stands."""
     mesh = posts(-35.0, 0.0, 35.0)
-    return decomposed(mesh, profile, limb(mesh, [(-35.0, 0.0, 24.0), (35.0, 0.0, 24.0)], (0.0, 0.0, 6.0)))
+    return decomposed(mesh, profile, limb(mesh, [(-35.0, 0.0, 24.0), (35.0, 0.0, 24.0)], (0.0, 0.0, base_mm)))
+
+
+def between_layers(profile: Profile) -> Decomposition:
+    """The same, cut in the middle of a layer of 0.2 mm."""
+    return outer_posts(profile, 6.1)
 
 
 def leaning_arm(profile: Profile) -> Decomposition:
@@ -69,11 +74,14 @@ def leaning_arm(profile: Profile) -> Decomposition:
     return decomposed(mesh, profile, limb(mesh, [(28.0, -25.0, 38.0)], base.tolist(), LEANING))
 
 
+MODELS = {"outer posts": outer_posts, "outer posts, cut between layers": between_layers, "leaning arm": leaning_arm}
+
+
 @cache
 def sliced(model: str) -> tuple[Profile, Decomposition, tuple[SlicedPart, ...]]:
     """A model's parts sliced with sparse infill, without the purge line."""
     profile = load(settings=["process.infill_density=0.1", "machine.purge_mm=0"])
-    decomposition = {"outer posts": outer_posts, "leaning arm": leaning_arm}[model](profile)
+    decomposition = MODELS[model](profile)
     return profile, decomposition, slice_parts(decomposition.parts, profile)
 
 

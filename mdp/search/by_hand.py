@@ -115,17 +115,17 @@ def name_limbs(node: Node, plane: Plane) -> Plane | Refusal:
     limbs, standing = divide(above(node.solid, plane), plane.limbs_mm)
     if limbs.is_empty():
         return Refusal("nothing lies above its plane")
-    if standing.is_empty():
-        return replace(plane, limbs_mm=None)
     surface = mesh_of(limbs)
-    high = surface.vertices[plane.heights_mm(surface.vertices) > BASE_TOLERANCE_MM]
-    if all((high == point).all(axis=1).any() for point in plane.limbs_mm):
-        return plane
     away_mm = [surface.distance_mm(point) for point in plane.limbs_mm]
     if max(away_mm) > FARTHEST_MM:
         place = ", ".join(f"{x:.4g}" for x in plane.limbs_mm[int(np.argmax(away_mm))])
         return Refusal(f"no piece above its plane lies at {place}: the nearest one is {max(away_mm):.3g} mm away")
+    if standing.is_empty():
+        return replace(plane, limbs_mm=None)
+    high = surface.vertices[plane.heights_mm(surface.vertices) > BASE_TOLERANCE_MM]
     bodies = [mesh_of(piece) for piece in limbs.decompose() if piece.volume() > 0.0]  # the others are voids
+    if len(bodies) == len(plane.limbs_mm) and all((high == point).all(axis=1).any() for point in plane.limbs_mm):
+        return plane
     tops = [body.vertices[np.argmax(body.vertices @ plane.normal)] for body in bodies]
     return replace(plane, limbs_mm=np.array(tops))
 

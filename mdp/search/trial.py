@@ -147,9 +147,11 @@ class Trials:
         return [*made, *(plane if isinstance(named, Refusal) else named for plane, named in others)]
 
     def _look(self, plane: Plane) -> Refusal | None:
-        """Why a plane cannot cut what is left; nothing is cut."""
-        named = name_limbs(self._node, plane)
-        return named if isinstance(named, Refusal) else refusal(self._problem, self._node, named)
+        """Why a plane cannot cut what is left. Only limbs are cut off for that: what they leave may float."""
+        if plane.limbs_mm is None:
+            return refusal(self._problem, self._node, plane)
+        child = cut_or_refuse(self._problem, self._node, plane)
+        return child if isinstance(child, Refusal) else None
 
     def _allowed(self, order: Sequence[Plane], unchecked: int) -> Trial:
         parts, left_mm2 = self._forecast.parts(self._named(order))

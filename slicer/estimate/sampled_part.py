@@ -15,7 +15,7 @@ from slicer.estimate.shell import Shell, shell_of
 from slicer.fill.region import shell_layers, solid_bottom_layers
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, union
-from slicer.heights import Heights, layer_heights
+from slicer.heights import Heights, layer_heights, limb_planes_mm
 from slicer.interface.interface import sections_of, touching
 from slicer.interface.model import joined
 from slicer.shells import layer_processes
@@ -85,7 +85,7 @@ def sample_part(part: Part, profile: Profile, later: Sequence[Part] = ()) -> Sam
     """
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    heights = layer_heights(mesh, profile, on_platform, pedestal_mm)
+    heights = layer_heights(mesh, profile, on_platform, pedestal_mm, limb_planes_mm(part, later))
     count = len(heights.tip_mm)
     pedestal = pedestal_layers(heights.tip_mm, pedestal_mm)
     choice = choose_layers(mesh, heights, process, max(1 if on_platform else process.interface_layers, pedestal))

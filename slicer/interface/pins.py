@@ -21,7 +21,7 @@ from profiles.profile import Profile
 from slicer.bead import Bead, length_mm
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, area_mm2, clean, islands, offset, offset_round, union
-from slicer.heights import Heights, layer_heights
+from slicer.heights import Heights, layer_heights, limb_planes_mm
 from slicer.interface.interface import BELOW_MM, frame_change, touching
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sections import Pin
@@ -77,7 +77,7 @@ def _pins_of(part: Part, earlier: Sequence[Part], cut: Sequence[tuple[Part, Sequ
         for x, y in _places(room, process):
             if not len(middles) or np.hypot(*(middles - (x, y)).T).min() >= least_spacing_mm(process, wide_mm):
                 middles = np.vstack([middles, [x, y]])
-                heights = heights or _heights_of(lower, below)
+                heights = heights or _heights_of(lower, below, part)
                 hole = mesh_of(_hole(x, y, wide_mm, -process.pin_depth_mm, 0.0))
                 yield Pin(x, y, _taken_mm3(hole.transform(*frame_change(part, lower)), heights))
 
@@ -153,9 +153,9 @@ def _holes(pins: Sequence[Pin], profile: Profile) -> Mesh:
     return mesh_of(m3.Manifold.compose([_hole(pin.x_mm, pin.y_mm, wide_mm, -depth_mm, MOUTH_MM) for pin in pins]))
 
 
-def _heights_of(part: Part, profile: Profile) -> Heights:
+def _heights_of(part: Part, profile: Profile, later: Part) -> Heights:
     pedestal_mm = profile.search.pedestal_mm if part.index == 1 else 0.0
-    return layer_heights(part.in_part_frame(), profile, part.index == 1, pedestal_mm)
+    return layer_heights(part.in_part_frame(), profile, part.index == 1, pedestal_mm, limb_planes_mm(part, [later]))
 
 
 def _taken_mm3(hole: Mesh, heights: Heights) -> float:

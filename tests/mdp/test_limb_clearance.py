@@ -47,6 +47,19 @@ def test_a_limb_whose_every_layer_lies_higher_than_what_stands_is_clear_however_
     assert not passes_clear(MACHINE, level(MACHINE), _box(0.0, 10.0, 10.0) + up, _box(10.5, 8.0, 5.5), 0.0)
 
 
+def _wide_box(x: float, height: float) -> Floats:
+    """A box of 70 x 80 mm that begins at x, of many cells in the coarsest grid."""
+    mesh = shapes.box(70.0, 80.0, height)
+    return mesh.vertices[mesh.faces] + np.array([x + 35.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("gap", "height", "clear"), [(70.0, 38.0, True), (25.0, 30.0, True), (16.5, 40.0, False), (3.0, 2.5, False)]
+)
+def test_large_limbs_are_compared_with_large_things_that_stand(gap: float, height: float, clear: bool) -> None:
+    assert passes_clear(MACHINE, level(MACHINE), _wide_box(0.0, 20.0), _wide_box(70.0 + gap, height), 0.0) is clear
+
+
 @given(st.floats(0.0, 40.0), st.floats(0.0, 40.0), st.floats(0.5, 60.0), st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=2))
 def test_the_tip_asked_for_is_the_height_that_the_underside_leaves(x: float, y: float, top: float, place: list[float]) -> None:
     standing = Standing.of(np.array([[x, y, top]]), 0.0, MACHINE)

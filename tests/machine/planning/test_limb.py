@@ -16,7 +16,7 @@ from machine.planning.stops import Stop
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load
-from tests.limbs import moved_part, printed, sliced
+from tests.limbs import MODELS, moved_part, printed, sliced
 
 TOP_MM = 24.0  # of the posts
 
@@ -28,7 +28,7 @@ def _short(z_mm: float) -> Profile:
     return profile.model_copy(update={"machine": profile.machine.model_copy(update={"z": z})})
 
 
-@pytest.mark.parametrize("model", ["outer posts", "leaning arm"])
+@pytest.mark.parametrize("model", sorted(MODELS))
 def test_a_limb_is_printed_beside_what_stands_without_a_finding(model: str) -> None:
     assert printed(model)[1].errors == ()
 

@@ -79,6 +79,28 @@ def test_a_point_beside_every_piece_is_refused_with_its_distance() -> None:
         _by_hand(shapes.bar_beside_a_tower(), replace(BAR, limbs_mm=((27.0, 0.0, 70.0),)))
 
 
+def test_a_point_far_from_the_only_piece_above_the_plane_is_refused_too() -> None:
+    above_the_bar = PlannedPart((0.0, 0.0, 1.0), 60.0, limbs_mm=((-900.0, 500.0, 700.0),))
+    with pytest.raises(PlanError, match="no piece above its plane lies at -900, 500, 700"):
+        _by_hand(shapes.bar_beside_a_tower(), above_the_bar)
+
+
+def test_a_limb_that_is_cut_off_already_is_not_taken_for_another_one() -> None:
+    twice = PlanFile("plan.toml", parts=(BAR, BAR))
+    with pytest.raises(PlanError, match="part 2 cannot be cut off: no piece above its plane lies at 27, 0, 54"):
+        cut_by_plan(shapes.bar_beside_a_tower(), "bar", _profile(), twice)
+
+
+def test_a_trial_refuses_a_limb_that_would_leave_something_in_the_air() -> None:
+    frame = m3.Manifold.cube((80, 40, 4)) + m3.Manifold.cube((8, 8, 40)) + m3.Manifold.cube((8, 8, 40)).translate((72, 0, 0))
+    frame += m3.Manifold.cube((30, 8, 8)).translate((0, 0, 34)) + m3.Manifold.cube((8, 8, 10)).translate((22, 0, 25))
+    hook = shapes.from_manifold(frame)  # the end of the hook hangs down below the plane
+    plane = PlannedPart((0.0, 0.0, 1.0), 30.0, limbs_mm=((0.0, 0.0, 42.0),)).plane
+    assert plane is not None
+    trial = Trials(hook, _profile(nozzle_load_n=0.0, fragile_mm=0.0)).attempt([plane])
+    assert "would not stand on the platform" in trial.refused
+
+
 def test_a_limb_too_near_to_a_tower_is_refused_and_the_place_of_the_tower_is_shown() -> None:
     mesh = shapes.bar_beside_a_tower(gap=2.0)
     with pytest.raises(PlanError, match="the head would meet what stands beside it"):

@@ -80,6 +80,7 @@ class Anything:
             "add": lambda n: {**self.plane(), "after": n},
             "move": lambda n: {**self.plane(), "part": n},
             "remove": lambda n: {"part": n},
+            "limb": lambda n: {"part": n, **self.choice(({}, {"point_mm": self.point(30.0)}))},
             "reorder": lambda n: {"part": n, "to": 2},
             "mark": lambda n: {"kind": self.choice(ZONE_KINDS), **self.choice(({}, {"number": n})), **self.zone()},
             "unmark": lambda n: {"kind": self.choice(ZONE_KINDS), "number": n},
