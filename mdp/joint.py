@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from manifold3d import CrossSection
 
+from mdp.cost.footing import section_edges
 from mdp.cut import Solid, mesh_of, solid_of
 from mdp.decomposition import Part
 from mdp.mesh import Floats
@@ -106,7 +107,7 @@ def _pieces(parts: Sequence[Part]) -> list[_Piece]:
             shared = {k: base ^ _in_frame(earlier[k].solid, part).slice(-BESIDE_MM) for k in near}
             shared = {k: area for k, area in shared.items() if area.area() > TOUCHING_MM2}
             contact = sum(shared.values(), CrossSection())
-            pieces.append(_Piece(part, solid, _edges(contact), tuple(shared)))
+            pieces.append(_Piece(part, solid, section_edges(contact), tuple(shared)))
     return pieces
 
 
@@ -114,12 +115,6 @@ def _meet(one: Solid, other: Solid) -> bool:
     """Whether the boxes of two solids come as near to each other as pieces that touch."""
     (low, high), (least, most) = (np.reshape(solid.bounding_box(), (2, 3)) for solid in (one, other))
     return bool(np.all((low <= most + BESIDE_MM) & (least <= high + BESIDE_MM)))
-
-
-def _edges(area: CrossSection) -> Floats:
-    """(n, 4) x, y, x, y, the area on the left of each."""
-    loops = [np.asarray(loop) for loop in area.to_polygons()]
-    return np.concatenate([np.zeros((0, 4)), *(np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops)])
 
 
 def _in_frame(solid: Solid, part: Part) -> Solid:

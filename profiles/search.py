@@ -111,12 +111,19 @@ class Search(Frozen):
         "direction: support leans there from the side or stands on support printed with other parts, which takes more plastic "
         "and holds less well",
     )
-    most_longer: float = Field(
-        0.05,
+    least_saving: float = Field(
+        0.03,
         ge=0,
-        le=1000,
-        description="share by which the chosen parts may take more time or filament than one piece, by the estimate; "
-        "where more would save scars that is told, and --parts N takes it",
+        le=1,
+        description="share of what one piece costs, with its time and filament, that every further part must save; where more "
+        "parts would save less, a note says so, and --parts N takes them",
+    )
+    most_left: float = Field(
+        0.33,
+        ge=0,
+        le=1,
+        description="how much support and seams may scar together where a model is cut, as a share of what support scars in one "
+        "piece; where that is more, the model stays in one piece, a note says so, and --parts N cuts it",
     )
     polish: bool = Field(
         True,

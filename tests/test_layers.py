@@ -18,6 +18,7 @@ CONFINED = {
     "cascadio": ("mdp/formats/cad",),
     "manifold3d": (
         "mdp/cut",
+        "mdp/cost/footing",
         "mdp/joint",
         "mdp/pedestal",
         "mdp/repair/",

@@ -51,7 +51,8 @@ class SeamPlaces:
         hidden = hidden_shares(whole.mesh) if hidden_share < 1.0 else np.zeros(len(whole.sources))
         by_source = 1.0 - (1.0 - hidden_share) * surface.by_source(whole, hidden)
         for cylinder in cylinders:
-            by_source[cylinder.faces] = feature_weight
+            if cylinder.is_bore:
+                by_source[cylinder.faces] = feature_weight
         return cls(surface, by_source, zones, cylinders)
 
     def cylinders_of(self, piece: Piece) -> tuple[Cylinder, ...]:

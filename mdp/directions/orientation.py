@@ -9,12 +9,11 @@ unless it is asked for the other.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import update_wrapper
-from math import atan2, cos, degrees, hypot, pi, radians, sin, tan
+from math import atan2, cos, degrees, hypot, pi, radians, sin
 from typing import Concatenate, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.cut import convex_hull
 from mdp.directions.spread import spread
@@ -33,14 +32,21 @@ SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 3
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, how high it stands,
-    and the area of its stairs, each face times the height of its steps in layers."""
+    """A model turned as a whole: rotation (3, 3), what is risky then, which share of the model's shadow the faces are that stand
+    on the plate, by what angle it may be leaned before it tips over (below 0: it tips over by itself), how high it stands, and
+    the area of its stairs, each face times the height of its steps in layers."""
 
     rotation: Floats
     risky_mm2: float
-    stable: bool
+    standing_share: float
+    lean_deg: float
     height_mm: float
     stairs_mm2: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether it rests without tipping over when it is leaned a little."""
+        return self.lean_deg >= LEAN_DEG
 
     @property
     def turns_deg(self) -> tuple[float, float]:
@@ -74,7 +80,7 @@ def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orie
     As the model stands counts as well, so the result is never worse than printing it straight up. Among equal areas one that
     rests is taken, then the least turned. A model that rests nowhere (a ball) is taken as it comes.
     """
-    candidates = _on_facets(mesh, angle_deg)
+    candidates = facet_orientations(mesh, angle_deg)
     resting_ones = [orientation for orientation in candidates if orientation.stable]
     if resting and resting_ones:
         return min(resting_ones, key=_rank)
@@ -84,7 +90,7 @@ def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orie
 def resting_orientations(mesh: Mesh, angle_deg: float) -> list[Orientation]:
     """The orientations in which the model rests on a facet of its hull, least risky first; the present one is among them when it
     rests."""
-    return sorted((orientation for orientation in _on_facets(mesh, angle_deg) if orientation.stable), key=_rank)
+    return sorted((orientation for orientation in facet_orientations(mesh, angle_deg) if orientation.stable), key=_rank)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +105,7 @@ class RestingFacet:
 def resting_facets(mesh: Mesh) -> list[RestingFacet]:
     """The facets of the hull, its triangles grouped by plane, that the model rests on without tipping over, largest first."""
     hull, directions = convex_hull(mesh.vertices), np.concatenate([_facets(mesh), UP[None]])
-    directions = directions[_rests(mesh, directions)]
+    directions = directions[_lean_deg(mesh, directions) >= LEAN_DEG]
     if len(directions) == 0:
         return []
     along = hull.normals @ -directions.T
@@ -126,6 +132,12 @@ def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
 
 def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
     """(k,) risky areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
+    facing_down, standing = _areas_down(mesh, directions, angle_deg)
+    return np.maximum(facing_down - standing, 0.0)
+
+
+def _areas_down(mesh: Mesh, directions: Floats, angle_deg: float) -> tuple[Floats, Floats]:
+    """(k,) areas, mm2, that face down too far to carry themselves, and of them (k,) those that stand on the plate."""
     facing_down, standing = np.zeros(len(directions)), np.zeros(len(directions))
     limit, areas = threshold(angle_deg), mesh.areas_mm2
     normals, points = np.ascontiguousarray(mesh.normals.T), np.ascontiguousarray(mesh.vertices.T)
@@ -138,23 +150,25 @@ def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
         faces = np.concatenate([order[starts[v] : starts[v + 1]] for v in np.flatnonzero(low)])
         stands = faces[low[mesh.faces[faces]].all(axis=1) & down[faces]]
         facing_down[k], standing[k] = areas[down].sum(), areas[stands].sum()
-    return np.maximum(facing_down - standing, 0.0)
+    return facing_down, standing
 
 
 @cached_with_mesh
-def _on_facets(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
-    """As the model stands, and on each facet of its hull."""
+def facet_orientations(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
+    """As the model stands, and on each facet of its hull, whether it rests there or not."""
     return tuple(_measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)])))
 
 
 def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
-    risky = risky_areas(mesh, directions, angle_deg)
-    rests, corners = _rests(mesh, directions), convex_hull(mesh.vertices).vertices
+    facing_down, standing = _areas_down(mesh, directions, angle_deg)
+    lean_deg, corners = _lean_deg(mesh, directions), convex_hull(mesh.vertices).vertices
+    shadows = [0.5 * float(np.abs(dot(mesh.normals, direction)) @ mesh.areas_mm2) for direction in directions]
     return [
         Orientation(
             rotation=_rotation(direction),
-            risky_mm2=float(risky[k]),
-            stable=bool(rests[k]),
+            risky_mm2=max(float(facing_down[k] - standing[k]), 0.0),
+            standing_share=float(standing[k]) / shadows[k],
+            lean_deg=float(lean_deg[k]),
             height_mm=float(np.ptp(dot(corners, direction))),
             stairs_mm2=float(step_shares(dot(mesh.normals, direction)) @ mesh.areas_mm2),
         )
@@ -182,24 +196,25 @@ def _facets(mesh: Mesh) -> Floats:
     return directions
 
 
-def _rests(mesh: Mesh, directions: Floats) -> NDArray[np.bool_]:
-    """(k,) whether the centre of mass stays over the base when the model is leaned by LEAN_DEG to any side.
+def _lean_deg(mesh: Mesh, directions: Floats) -> Floats:
+    """(k,) the least angle by which the model, leaned to any side, has its centre of mass over the edge of its base; below 0
+    where it is not over the base to begin with.
 
     The base reaches as far to each of 64 sides as its vertices within the platform's tolerance do.
     """
     hull = convex_hull(mesh.vertices)
-    centre = _centre_of_mass(mesh)
-    stable = np.zeros(len(directions), np.bool_)
+    centre = centre_of_mass(mesh)
+    lean_rad = np.zeros(len(directions))
     for k, direction in enumerate(directions):
         heights = hull.vertices @ direction
         lowest = float(heights.min())
         base = hull.vertices[heights <= lowest + PLATFORM_TOLERANCE_MM] - centre
         reach = (base @ _rotation(direction)[:2].T @ SIDES).max(axis=0)
-        stable[k] = bool(reach.min() >= tan(radians(LEAN_DEG)) * (float(centre @ direction) - lowest))
-    return stable
+        lean_rad[k] = atan2(float(reach.min()), float(centre @ direction) - lowest)
+    return np.degrees(lean_rad)
 
 
-def _centre_of_mass(mesh: Mesh) -> Floats:
+def centre_of_mass(mesh: Mesh) -> Floats:
     """(3,) by the divergence theorem: tetrahedra from the box's centre to every face."""
     middle = 0.5 * (mesh.bounds_mm[0] + mesh.bounds_mm[1])
     a, b, c = (mesh.vertices[mesh.faces[:, k]] - middle for k in range(3))

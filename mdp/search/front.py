@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from mdp.kernels.processes import side_by_side
 from mdp.search.node import Node
 from mdp.sweep.limbs import limb_faces
 from profiles.profile import Profile
+from profiles.search import Search
 
 # Costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams.
 EQUAL = 0.01
@@ -148,38 +148,59 @@ class Worth:
 
 @dataclass(frozen=True)
 class Choice:
-    """The place of a row in a front and why it is taken; note: what another one would save, where its time speaks against it."""
+    """The place of a row in a front and why it is taken; note: what the row with the fewest scars would save, and its price."""
 
     place: int
     reason: str
     note: tuple[str, ...] = ()
 
 
-def choose(rows: Sequence[FrontRow], worth: Worth, most_longer: float = inf) -> Choice:
-    """The row of the fewest parts among those whose cost is alike to the least. rows: by their number of parts.
+@dataclass(frozen=True)
+class Demands:
+    """What cuts must bring to be made. least_saving: what every further part must save, as a share of the cost of one piece with
+    its time; most_left: how much support and seams may scar together, as a share of what support scars in one piece."""
 
-    worth: what their time and filament count. Where any row has a time, those that may be taken and have none cannot be printed;
-    where none has, neither counts. most_longer: share by which a row may take more time, or filament, than the first.
+    least_saving: float = 0.0
+    most_left: float = 1.0
+
+    @classmethod
+    def of(cls, search: Search) -> "Demands":
+        """What cuts must bring by the settings of a search."""
+        return cls(search.least_saving, search.most_left)
+
+
+def choose(rows: Sequence[FrontRow], worth: Worth, demands: Demands = Demands()) -> Choice:
+    """The row whose cost, with its time and filament and a charge for every part, is least, of the first and those that meet the
+    demands beside it. rows: by their number of parts; worth: what time and filament count.
+
+    Where any row has a time, those without cannot be printed. Where none has, or where time counts nothing, the fewest parts
+    are taken whose cost is alike to the least.
     """
     places = [place for place, good in enumerate(pays(rows)) if good]
     places = [place for place in places if rows[place].time_s is not None] or places
-    scars = _first_alike([rows[place].cost_mm2 for place in places])
-    reason = "the least cost" if rows[places[scars]].cost_mm2 <= min(row.cost_mm2 for row in rows) else LEAST_PARTS
+    scars = places[_first_alike([rows[place].cost_mm2 for place in places])]
+    reason = "the least cost" if rows[scars].cost_mm2 <= min(row.cost_mm2 for row in rows) else LEAST_PARTS
     if not worth or all(rows[place].time_s is None for place in places):
-        return Choice(places[scars], reason)
-    allowed = [place for place in places if _is_quick(rows[place], rows[0], most_longer)]
-    totals = [rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in allowed]
-    taken = _first_alike(totals)
-    if allowed[taken] == places[scars]:
-        return Choice(places[scars], reason)
-    reason = "the least cost with its time" if totals[taken] <= min(totals) else "the fewest parts, cost and time alike"
-    return Choice(allowed[taken], reason, _given_up(rows[places[scars]], rows[allowed[taken]]))
+        return Choice(scars, reason)
+    totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
+    first, limit_mm2 = places[0], demands.most_left * _unlike_stairs_mm2(rows[places[0]])
+    charge_mm2 = demands.least_saving * totals[first]
+    allowed = [place for place in places if place == first or _unlike_stairs_mm2(rows[place]) <= limit_mm2]
+    taken = min(allowed, key=lambda place: totals[place] + charge_mm2 * (rows[place].parts - rows[first].parts))
+    if taken == scars:
+        return Choice(taken, reason)
+    if totals[taken] <= min(totals.values()):
+        reason = "the least cost with its time"
+    elif taken == first and len(allowed) == 1:
+        reason = f"cuts would leave more than {demands.most_left:.0%} of the support, their seams counted"
+    else:
+        reason = f"more parts would save less than {demands.least_saving:.0%} each"
+    return Choice(taken, reason, _given_up(rows[scars], rows[taken]))
 
 
-def _is_quick(row: FrontRow, first: FrontRow, most_longer: float) -> bool:
-    """Whether a row takes little more time and filament than the first, as far as that is known."""
-    pairs = ((row.time_s, first.time_s), (row.filament_mm, first.filament_mm))
-    return all(own is None or its is None or own <= (1.0 + most_longer) * its for own, its in pairs)
+def _unlike_stairs_mm2(row: FrontRow) -> float:
+    """What support, seams and cuts cost: all but the stairs, which cuts hardly change."""
+    return row.cost_mm2 - row.stairs_mm2
 
 
 def _first_alike(costs_mm2: Sequence[float]) -> int:
@@ -192,9 +213,12 @@ def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
     """What the row with the fewest scars would save and cost beside the one that is taken."""
     saved_mm2, longer_s = taken.cost_mm2 - fewest_scars.cost_mm2, (fewest_scars.time_s or 0.0) - (taken.time_s or 0.0)
     more_mm = (fewest_scars.filament_mm or 0.0) - (taken.filament_mm or 0.0)
-    if saved_mm2 <= 0.0 or max(longer_s, more_mm) <= 0.0:
-        return ()
-    longer = f"{longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"{longer_s:.0f} s longer"
-    price = longer if longer_s > 0.0 else f"{more_mm / 1000.0:.1f} m more filament"
     parts = fewest_scars.parts
-    return (f"{parts} parts would save {saved_mm2:.0f} mm2 of scars but take {price}: --parts {parts}",)
+    if saved_mm2 <= 0.0:
+        return ()
+    price = f"with {parts - taken.parts} more {'cut' if parts == taken.parts + 1 else 'cuts'}"
+    if longer_s > 0.0:
+        price = f"but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"but take {longer_s:.0f} s longer"
+    elif more_mm > 0.0:
+        price = f"but take {more_mm / 1000.0:.1f} m more filament"
+    return (f"{parts} parts would save {saved_mm2:.0f} mm2 of scars {price}: --parts {parts}",)

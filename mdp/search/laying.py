@@ -9,11 +9,13 @@ narrow search promises more.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import ceil, inf
+from math import ceil, cos, inf, radians
 
 from mdp.cost.cost import weight_of_stairs
+from mdp.cost.footing import Plate, Stance
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
+from mdp.directions.orientation import Orientation, facet_orientations, measure_upright, standing_still
+from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import side_by_side
 from mdp.mesh import Mesh
 from mdp.search.coarse import as_it_is, coarse_copy
@@ -26,7 +28,12 @@ from profiles.profile import Profile
 
 RESTING = 20  # orientations that are ranked, those that a symmetry makes alike counted once
 PRICED = 3  # of them whose bare time is looked at
-CLEARLY = 0.95  # of the cost: estimates are not good enough to turn a model over for less
+# Shares of the cost as a model stands that another way to lie must cost less than: estimates are not good enough for CLEARLY;
+# where it stands less firmly; where the file has it on a flat base; where nothing holds it as it stands.
+CLEARLY, LESS_FIRMLY, FROM_FLAT_BASE, FROM_NO_BASE = 0.95, 0.85, 0.8, 1.1
+ALIKE_BASE = 0.9  # times the share of its shadow that a model stands on; less is a smaller base
+EVEN = 1.02  # times the least cost: of ways to lie that cost hardly more the one with the fewest scars is taken
+NEAR = cos(radians(15.0))  # orientations that differ by less are one
 ALIKE = 1.03  # of the cost: nobody cuts a model for less who may lay it down in one piece
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
@@ -43,13 +50,15 @@ PricingBy = Callable[[Profile], Pricing]
 @dataclass(frozen=True, eq=False)
 class Lying:
     """A model laid down and cut: turned whole by the orientation, None where it stays as it stands; total_mm2: what it costs
-    with its time; standing: the row that is taken of the model as it stands, where that was searched; upright: as it stands."""
+    with its time; standing: the row that is taken of the model as it stands, where that was searched; upright: as it stands;
+    stance: how the plate holds it."""
 
     orientation: Orientation | None
     decomposition: Decomposition
     total_mm2: float
     standing: FrontRow | None
     upright: Orientation
+    stance: Stance
 
 
 def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[[Mesh], Decomposition]) -> Lying:
@@ -67,41 +76,38 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
         turned = glimpse.mesh if copy is None else standing_still(mesh, glimpse.orientation.rotation)
         decomposition = search(turned)
         total = total_mm2(decomposition.chosen, worth)
-        return Lying(glimpse.orientation, decomposition, total, standing, upright.orientation)
+        return Lying(glimpse.orientation, decomposition, total, standing, upright.orientation, glimpse.stance)
 
-    limit_mm2 = _limit_mm2(upright.forecast_mm2, profile)
-    lying = laid(others[0], None) if others and others[0].forecast_mm2 < NO_DOUBT * limit_mm2 else None
-    if lying is not None and lying.total_mm2 < _limit_mm2(upright.hopeful_mm2, profile):
-        return lying
+    sure = next((other for other in others if other.forecast_mm2 < NO_DOUBT * other.limit_mm2(upright.forecast_mm2)), None)
+    tried = [] if sure is None else [(sure, laid(sure, None))]
+    for glimpse, lying in tried:
+        if lying.total_mm2 < glimpse.limit_mm2(upright.hopeful_mm2):
+            return lying
     found = search(mesh)
-    best = Lying(None, found, total_mm2(found.chosen, worth), found.chosen, upright.orientation)
-    if lying is not None:
-        lying = replace(lying, standing=found.chosen)
-    else:
-        near = [glimpse for glimpse in others if glimpse.forecast_mm2 < DOUBT * limit_mm2]
-        likely = _most_promising(near, quick, PROMISING * _limit_mm2(best.total_mm2, profile))
-        if likely is None and len(found.parts) > 1:
-            likely = _whole(others, quick, pricing, ALIKE * best.total_mm2)
-        lying = None if likely is None else laid(likely, found.chosen)
-    return lying if lying is not None and _is_better(lying, best, profile) else best
+    standing = Lying(None, found, total_mm2(found.chosen, worth), found.chosen, upright.orientation, upright.stance)
+    tried = [(glimpse, replace(lying, standing=found.chosen)) for glimpse, lying in tried]
+    if sure is None:
+        near = [other for other in others if other.forecast_mm2 < DOUBT * other.limit_mm2(upright.forecast_mm2)]
+        likely = [_most_promising(near, quick, standing.total_mm2), _whole(others, quick, pricing, standing)]
+        tried = [(glimpse, laid(glimpse, found.chosen)) for glimpse in dict.fromkeys(likely) if glimpse is not None]
+    return _best_of(tried, standing)
 
 
-def _is_better(lying: Lying, standing: Lying, profile: Profile) -> bool:
-    """Whether a model is to lie so instead of as it stands."""
-    whole = len(lying.decomposition.parts) == 1 < len(standing.decomposition.parts)
-    alike = whole and lying.total_mm2 < ALIKE * standing.total_mm2
-    return alike or lying.total_mm2 < _limit_mm2(standing.total_mm2, profile)
-
-
-def _limit_mm2(standing_mm2: float, profile: Profile) -> float:
-    """What another way to lie must cost less than, by what it costs as the model stands."""
-    return min(CLEARLY * standing_mm2, standing_mm2 - profile.search.turning_mm2)
+def _best_of(tried: Sequence[tuple["Glimpse", Lying]], standing: Lying) -> Lying:
+    """Of the ways to lie that cost less than they must the one with the fewest scars of those that cost hardly more than the best
+    one; else as the model stands."""
+    better = [lying for glimpse, lying in tried if lying.total_mm2 < glimpse.limit_of(standing, lying)]
+    least_mm2 = min((lying.total_mm2 for lying in better), default=0.0)
+    even = [lying for lying in better if lying.total_mm2 <= EVEN * least_mm2]
+    return min(even, key=lambda lying: lying.decomposition.cost_mm2, default=standing)
 
 
 @dataclass(frozen=True, eq=False)
 class Glimpse:
     """A model in some orientation: what its time and filament cost without any support, hardly any decomposition less, what it
-    costs in one piece, and after a search, roughly, and where that does well."""
+    costs in one piece, and after a search, roughly, and where that does well; stance: how the plate holds it; share, saving_mm2:
+    of the cost as the model stands, and by how much less than that, it must cost less; whole_share: the same in one piece, where
+    the model as it stands is cut."""
 
     orientation: Orientation
     mesh: Mesh
@@ -109,6 +115,21 @@ class Glimpse:
     whole_mm2: float
     forecast_mm2: float
     hopeful_mm2: float
+    stance: Stance
+    share: float
+    saving_mm2: float
+    whole_share: float
+
+    def limit_mm2(self, standing_mm2: float) -> float:
+        """What it must cost less than, by what the model costs as it stands."""
+        return min(self.share * standing_mm2, standing_mm2 - self.saving_mm2)
+
+    def limit_of(self, standing: Lying, lying: Lying | None = None) -> float:
+        """The same, where the model as it stands is searched; lying: how it is cut in this orientation, None: not at all."""
+        limit_mm2, whole = self.limit_mm2(standing.total_mm2), lying is None or len(lying.decomposition.parts) == 1
+        if whole and len(standing.decomposition.parts) > 1:
+            return max(limit_mm2, self.whole_share * standing.total_mm2)
+        return limit_mm2
 
 
 def glimpses_of(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[Glimpse]:
@@ -118,14 +139,36 @@ def glimpses_of(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[Glimps
     orientations = [upright, *others[:PRICED]]
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation in orientations[1:])]
     prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
-    glimpses = []
+    glimpses, plate = [], Plate.under(mesh, profile)
+    standing = plate.stance(upright, of_file=True)
     for orientation, turned, bare in zip(orientations, meshes, prices, strict=True):
         bare_mm2 = inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm)
         scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
         shares = ((1.0, 1.0), (LEFT, STAIRS_LEFT), (LEAST_LEFT, LEAST_STAIRS_LEFT))
-        costs_mm2 = (bare_mm2 + left * scars_mm2 + stairs_left * stairs_mm2 for left, stairs_left in shares)
-        glimpses.append(Glimpse(orientation, turned, bare_mm2, *costs_mm2))
+        whole_mm2, forecast_mm2, hopeful_mm2 = (
+            bare_mm2 + left * scars_mm2 + stairs_left * stairs_mm2 for left, stairs_left in shares
+        )
+        stance = standing if orientation is upright else plate.stance(orientation)
+        share = _share(standing, stance, _is_broader(orientation, upright))
+        saving_mm2 = profile.search.turning_mm2 if share < 1.0 else -inf
+        whole_share = FROM_NO_BASE if standing == Stance.LOOSE else ALIKE
+        costs_mm2 = bare_mm2, whole_mm2, forecast_mm2, hopeful_mm2
+        glimpses.append(Glimpse(orientation, turned, *costs_mm2, stance, share, saving_mm2, whole_share))
     return glimpses
+
+
+def _is_broader(orientation: Orientation, upright: Orientation) -> bool:
+    """Whether a model stands on a flat base that is broader for its height than that of its file."""
+    return orientation.lean_deg > upright.lean_deg and orientation.standing_share >= ALIKE_BASE * upright.standing_share
+
+
+def _share(standing: Stance, lying: Stance, broader: bool) -> float:
+    """Of the cost as a model stands, which another way to lie must cost less than, by how it stands then and now."""
+    if standing == Stance.FLAT and not (lying == Stance.FLAT and broader):
+        return FROM_FLAT_BASE
+    if lying < Stance.FIRM:
+        return LESS_FIRMLY
+    return FROM_NO_BASE if standing == Stance.LOOSE else CLEARLY
 
 
 def _scar_mm2(worth: Worth) -> float:
@@ -133,22 +176,27 @@ def _scar_mm2(worth: Worth) -> float:
     return 1.0 + worth.second_mm2 * SUPPORT_S_MM2
 
 
-def _most_promising(glimpses: Sequence[Glimpse], profile: Profile, limit_mm2: float) -> Glimpse | None:
-    """The one that costs least after a narrow search; None where none costs less than the limit."""
+def _most_promising(glimpses: Sequence[Glimpse], profile: Profile, standing_mm2: float) -> Glimpse | None:
+    """The one that costs least after a narrow search; None where none costs less than it must."""
     quick, chosen = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
-    more_mm2 = _scar_mm2(Worth.of(profile)) - 1.0
-    for glimpse in [glimpse for glimpse in glimpses if glimpse.bare_mm2 < limit_mm2][:SEARCHED]:
+    more_mm2, least_mm2 = _scar_mm2(Worth.of(profile)) - 1.0, inf
+    able = [glimpse for glimpse in glimpses if glimpse.bare_mm2 < PROMISING * glimpse.limit_mm2(standing_mm2)]
+    for glimpse in able[:SEARCHED]:
         rows = decompose(glimpse.mesh, "", quick).front
         cost_mm2 = glimpse.bare_mm2 + min(row.cost_mm2 + more_mm2 * row.support_area_mm2 for row in rows)
-        if cost_mm2 < limit_mm2:
-            chosen, limit_mm2 = glimpse, cost_mm2
+        if cost_mm2 < min(PROMISING * glimpse.limit_mm2(standing_mm2), least_mm2):
+            chosen, least_mm2 = glimpse, cost_mm2
     return chosen
 
 
-def _whole(glimpses: Sequence[Glimpse], profile: Profile, pricing: PricingBy, limit_mm2: float) -> Glimpse | None:
-    """The one that costs least in one piece, where that is less than the limit."""
+def _whole(glimpses: Sequence[Glimpse], profile: Profile, pricing: PricingBy, standing: Lying) -> Glimpse | None:
+    """The one that costs least in one piece, where that is less than it must cost, or hardly more than several parts of the model
+    as it stands."""
     glimpse = min(glimpses, key=lambda glimpse: glimpse.whole_mm2, default=None)
-    if glimpse is None or glimpse.whole_mm2 > DOUBT * limit_mm2:
+    if glimpse is None:
+        return None
+    limit_mm2 = glimpse.limit_of(standing)
+    if glimpse.whole_mm2 > DOUBT * limit_mm2:
         return None
     problem = Problem(glimpse.mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
     row = price_row(front_row(problem.root), (one_piece(glimpse.mesh, profile.machine),), pricing(profile))
@@ -156,17 +204,23 @@ def _whole(glimpses: Sequence[Glimpse], profile: Profile, pricing: PricingBy, li
 
 
 def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
-    """Up to RESTING orientations in which the model rests, the one that is guessed to cost least first; without as it stands and
-    without those that cannot be told from another one by what needs support, their stairs and their height."""
-    angle_deg = profile.process.self_supporting_angle_deg
-    upright = measure_upright(mesh, angle_deg)
-    resting = resting_orientations(mesh, angle_deg)
-    worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *resting])
-    distinct = [upright]
-    for orientation in sorted(resting, key=_guess(profile)):
-        if not any(_alike(orientation, known, worst_mm2) for known in distinct):
+    """Up to RESTING orientations in which the model rests and the plate holds it, the one that is guessed to cost least first;
+    without as it stands, those near another one, and those that a symmetry makes like another one. A turned body that is most
+    of the model stands or lies along its axis."""
+    angle_deg, revolution, costs_mm2 = profile.process.self_supporting_angle_deg, find_revolution(mesh), _guess(profile)
+    upright, *others = facet_orientations(mesh, angle_deg)
+    others = [other for other in others if revolution is None or revolution.is_square_to(other.rotation[2])]
+    worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
+    distinct, plate = [upright], Plate.under(mesh, profile)
+    loose = plate.stance(upright, of_file=True) == Stance.LOOSE
+    for orientation in sorted(others, key=costs_mm2):
+        if len(distinct) > RESTING:
+            break
+        near = any(float(orientation.rotation[2] @ known.rotation[2]) > NEAR for known in distinct[int(loose) :])
+        alike = near or any(_alike(orientation, known, worst_mm2) for known in distinct)
+        if not alike and plate.stance(orientation) > Stance.LOOSE:
             distinct.append(orientation)
-    return distinct[1 : RESTING + 1]
+    return distinct[1:]
 
 
 def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:

@@ -38,7 +38,7 @@ from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
 from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
-from mdp.sweep.cylinders import bores_of
+from mdp.sweep.cylinders import spoiled_by_cuts
 from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.limbs import LimbGrid, LimbSums, limb_faces, limb_mesh, limb_vertices, sum_limbs
 from mdp.sweep.slivers import sliver_mm
@@ -82,7 +82,7 @@ class Problem:
             solid,
             settings.hidden_seam_share,
             self.zones,
-            cylinders=bores_of(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else (),
+            cylinders=spoiled_by_cuts(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else (),
             feature_weight=settings.feature_weight,
         )
         self.root = self.start = Node(solid, (), self.terms, places)

@@ -14,7 +14,8 @@ from time import perf_counter
 from typing import Any
 
 from mdp.cost.symmetry import find_mirrors
-from mdp.decomposition import Decomposition, FrontRow
+from mdp.decomposition import Decomposition, FrontRow, Part
+from mdp.joint import joints_of, weakest_of
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
@@ -25,7 +26,7 @@ from mdp.ranking.record import Trace
 from mdp.search.beam import Beam, search_limbs
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
-from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
+from mdp.search.front import ASKED, Choice, Demands, Front, Pricing, choose, front_row, pays, price_row, price_rows
 from mdp.search.node import Node
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.polish import make_regular, polish
@@ -116,7 +117,7 @@ def decompose(
         best, front, rounds = _search_beam(problem, ranker_named(ranker), trace, report)
     if on_record is not None and trace is not None:
         on_record(trace.to_bytes())
-    taken = _take(problem, front, best, parts, price)
+    taken = _take(problem, front, best, parts, price, profile)
     notes = (*_notes(problem, taken, parts), *_zone_notes(problem), *_front_note(planned))
     return made_of(problem, taken, Outcome(name, ranker, rounds, problem.evaluated, perf_counter() - began, notes))
 
@@ -136,14 +137,16 @@ def _copy_to_search(mesh: Mesh, profile: Profile, planned: PlanFile, tell: Calla
     return coarse_copy(mesh, profile, planned.zones)
 
 
-def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None) -> Taken:
+def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None, profile: Profile) -> Taken:
     """The decomposition of a front to take: of at most the wanted number of parts, else the one that costs least, with its time
-    where seconds cost anything; best: the one to take where seams cost nothing."""
+    where seconds cost anything; best: the one to take where seams cost nothing. Rows with a joint that the nozzle's push may
+    break get no time, so they are taken only where a person asks for them."""
     nodes, parts_of = front.nodes, cache(partial(make_parts, problem))
     rows = [front_row(node) for node in nodes]
     if price is not None:
-        rows = price_rows(rows, {place: parts_of(nodes[place]) for place, good in enumerate(pays(rows)) if good}, price)
-    choice = choose(rows, problem.worth, problem.settings.most_longer)
+        paying = {place: parts_of(nodes[place]) for place, good in enumerate(pays(rows)) if good}
+        rows = price_rows(rows, {place: parts for place, parts in paying.items() if _is_firm(parts, profile)}, price)
+    choice = choose(rows, problem.worth, Demands.of(problem.settings))
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
@@ -154,6 +157,12 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
         row = price_row(row, parts_of(node), price)
     rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
     return Taken(parts_of(node), tuple(rows), (*_feature_notes(node), *choice.note))
+
+
+def _is_firm(parts: Sequence[Part], profile: Profile) -> bool:
+    """Whether no joint of parts breaks when the nozzle pushes the far end of what it holds."""
+    weakest = weakest_of(joints_of(parts, profile))
+    return weakest is None or weakest.load_n >= profile.search.effective.nozzle_load_n
 
 
 def check_part_count(parts: int) -> None:

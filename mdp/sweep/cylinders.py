@@ -17,6 +17,7 @@ from math import cos, radians
 import numpy as np
 
 from mdp.directions.frame import frame_across
+from mdp.directions.revolution import find_revolution
 from mdp.mesh import Floats, Indices, Ints, Mesh
 from mdp.plane import Plane
 from mdp.topology.components import connected_components
@@ -29,6 +30,7 @@ SAME_RADIUS = 1.25  # greatest ratio of two radii told by edges of one strip: st
 LEAST_ASKEW = 0.05  # sine of some 3 degrees
 TOUCHED_MM = 0.05  # a plane that reaches no further into a cylinder leaves it as it is
 MOST_FACES = 200  # of a strip; one that is cut by other bores has some, a wall or a plate many
+TURNED_MM2 = 2500.0  # of a turned body: one so large counts as a bore does when it is cut askew, a larger one more
 SMOOTH = cos(radians(20.0))  # of the folds between the pieces of a bent pipe, and beside a band of a round surface
 SHORT = 0.15  # of the radius: a hole in a thin sheet is shorter, too, but its rims are sharp
 FEWEST = 4  # edges between strips: fewer are a chamfer or a fillet of three facets
@@ -43,8 +45,8 @@ LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = (
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
-    """A bore or a pin: unit axis (3,), the middle of it (3,), radius, half its length, whether the material lies around it, and
-    (k,) its faces."""
+    """A bore, a pin, or a whole turned body: unit axis (3,), the middle of it (3,), radius, half its length, whether the material
+    lies around it, (k,) its faces, and how many times it counts that it is cut askew."""
 
     axis: Floats
     middle: Floats
@@ -52,6 +54,7 @@ class Cylinder:
     half_mm: float
     is_bore: bool
     faces: Ints
+    weight: float = 1.0
 
     def is_crossed(self, plane: Plane) -> bool:
         """Whether a plane cuts it more askew than a layer would show."""
@@ -70,7 +73,8 @@ class Cylinder:
         >>> Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, 5.0, True, np.zeros(0, np.int32)).in_words
         'a bore of 8 mm'
         """
-        return f"a {'bore' if self.is_bore else 'pin'} of {round(2.0 * self.radius_mm, 1):g} mm"
+        kind = "bore" if self.is_bore else "turned body"
+        return f"a {kind} of {round(2.0 * self.radius_mm, 1):g} mm"
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +90,8 @@ class _Folds:
 
 
 def crossings(cylinders: Sequence[Cylinder], directions: Floats, offsets_mm: Floats) -> Floats:
-    """(k, n) how many cylinders planes at (k, n) offsets along (k, 3) directions cut askew: each counts the sine of the angle
-    between axis and direction, for cut across its axis it stays round.
+    """(k, n) how many cylinders planes at (k, n) offsets along (k, 3) directions cut askew: each counts its weight times the sine
+    of the angle between axis and direction, for cut across its axis it stays round.
 
     >>> upright = Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, 5.0, True, np.zeros(0, np.int32))
     >>> crossings([upright], np.array([[1.0, 0, 0], [0, 0, 1]]), np.array([[3.9, 4.1], [4.9, 5.1]])).tolist()
@@ -98,14 +102,20 @@ def crossings(cylinders: Sequence[Cylinder], directions: Floats, offsets_mm: Flo
         cosines = np.abs(directions @ cylinder.axis)
         sines = np.sqrt(np.maximum(1.0 - cosines * cosines, 0.0))
         reach_mm = cylinder.half_mm * cosines + cylinder.radius_mm * sines - TOUCHED_MM
-        total += (np.abs(offsets_mm - (directions @ cylinder.middle)[:, None]) < reach_mm[:, None]) * sines[:, None]
+        cut = np.abs(offsets_mm - (directions @ cylinder.middle)[:, None]) < reach_mm[:, None]
+        total += cut * (cylinder.weight * sines[:, None])
     return total
 
 
-def bores_of(mesh: Mesh) -> tuple[Cylinder, ...]:
-    """The bores of a closed mesh. Pins are left out: the arms and struts of a model look the same, and those are where it is
-    cut."""
-    return tuple(cylinder for cylinder in find_cylinders(mesh) if cylinder.is_bore)
+def spoiled_by_cuts(mesh: Mesh) -> tuple[Cylinder, ...]:
+    """What cuts of a closed mesh should not pass askew: its bores, and the turned body that is hardly less than all of it. Pins
+    are left out: the arms and struts of a model look the same, and those are where it is cut."""
+    bores = tuple(cylinder for cylinder in find_cylinders(mesh) if cylinder.is_bore)
+    body = find_revolution(mesh)
+    if body is None or not body.is_all:
+        return bores
+    weight = max(body.area_mm2 / TURNED_MM2, 1.0)
+    return (*bores, Cylinder(body.axis, body.middle, body.radius_mm, body.half_mm, False, body.faces, weight))
 
 
 def find_cylinders(mesh: Mesh) -> tuple[Cylinder, ...]:

@@ -1,19 +1,17 @@
-"""Brim and skirt: beads around part 1's first layer on the plate, and how well it holds there."""
+"""Brim and skirt: beads around part 1's first layer on the plate."""
 
 from math import ceil
 
-from mdp.sweep.bending import greatest_stress_per_moment
+from mdp.cost.footing import tips_over
 from profiles.machine import Table
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
-from slicer.geometry.polygons import Polygons, area_mm2, contours, edges, offset, offset_round
+from slicer.geometry.polygons import Polygons, area_mm2, contours, offset, offset_round
 from slicer.paths import Kind
 from slicer.walls.seam import start_at_rear
 
 RANK = -2000  # before all walls; the loops count down from it
 LEAST_MM2 = 1e-3  # areas smaller than this are rounding
-PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
-ADHESION_N_MM2 = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give
 
 
 def brim(
@@ -55,18 +53,3 @@ def plate_outline(table: Table) -> Polygons:
     if table.size_mm is not None:
         return Polygons.square(table.size_mm, True)
     return Polygons.circle(table.radius_mm, 180)
-
-
-def tips_over(base: Polygons, height_mm: float) -> bool:
-    """Whether a push at that height would tear the base off the plate.
-
-    The plate holds the base like glue an upright beam: the greatest tension is push times height over the least section
-    modulus of the base.
-    """
-    modulus = section_modulus_mm3(base)
-    return modulus <= 0.0 or PUSH_N * height_mm / modulus > ADHESION_N_MM2
-
-
-def section_modulus_mm3(base: Polygons) -> float:
-    """Least section modulus of an area over all directions of bending, 0 of an empty one."""
-    return 1.0 / greatest_stress_per_moment(edges(base))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from machine.planning.arrange import Place, places_on_plate
+from mdp.cost.footing import tips_over
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
@@ -13,7 +14,6 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import clean
-from slicer.walls.brim import tips_over
 
 GAP_MM = 5.0  # between copies, or between their brims
 MOST = 1000

@@ -4,11 +4,14 @@ from collections.abc import Sequence
 
 from machine.app.terminal.report import estimates, table
 from machine.quantities import minutes
+from mdp.cost.footing import Stance
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words, side_in_words
-from mdp.search.front import ASKED, BY_PLAN, Worth, choose
+from mdp.search.front import ASKED, BY_PLAN, Demands, Worth, choose
 from mdp.search.laying import Lying
 from profiles.profile import Profile
+
+HARDLY_HELD = "its base may be too small to hold it: give it a wide brim (process.brim_mm) or turn it (process.rotate_deg)"
 
 
 def advice(decomposition: Decomposition, profile: Profile) -> str:
@@ -24,10 +27,11 @@ def advice(decomposition: Decomposition, profile: Profile) -> str:
 
 
 def laid_in_words(lying: Lying, otherwise: str) -> tuple[str, ...]:
-    """How a model was laid down, what that is better by, and how a person has it otherwise; nothing where it stays."""
+    """How a model was laid down, what that is better by, and how a person has it otherwise; nothing where it stays, unless the
+    plate hardly holds it."""
     orientation, standing, laid = lying.orientation, lying.standing, lying.decomposition.chosen
     if orientation is None:
-        return ()
+        return (HARDLY_HELD,) if lying.stance == Stance.LOOSE else ()
     side, turns = side_in_words(orientation), in_words(orientation)
     where, better = f"{side} ({turns})" if side else turns, ""
     if laid is not None:
@@ -51,7 +55,7 @@ def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
     chosen, front = decomposition.chosen, decomposition.front
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen
-    return front[choose(front, Worth.of(profile), profile.search.most_longer).place]
+    return front[choose(front, Worth.of(profile), Demands.of(profile.search)).place]
 
 
 def _without_front(decomposition: Decomposition) -> list[FrontRow]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
-from mdp.search.front import Worth, choose, pays
+from mdp.search.front import Demands, Worth, choose, pays
 from profiles.profile import load
 
 PLANE = Plane(np.array([0.0, 0.0, 1.0]), 5.0)
@@ -25,7 +25,7 @@ def front(*costs_and_times: tuple[float, float | None]) -> list[FrontRow]:
 BUNNY = front((1885.0, 10529.0), (1771.0, 10751.0), (1495.0, 11350.0), (1384.0, 11948.0), (1406.0, None))
 
 
-@pytest.mark.parametrize(("second_mm2", "parts"), [(0.0, 4), (0.1, 4), (0.3, 3), (0.4, 2), (0.6, 1), (100.0, 1)])
+@pytest.mark.parametrize(("second_mm2", "parts"), [(0.0, 4), (0.1, 4), (0.3, 3), (0.45, 3), (0.5, 2), (0.6, 1), (100.0, 1)])
 def test_the_dearer_a_second_the_fewer_the_parts_that_take_long(second_mm2: float, parts: int) -> None:
     assert choose(BUNNY, Worth(second_mm2)).place + 1 == parts
 
@@ -51,18 +51,44 @@ def test_where_only_time_counts_the_fastest_row_that_saves_scars_is_taken(values
     assert (rows[choose(rows, Worth(1e9)).place].time_s or 0.0) - fastest_s <= 1e-3
 
 
-@pytest.mark.parametrize(("most_longer", "parts"), [(0.0, 1), (0.05, 2), (0.1, 3), (0.2, 4)])
-def test_what_takes_much_longer_than_one_piece_is_told_and_not_taken(most_longer: float, parts: int) -> None:
-    choice = choose(BUNNY, Worth(0.1), most_longer)
-    assert choice.place + 1 == parts
-    assert bool(choice.note) == (parts < 4)
+# Three pieces with 100 mm2 of time each; every cut saves 200 mm2 of scars more than the next.
+THREE = front((1000.0, 200.0), (600.0, 200.0), (400.0, 200.0))
 
 
-def test_what_takes_much_more_filament_is_told_and_not_taken_however_fast() -> None:
+@pytest.mark.parametrize(("least_saving", "parts"), [(0.0, 3), (0.18, 3), (0.19, 2), (0.36, 2), (0.37, 1)])
+def test_every_further_part_saves_at_least_that_share_of_the_cost_of_one_piece(least_saving: float, parts: int) -> None:
+    assert choose(THREE, Worth(0.5), Demands(least_saving=least_saving)).place + 1 == parts
+
+
+@pytest.mark.parametrize(("most_left", "parts"), [(1.0, 3), (0.6, 3), (0.4, 3), (0.39, 1)])
+def test_cuts_leave_at_most_that_share_of_the_scars_of_support(most_left: float, parts: int) -> None:
+    assert choose(THREE, Worth(0.5), Demands(most_left=most_left)).place + 1 == parts
+
+
+def test_stairs_are_no_support_that_cuts_take_away() -> None:
+    rows = [replace(row, stairs_mm2=300.0) for row in THREE]  # 700, 300 and 100 mm2 of support
+    assert [choose(rows, Worth(0.5), Demands(most_left=left)).place + 1 for left in (0.5, 0.15, 0.14)] == [3, 3, 1]
+
+
+def test_of_rows_that_leave_few_scars_the_one_is_taken_that_costs_least() -> None:
+    assert choose(THREE, Worth(0.5), Demands(least_saving=0.19, most_left=0.5)).place + 1 == 3
+    assert choose(THREE, Worth(0.5), Demands(least_saving=0.19, most_left=0.6)).place + 1 == 2
+
+
+def test_the_reason_names_the_demand_that_more_parts_do_not_meet() -> None:
+    assert (
+        choose(THREE, Worth(0.5), Demands(most_left=0.3)).reason
+        == "cuts would leave more than 30% of the support, their seams counted"
+    )
+    assert choose(THREE, Worth(0.5), Demands(least_saving=0.19)).reason == "more parts would save less than 19% each"
+
+
+def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:
+    choice = choose(THREE, Worth(0.5), Demands(most_left=0.3))
+    assert choice.note == ("3 parts would save 600 mm2 of scars with 2 more cuts: --parts 3",)
     rows = front((1000.0, 900.0), (500.0, 800.0))
     rows = [replace(row, filament_mm=filament_mm) for row, filament_mm in zip(rows, (10_000.0, 12_000.0), strict=True)]
-    choice = choose(rows, Worth(0.5), 0.05)
-    assert choice.place == 0
+    choice = choose(rows, Worth(0.5), Demands(most_left=0.3))
     assert choice.note == ("2 parts would save 500 mm2 of scars but take 2.0 m more filament: --parts 2",)
 
 

@@ -3,13 +3,16 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.cut import mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import measure_upright, side_in_words, standing_still
 from mdp.mesh import Mesh
 from mdp.pose import about
+from mdp.search import laying
 from mdp.search.front import Price, Pricing, Worth
 from mdp.search.laying import Lying, distinct_orientations, glimpses_of, lay_down, total_mm2
 from mdp.search.search import decompose
@@ -141,3 +144,30 @@ def test_the_side_that_a_model_lies_on_has_a_name() -> None:
     assert side_in_words(measure_upright(tee(), 45.0)) == "as it stands"
     sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}
     assert sides <= {"on its front", "on its back", "on its left side", "on its right side", "upside down"}
+
+
+def test_another_facet_near_that_of_the_file_or_of_another_way_is_none() -> None:
+    barrel = mesh_of(m3.Manifold.cylinder(40.0, 10.0, 10.0, 48))  # its sides are facets 7.5 degrees apart
+    assert [side_in_words(orientation) != "" for orientation in distinct_orientations(barrel, PROFILE)] == [True]
+
+
+def test_a_file_on_a_flat_base_is_turned_only_for_a_fifth_of_its_cost() -> None:
+    tower = m3.Manifold.cube((40.0, 40.0, 10.0), True).translate((0.0, 0.0, 5.0)) + m3.Manifold.cube((8.0, 8.0, 30.0))
+    _, *others = glimpses_of(mesh_of(tower), PROFILE, by_height)
+    assert [other.limit_mm2(1000.0) for other in others] == [800.0] * len(others) != []
+
+
+def test_a_slab_on_its_edge_is_laid_down_for_less() -> None:
+    _, *others = glimpses_of(box(40, 8, 40), PROFILE, by_height)
+    assert others[0].limit_mm2(1000.0) == 950.0
+
+
+def test_a_turned_body_stands_or_lies_along_its_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+    cup = mesh_of(m3.CrossSection([[(0.0, 0.0), (8.0, 0.0), (20.0, 30.0), (0.0, 30.0)]]).revolve(24))
+
+    def heights() -> set[float]:
+        return {round(abs(float(orientation.rotation[2, 2])), 3) for orientation in distinct_orientations(cup, PROFILE)}
+
+    assert heights() <= {0.0, 1.0}
+    monkeypatch.setattr(laying, "find_revolution", lambda mesh: None)
+    assert not heights() <= {0.0, 1.0}  # on its slanted side

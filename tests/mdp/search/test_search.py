@@ -276,7 +276,7 @@ def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best() -> No
     twin, front = replace(first), Front(problem.start)
     front.offer(first)
     front.offer(twin)
-    (chosen,) = (row for row in _take(problem, front, twin, None, None).front if row.chosen)
+    (chosen,) = (row for row in _take(problem, front, twin, None, None, profile).front if row.chosen)
     assert chosen.cost_mm2 == first.cost_mm2
 
 

@@ -6,11 +6,11 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mdp.cost.footing import section_modulus_mm3, tips_over
 from mdp.mesh import Mesh
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
-from slicer.walls.brim import section_modulus_mm3, tips_over
 from tests.shapes import box, tee
 from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
 

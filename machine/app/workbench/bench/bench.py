@@ -18,7 +18,7 @@ from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
 from mdp.overhang import UP
 from mdp.plans.plan_file import PlanFile, PlannedPart, planned_row
-from mdp.search.front import Worth, choose, pays
+from mdp.search.front import Demands, Worth, choose, pays
 from mdp.zone import NO_ZONES, Zones
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
@@ -217,9 +217,19 @@ def _placing(bench: Bench, factor: float = 1.0) -> Placing:
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """The front of a search, cut by the row that it has chosen."""
+    """The front of a search, cut by the row that it has chosen. A limb may be named by another point there than it was before."""
     chosen = next(row for row in rows if row.chosen)
-    return with_cuts(replace(bench, rows=tuple(rows), recommended=chosen.parts), parts_of(chosen))
+    parts = parts_of(chosen)
+    names = {before: part for before in bench.cuts or () for part in parts if _is_same_cut(before, part)}
+    cuts, locked = (tuple(names.get(part, part) for part in several) for several in (bench.cuts or (), bench.locked))
+    named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked))
+    return with_cuts(named, parts)
+
+
+def _is_same_cut(part: PlannedPart, other: PlannedPart) -> bool:
+    """Whether two parts have the same plane and the same number of limbs above it."""
+    same_plane = (part.normal, part.offset_mm) == (other.normal, other.offset_mm)
+    return same_plane and len(part.limbs_mm) == len(other.limbs_mm)
 
 
 def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:
@@ -265,7 +275,7 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
     ]
     if not bench.recommended:
         return replace(bench, rows=tuple(rows), priced=True)
-    choice = choose(rows, Worth.of(bench.profile), bench.profile.search.most_longer)
+    choice = choose(rows, Worth.of(bench.profile), Demands.of(bench.profile.search))
     marked = [
         replace(row, chosen=number == choice.place, reason=choice.reason if number == choice.place else "")
         for number, row in enumerate(rows)

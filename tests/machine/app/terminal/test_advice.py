@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from machine.app.terminal.advice import advice, laid_in_words
+from mdp.cost.footing import Stance
 from mdp.decomposition import FrontRow
 from mdp.directions.orientation import best_orientation, measure_upright
 from mdp.plane import Plane
@@ -37,15 +38,22 @@ def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
 def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> None:
     lying = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
     side, upright = best_orientation(tee(), 45.0), measure_upright(tee(), 45.0)
-    assert laid_in_words(Lying(side, lying, 900.0, CUT, upright), "--as-is keeps it so") == (
+    assert laid_in_words(Lying(side, lying, 900.0, CUT, upright, Stance.FIRM), "--as-is keeps it so") == (
         "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands in 3 parts with"
         " 78 mm2 of scars in 1h 0m; --as-is keeps it so",
     )
-    assert laid_in_words(Lying(side, lying, 900.0, None, upright), "--as-is keeps it so") == (
+    assert laid_in_words(Lying(side, lying, 900.0, None, upright, Stance.FIRM), "--as-is keeps it so") == (
         "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands 300 mm2 hang"
         " over; --as-is keeps it so",
     )
-    assert laid_in_words(Lying(None, lying, 900.0, WHOLE, upright), "--as-is keeps it so") == ()
+    assert laid_in_words(Lying(None, lying, 900.0, WHOLE, upright, Stance.HELD), "--as-is keeps it so") == ()
+
+
+def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
+    lying = Lying(None, alone(tee(), 300.0), 900.0, WHOLE, measure_upright(tee(), 45.0), Stance.LOOSE)
+    assert laid_in_words(lying, "--as-is keeps it so") == (
+        "its base may be too small to hold it: give it a wide brim (process.brim_mm) or turn it (process.rotate_deg)",
+    )
 
 
 def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:

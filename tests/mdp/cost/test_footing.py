@@ -1,0 +1,84 @@
+"""Footing: what the plate holds, by the closed formulas of a glued beam."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.cost.footing import Plate, Stance, measure_footing
+from mdp.cut import mesh_of
+from mdp.directions.orientation import measure_upright
+from profiles.profile import load
+
+UPRIGHT = np.eye(3)
+
+
+def rod(radius_mm: float, height_mm: float) -> m3.Manifold:
+    return m3.Manifold.cylinder(height_mm, radius_mm, radius_mm, 512)
+
+
+def test_the_tension_under_a_rod_is_that_of_a_push_at_its_top_less_its_weight() -> None:
+    """1 N at 60 mm bends pi r^3 / 4; the weight of pi r^2 h of 1.24 g/cm3 presses on pi r^2."""
+    found = measure_footing(rod(5.0, 60.0), np.array([0.0, 0.0, 30.0]), UPRIGHT, 5.0, 1.24)
+    pressed_mpa = 60.0 * 1.24e-6 * 9.81
+    assert found.area_mm2 == pytest.approx(np.pi * 25.0, rel=1e-3)
+    assert found.outline_mm == pytest.approx(np.pi * 10.0, rel=1e-3)
+    assert found.tension_mpa == pytest.approx(60.0 / (np.pi * 125.0 / 4.0) - pressed_mpa, rel=1e-3)
+    assert found.tension_with_brim_mpa == pytest.approx(60.0 / (np.pi * 1000.0 / 4.0) - pressed_mpa / 4.0, rel=1e-2)
+    assert (found.holds, found.holds_with_brim) == (False, True)
+
+
+def test_a_weight_beside_the_contact_bends_it_too() -> None:
+    straight, leaning = (measure_footing(rod(5.0, 60.0), np.array([x, 0.0, 30.0]), UPRIGHT, 0.0, 1.24) for x in (0.0, 40.0))
+    weight_n = np.pi * 25.0 * 60.0 * 1.24e-6 * 9.81
+    assert leaning.tension_mpa - straight.tension_mpa == pytest.approx(weight_n * 40.0 / (np.pi * 125.0 / 4.0), rel=1e-3)
+
+
+def test_a_point_holds_nothing_without_a_brim() -> None:
+    cone = m3.Manifold.cylinder(40.0, 0.001, 20.0, 64)
+    found = measure_footing(cone, np.array([0.0, 0.0, 30.0]), UPRIGHT, 0.0, 1.24)
+    assert not found.holds
+    assert not found.holds_with_brim
+
+
+def test_a_solid_is_measured_as_it_is_turned() -> None:
+    plate = m3.Manifold.cube((40.0, 30.0, 4.0), True)
+    on_edge = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    assert measure_footing(plate, np.zeros(3), UPRIGHT, 0.0, 1.24).area_mm2 == pytest.approx(1200.0)
+    assert measure_footing(plate, np.zeros(3), on_edge, 0.0, 1.24).area_mm2 == pytest.approx(120.0)
+
+
+def stance_of(solid: m3.Manifold, of_file: bool = False) -> Stance:
+    mesh = mesh_of(solid.translate((0.0, 0.0, -solid.bounding_box()[2])))
+    return Plate.under(mesh, load()).stance(measure_upright(mesh, 45.0), of_file)
+
+
+def table(legs_mm: float) -> m3.Manifold:
+    """A plate of 60 x 60 mm on four square legs of 40 mm."""
+    legs = [m3.Manifold.cube((legs_mm, legs_mm, 41.0), True).translate((x, y, 20.5)) for x in (-27, 27) for y in (-27, 27)]
+    return m3.Manifold.batch_boolean(
+        [m3.Manifold.cube((60.0, 60.0, 4.0), True).translate((0.0, 0.0, 42.0)), *legs], m3.OpType.Add
+    )
+
+
+def balanced(radius_mm: float, aside_mm: float) -> m3.Manifold:
+    """A slab of 30 x 30 x 10 mm that stands on a rod of 40 mm, so far from the slab's middle."""
+    return rod(radius_mm, 41.0) + m3.Manifold.cube((30.0, 30.0, 10.0), True).translate((aside_mm, 0.0, 45.0))
+
+
+def test_a_model_on_a_fifth_of_its_shadow_stands_on_a_flat_base() -> None:
+    assert stance_of(m3.Manifold.cube((20.0, 20.0, 20.0))) == Stance.FLAT
+    assert stance_of(balanced(8.0, 0.0)) == Stance.FLAT  # 201 of 900 mm2
+
+
+def test_a_table_on_its_legs_stands_firmly_unless_they_are_thin() -> None:
+    assert stance_of(table(8.0)) == Stance.FIRM  # 256 of 3600 mm2
+    assert stance_of(table(3.0)) == Stance.HELD  # 36 mm2: four such legs hold, and no more
+
+
+def test_what_leans_out_over_its_base_is_held_as_far_as_glue_and_brim_reach() -> None:
+    assert stance_of(balanced(5.0, 3.0)) == Stance.HELD  # 79 of 900 mm2, the weight over the edge of the rod
+    assert stance_of(balanced(5.0, 14.0)) == Stance.LOOSE
+
+
+def test_a_point_is_no_base_and_the_file_is_believed_no_further_than_it_stands() -> None:
+    assert stance_of(m3.Manifold.cylinder(40.0, 0.01, 20.0, 64), of_file=True) == Stance.LOOSE
