@@ -10,6 +10,7 @@ from machine.app.workbench.bench.bench import STANDING, Bench, History, Step, pl
 from machine.app.workbench.bench.changes import lay, stand, take, turn
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
+from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import changed, model
@@ -97,3 +98,11 @@ def test_a_plan_has_the_planes_in_print_order() -> None:
 def test_what_cannot_be_done_is_one_sentence(change: Any, asked: dict[str, Any], said: str) -> None:
     with pytest.raises(PlanError, match=said):
         changed(history(), change, **asked)
+
+
+def test_a_locked_limb_stays_locked_where_a_search_names_it_by_another_point() -> None:
+    clicked = PlannedPart((0.0, 0.0, 1.0), 12.0, limbs_mm=((30.0, 8.0, 14.0),))
+    bench = replace(Bench(PROFILE, model()), cuts=(clicked,), locked=frozenset({clicked}))
+    limb = Plane(np.array([0.0, 0.0, 1.0]), 12.0, np.array([[33.0, 17.0, 36.0]]))
+    searched = with_front(bench, (FrontRow((), 500.0, 0.0, 500.0), FrontRow((limb,), 100.0, 40.0, 140.0, chosen=True)))
+    assert searched.locked == frozenset(searched.cuts or ()) == {PlannedPart.of(limb)}
