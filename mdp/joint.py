@@ -14,11 +14,13 @@ from manifold3d import CrossSection
 from mdp.cost.footing import section_edges
 from mdp.cut import Solid, mesh_of, solid_of
 from mdp.decomposition import Part
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Mesh
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
 from profiles.profile import Profile
 
 BESIDE_MM = 0.02  # of a base plane sections are taken: on it they would be those of a face
+# Of the square of a model's longest side: the convex hull of a cut through a neck or the root of a limb is smaller.
+BULK = 0.2
 TOUCHING_MM2 = 0.01  # sections that share less only meet in an edge
 
 
@@ -69,6 +71,23 @@ def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
 def weakest_of(joints: Sequence[Joint]) -> Joint | None:
     """The joint that breaks first; None where there is none."""
     return min(joints, key=lambda joint: joint.load_n, default=None)
+
+
+def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile) -> bool:
+    """Whether no joint of a model's parts breaks when the nozzle pushes the far end of what it holds, and no cut passes through
+    the bulk of the model, where its seam runs round all that one sees of it; always on the paper's terms, which know neither."""
+    search = profile.search.effective
+    if search.seam_mm <= 0.0:
+        return True
+    weakest, most_mm2 = weakest_of(joints_of(parts, profile)), BULK * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
+    firm = weakest is None or weakest.load_n >= search.strength_safety * search.nozzle_load_n
+    return firm and all(_base_hull_mm2(part) <= most_mm2 for part in parts[1:])
+
+
+def _base_hull_mm2(part: Part) -> float:
+    """The area of the convex hull of what a part stands on, of the largest of its pieces."""
+    pieces = _in_frame(solid_of(part.mesh), part).slice(BESIDE_MM).decompose()
+    return max((piece.hull().area() for piece in pieces), default=0.0)
 
 
 def _joint(pieces: Sequence[_Piece], number: int, strength_mpa: float) -> Joint:

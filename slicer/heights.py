@@ -49,7 +49,8 @@ def layer_heights(
     """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
 
     A pedestal is sliced for itself and ends pedestal_gap_mm below the model. A layer ends in each of the limb planes: heights,
-    lowest first, at which the part goes on beside limbs that are printed later. Raises SliceError as equal_heights().
+    lowest first, at which the part goes on beside limbs that are printed later; but for planes less than a layer from the
+    top or from the one below. Raises SliceError as equal_heights().
     """
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
     roof_mm, bottom, heights = pedestal_mm - process.pedestal_gap_mm, _bottom(process, on_platform), NO_LAYERS

@@ -79,6 +79,8 @@ def sheet(model: Path, out: Path, settings: list[str]) -> str:
 def verdicts_of(file: Path) -> dict[str, str]:
     """The verdicts of a file by sheet."""
     rows = [row for row in csv.reader(file.read_text().splitlines()) if len(row) > 1 and row[1].strip() in VERDICTS]
+    if not rows:
+        raise SystemExit(f"{file}: no line with one of the verdicts {', '.join(VERDICTS)}")
     return {row[0].strip().removesuffix(".png"): row[1].strip() for row in rows}
 
 

@@ -31,11 +31,9 @@ BROAD_DEG = 15.0  # by which a model on a broad stance may be leaned
 
 @dataclass(frozen=True)
 class Footing:
-    """The contact of a print with the plate: its area, the length of its outline, and the greatest tension in it under the
-    nozzle's push and the weight, alone and with a brim."""
+    """The contact of a print with the plate: the greatest tension in it under the nozzle's push and the weight, alone and with a
+    brim."""
 
-    area_mm2: float
-    outline_mm: float
     tension_mpa: float
     tension_with_brim_mpa: float
 
@@ -59,9 +57,7 @@ def measure_footing(solid: Solid, centre: Floats, rotation: Floats, brim_mm: flo
     brim = contact.offset(brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS) if brim_mm > 0.0 else contact
     weight_n, middle = 1e-3 * density_g_cm3 * solid.volume() * NEWTON_PER_G, (rotation @ centre)[:2]
     tensions = [_tension_mpa(section_edges(area), bounds[5] - bounds[2], weight_n, middle) for area in (contact, brim)]
-    edges = section_edges(contact)
-    outline_mm = float(np.linalg.norm(edges[:, 2:] - edges[:, :2], axis=1).sum())
-    return Footing(contact.area(), outline_mm, *tensions)
+    return Footing(*tensions)
 
 
 class Stance(IntEnum):

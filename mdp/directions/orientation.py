@@ -249,11 +249,13 @@ def side_in_words(orientation: Orientation) -> str:
     return faces[side] if float(np.dot(down, side)) >= cos(radians(LYING_DEG)) else ""
 
 
-def in_words(orientation: Orientation) -> str:
-    """How the model is turned, in the order process.rotate_deg takes, and whether it needs holding."""
+def in_words(orientation: Orientation, held: bool = False) -> str:
+    """How the model is turned, in the order process.rotate_deg takes, and whether it needs holding; held: the plate holds it."""
     turns = [(_angle(angle), axis) for angle, axis in zip(orientation.turns_deg, "xy", strict=True)]
     words = ", then ".join(f"{angle} about {axis}" for angle, axis in turns if angle != "0")
-    return (f"turned {words}" if words else "as it stands") + ("" if orientation.stable else ", rests nowhere without a raft")
+    return (f"turned {words}" if words else "as it stands") + (
+        "" if held or orientation.stable else ", rests nowhere without a raft"
+    )
 
 
 def _angle(value_deg: float) -> str:

@@ -65,9 +65,9 @@ def find_revolution(mesh: Mesh) -> Revolution | None:
         return None
     through = np.cross(axis, moment)
     faces = np.flatnonzero(_fits(points, normals, axis, moment)).astype(np.int32)
-    along = (mesh.vertices[mesh.faces[faces]].reshape(-1, 3) - centre) @ axis
-    beside = points[faces] - through
-    radii = np.linalg.norm(beside - (beside @ axis)[:, None] * axis, axis=1)
+    corners = mesh.vertices[mesh.faces[faces]] - centre - through
+    along = corners @ axis
+    radii = np.linalg.norm(corners - along[..., None] * axis, axis=2).max(axis=1)
     order = np.argsort(radii, kind="stable")
     most = np.searchsorted(np.cumsum(areas[faces][order]), BESIDE_HANDLES * float(areas[faces].sum()))
     middle = centre + through + 0.5 * (along.min() + along.max()) * axis

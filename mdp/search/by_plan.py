@@ -6,6 +6,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from mdp.decomposition import Decomposition, FrontRow, Part
+from mdp.joint import is_sound
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
 from mdp.plans.plan_file import PlanFile, PlannedRow, planned_row
@@ -53,7 +54,7 @@ def cut_by_plan(
     rows[len(node.cuts)] = replace(front_row(node), chosen=True, reason=BY_PLAN)
     cut_parts, front = make_parts(problem, node), [rows[count] for count in sorted(rows)]
     if price is not None:
-        front = _priced(problem, plan, front, cut_parts, price)
+        front = _priced(problem, plan, front, cut_parts, price, profile)
     notes = fewer_parts(parts, len(plan.parts) + 1, f"the plan {plan.name} holds")
     outcome = Outcome(name, ranker, 0, problem.evaluated, perf_counter() - began, notes)
     return made_of(problem, Taken(cut_parts, tuple(front)), outcome)
@@ -75,9 +76,14 @@ def _front_row(row: PlannedRow) -> FrontRow:
 
 
 def _priced(
-    problem: Problem, plan: PlanFile, rows: Sequence[FrontRow], chosen_parts: tuple[Part, ...], price: Pricing
+    problem: Problem,
+    plan: PlanFile,
+    rows: Sequence[FrontRow],
+    chosen_parts: tuple[Part, ...],
+    price: Pricing,
+    profile: Profile,
 ) -> list[FrontRow]:
-    """The rows of a plan's front with their prices, those that cannot be cut again as they are."""
+    """The rows of a plan's front with their prices, those that cannot be cut again or are not sound as they are."""
     planned = {len(row.parts) + 1: row.parts for row in plan.front}
     parts: dict[int, Sequence[Part]] = {}
     for place, (row, good) in enumerate(zip(rows, pays(rows), strict=True)):
@@ -86,4 +92,5 @@ def _priced(
                 parts[place] = chosen_parts
             elif good:
                 parts[place] = make_parts(problem, cut_by_hand(problem, replace(plan, parts=planned[row.parts])))
-    return price_rows(rows, parts, price)
+    sound = {place: of_row for place, of_row in parts.items() if rows[place].chosen or is_sound(problem.mesh, of_row, profile)}
+    return price_rows(rows, sound, price)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 
 import numpy as np
 
@@ -28,6 +29,7 @@ class Price:
 
 ASKED, BY_PLAN = "asked for", "by the plan"
 LEAST_PARTS = "the fewest parts, cost alike to the least"
+PRINTABLE = "the least cost of what can be printed well"
 Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 
 
@@ -173,29 +175,34 @@ def choose(rows: Sequence[FrontRow], worth: Worth, demands: Demands = Demands())
     """The row whose cost, with its time and filament and a charge for every part, is least, of the first and those that meet the
     demands beside it. rows: by their number of parts; worth: what time and filament count.
 
-    Where any row has a time, those without cannot be printed. Where none has, or where time counts nothing, the fewest parts
-    are taken whose cost is alike to the least.
+    Where any row has a time, those without cannot be printed well. Where none has, nothing is demanded; there, and where time
+    counts nothing, the fewest parts are taken whose cost is alike to the least. A first row of several parts is a person's
+    choice: beside it cuts may leave what they like.
     """
-    places = [place for place, good in enumerate(pays(rows)) if good]
-    places = [place for place in places if rows[place].time_s is not None] or places
-    scars = places[_first_alike([rows[place].cost_mm2 for place in places])]
-    reason = "the least cost" if rows[scars].cost_mm2 <= min(row.cost_mm2 for row in rows) else LEAST_PARTS
-    if not worth or all(rows[place].time_s is None for place in places):
-        return Choice(scars, reason)
-    totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
-    first, limit_mm2 = places[0], demands.most_left * _unlike_stairs_mm2(rows[places[0]])
-    charge_mm2 = demands.least_saving * totals[first]
+    paying = [place for place, good in enumerate(pays(rows)) if good]
+    timed = [place for place in paying if rows[place].time_s is not None]
+    places, first = timed or paying, (timed or paying)[0]
+    limit_mm2 = inf if rows[0].parts > 1 or not timed else demands.most_left * _unlike_stairs_mm2(rows[0])
     allowed = [place for place in places if place == first or _unlike_stairs_mm2(rows[place]) <= limit_mm2]
-    taken = min(allowed, key=lambda place: totals[place] + charge_mm2 * (rows[place].parts - rows[first].parts))
-    if taken == scars:
-        return Choice(taken, reason)
-    if totals[taken] <= min(totals.values()):
+    totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
+    charge_mm2 = demands.least_saving * totals[first]
+    if worth and timed:
+        taken = min(allowed, key=lambda place: totals[place] + charge_mm2 * (rows[place].parts - rows[first].parts))
+    else:
+        taken = allowed[_first_alike([rows[place].cost_mm2 for place in allowed])]
+    scars = places[_first_alike([rows[place].cost_mm2 for place in places])]
+    least_mm2 = min(row.cost_mm2 for row in rows)
+    if rows[taken].cost_mm2 <= least_mm2:
+        reason = "the least cost"
+    elif taken == scars:
+        reason = LEAST_PARTS if min(rows[place].cost_mm2 for place in places) <= least_mm2 else PRINTABLE
+    elif totals[taken] <= min(totals.values()):
         reason = "the least cost with its time"
     elif taken == first and len(allowed) == 1:
         reason = f"cuts would leave more than {demands.most_left:.0%} of the support, their seams counted"
     else:
         reason = f"more parts would save less than {demands.least_saving:.0%} each"
-    return Choice(taken, reason, _given_up(rows[scars], rows[taken]))
+    return Choice(taken, reason, _given_up(rows[scars], rows[taken]) if taken != scars else ())
 
 
 def _unlike_stairs_mm2(row: FrontRow) -> float:

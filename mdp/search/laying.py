@@ -94,12 +94,14 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
 
 
 def _best_of(tried: Sequence[tuple["Glimpse", Lying]], standing: Lying) -> Lying:
-    """Of the ways to lie that cost less than they must the one with the fewest scars of those that cost hardly more than the best
-    one; else as the model stands."""
+    """The way to lie with the fewest scars, of those that cost less than they must, and hardly more than the best of them; as the
+    model stands where it costs hardly more, too, or where there are none."""
     better = [lying for glimpse, lying in tried if lying.total_mm2 < glimpse.limit_of(standing, lying)]
-    least_mm2 = min((lying.total_mm2 for lying in better), default=0.0)
-    even = [lying for lying in better if lying.total_mm2 <= EVEN * least_mm2]
-    return min(even, key=lambda lying: lying.decomposition.cost_mm2, default=standing)
+    if not better:
+        return standing
+    most_mm2 = EVEN * min(lying.total_mm2 for lying in better)
+    even = [lying for lying in (*better, standing) if lying.total_mm2 <= most_mm2]
+    return min(even, key=lambda lying: round(lying.decomposition.cost_mm2, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,9 +218,11 @@ def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
     for orientation in sorted(others, key=costs_mm2):
         if len(distinct) > RESTING:
             break
-        near = any(float(orientation.rotation[2] @ known.rotation[2]) > NEAR for known in distinct[int(loose) :])
-        alike = near or any(_alike(orientation, known, worst_mm2) for known in distinct)
-        if not alike and plate.stance(orientation) > Stance.LOOSE:
+        known = distinct[int(loose) :]  # nothing is too near to a way in which the model would come off
+        near = any(float(orientation.rotation[2] @ other.rotation[2]) > NEAR for other in known)
+        if near or any(_alike(orientation, other, worst_mm2) for other in known):
+            continue
+        if plate.stance(orientation) > Stance.LOOSE:
             distinct.append(orientation)
     return distinct[1:]
 

@@ -14,8 +14,8 @@ from time import perf_counter
 from typing import Any
 
 from mdp.cost.symmetry import find_mirrors
-from mdp.decomposition import Decomposition, FrontRow, Part
-from mdp.joint import joints_of, weakest_of
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.joint import is_sound
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
@@ -139,13 +139,14 @@ def _copy_to_search(mesh: Mesh, profile: Profile, planned: PlanFile, tell: Calla
 
 def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None, profile: Profile) -> Taken:
     """The decomposition of a front to take: of at most the wanted number of parts, else the one that costs least, with its time
-    where seconds cost anything; best: the one to take where seams cost nothing. Rows with a joint that the nozzle's push may
-    break get no time, so they are taken only where a person asks for them."""
+    where seconds cost anything; best: the one to take where seams cost nothing. Rows that are not sound get no time, so they are
+    taken only where a person asks for them."""
     nodes, parts_of = front.nodes, cache(partial(make_parts, problem))
     rows = [front_row(node) for node in nodes]
     if price is not None:
         paying = {place: parts_of(nodes[place]) for place, good in enumerate(pays(rows)) if good}
-        rows = price_rows(rows, {place: parts for place, parts in paying.items() if _is_firm(parts, profile)}, price)
+        sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, profile)}
+        rows = price_rows(rows, sound, price)
     choice = choose(rows, problem.worth, Demands.of(problem.settings))
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
@@ -157,12 +158,6 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
         row = price_row(row, parts_of(node), price)
     rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
     return Taken(parts_of(node), tuple(rows), (*_feature_notes(node), *choice.note))
-
-
-def _is_firm(parts: Sequence[Part], profile: Profile) -> bool:
-    """Whether no joint of parts breaks when the nozzle pushes the far end of what it holds."""
-    weakest = weakest_of(joints_of(parts, profile))
-    return weakest is None or weakest.load_n >= profile.search.effective.nozzle_load_n
 
 
 def check_part_count(parts: int) -> None:

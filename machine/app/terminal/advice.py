@@ -11,7 +11,7 @@ from mdp.search.front import ASKED, BY_PLAN, Demands, Worth, choose
 from mdp.search.laying import Lying
 from profiles.profile import Profile
 
-HARDLY_HELD = "its base may be too small to hold it: give it a wide brim (process.brim_mm) or turn it (process.rotate_deg)"
+HARDLY_HELD = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
 
 
 def advice(decomposition: Decomposition, profile: Profile) -> str:
@@ -32,7 +32,7 @@ def laid_in_words(lying: Lying, otherwise: str) -> tuple[str, ...]:
     orientation, standing, laid = lying.orientation, lying.standing, lying.decomposition.chosen
     if orientation is None:
         return (HARDLY_HELD,) if lying.stance == Stance.LOOSE else ()
-    side, turns = side_in_words(orientation), in_words(orientation)
+    side, turns = side_in_words(orientation), in_words(orientation, held=True)
     where, better = f"{side} ({turns})" if side else turns, ""
     if laid is not None:
         was = f"{lying.upright.risky_mm2:.0f} mm2 hang over" if standing is None else _with_scars(standing)

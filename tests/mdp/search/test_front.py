@@ -130,3 +130,22 @@ def test_of_two_rows_that_take_as_long_the_one_with_less_filament_is_taken_where
         for row, filament_mm in zip(front((100.0, 60.0), (90.0, 60.0)), (4e3, 5e3), strict=True)
     ]
     assert [choose(rows, Worth(0.5, filament_mm2)).place for filament_mm2 in (0.0, 0.05)] == [1, 0]
+
+
+def test_a_row_without_a_time_is_said_to_be_no_choice() -> None:
+    assert choose(front((200.0, 900.0), (100.0, None)), Worth(1.0)).reason == "the least cost of what can be printed well"
+
+
+def test_beside_a_persons_own_planes_cuts_may_leave_what_they_like() -> None:
+    rows = [replace(row, planes=(PLANE,) * (count + 2)) for count, row in enumerate(THREE)]
+    assert choose(rows, Worth(0.5), Demands(most_left=0.1)).place == 2
+
+
+def test_the_share_that_may_be_left_is_of_one_piece_even_where_that_cannot_be_printed() -> None:
+    rows = front((1000.0, None), (400.0, 10.0), (200.0, 10.0))
+    assert choose(rows, Worth(0.5), Demands(most_left=0.25)).place == 2
+
+
+def test_where_time_counts_nothing_cuts_must_take_the_support_away_all_the_same() -> None:
+    assert choose(THREE, Worth(0.0), Demands(most_left=0.3)).place == 0
+    assert choose(THREE, Worth(0.0), Demands(most_left=0.4)).place == 2

@@ -7,6 +7,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.cost.footing import Stance
 from mdp.cut import mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import measure_upright, side_in_words, standing_still
@@ -144,6 +145,14 @@ def test_the_side_that_a_model_lies_on_has_a_name() -> None:
     assert side_in_words(measure_upright(tee(), 45.0)) == "as it stands"
     sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}
     assert sides <= {"on its front", "on its back", "on its left side", "on its right side", "upside down"}
+
+
+def test_a_cone_on_its_point_is_set_on_its_base_though_nothing_else_tells_the_two_apart() -> None:
+    cone = mesh_of(m3.Manifold.cylinder(40.0, 0.01, 12.0, 64))
+    lying = laid_down(cone)
+    assert lying.orientation is not None
+    assert lying.orientation.rotation[2] == pytest.approx([0, 0, -1], abs=1e-6)
+    assert (lying.stance, lying.upright.risky_mm2) == (Stance.FLAT, 0.0)
 
 
 def test_another_facet_near_that_of_the_file_or_of_another_way_is_none() -> None:

@@ -1,14 +1,16 @@
 import io
+from collections.abc import Sequence
 from concurrent.futures import Future, wait
 from dataclasses import replace
 from itertools import product
 from typing import Any
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
 from mdp.clearance import least_tip_height_mm
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.overhang import facing_down
@@ -16,7 +18,7 @@ from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.ranking.candidates import directions
 from mdp.ranking.features import COLUMNS
-from mdp.search.front import Front
+from mdp.search.front import Front, Price
 from mdp.search.parts import folded_mm3
 from mdp.search.problem import Problem
 from mdp.search.search import Progress, _take, decompose
@@ -287,3 +289,18 @@ def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_
     told.clear()
     decompose(shapes.box(10.0, 10.0, 10.0), "box", load(), on_stage=lambda progress: told.append(progress.stage))
     assert told == []
+
+
+def test_a_cut_through_the_bulk_of_a_model_is_made_only_on_demand() -> None:
+    """A thick lying slab with an overhanging rim all round is cut at its waist, which is as wide as it is."""
+    slab = m3.Manifold.cube((40.0, 40.0, 30.0), True).translate((0.0, 0.0, 15.0))
+    rimmed = slab + m3.Manifold.cube((60.0, 60.0, 30.0), True).translate((0.0, 0.0, 45.0))
+    profile = load(settings=["search.directions=60", "search.most_left=1", "search.clearance=false"])
+
+    def price(parts: Sequence[Part]) -> Price:
+        return Price(10.0 * len(parts), 100.0)
+
+    chosen = decompose(shapes.from_manifold(rimmed), "rimmed", profile, price=price)
+    assert len(chosen.parts) == 1
+    asked = decompose(shapes.from_manifold(rimmed), "rimmed", profile, price=price, parts=2)
+    assert len(asked.parts) == 2

@@ -220,7 +220,12 @@ def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
     """The front of a search, cut by the row that it has chosen. A limb may be named by another point there than it was before."""
     chosen = next(row for row in rows if row.chosen)
     parts = parts_of(chosen)
-    names = {before: part for before in bench.cuts or () for part in parts if _is_same_cut(before, part)}
+    names, left = {}, list(parts)
+    for before in bench.cuts or ():
+        same = [part for part in left if _is_same_cut(before, part)]
+        if same:
+            names[before] = before if before in same else same[0]
+            left.remove(names[before])
     cuts, locked = (tuple(names.get(part, part) for part in several) for several in (bench.cuts or (), bench.locked))
     named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked))
     return with_cuts(named, parts)

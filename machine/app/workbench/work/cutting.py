@@ -16,6 +16,7 @@ from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan
 from machine.app.workbench.work.processes import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import standing_still
+from mdp.joint import is_sound
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
@@ -103,10 +104,11 @@ def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ..
 
 
 def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
-    """A row of the front on the bench with its time and plastic; as it is where it cannot be cut any more."""
+    """A row of the front on the bench with its time and plastic; as it is where it cannot be cut any more, or is not sound."""
     row = bench.rows[number]
     with suppress(PlanError):
-        return cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts_of(row), front=()), prices=True).front[0]
+        cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts_of(row), front=()), prices=True)
+        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile) else row
     return row
 
 

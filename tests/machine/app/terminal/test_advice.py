@@ -52,7 +52,7 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
 def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
     lying = Lying(None, alone(tee(), 300.0), 900.0, WHOLE, measure_upright(tee(), 45.0), Stance.LOOSE)
     assert laid_in_words(lying, "--as-is keeps it so") == (
-        "its base may be too small to hold it: give it a wide brim (process.brim_mm) or turn it (process.rotate_deg)",
+        "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)",
     )
 
 

@@ -106,3 +106,11 @@ def test_a_locked_limb_stays_locked_where_a_search_names_it_by_another_point() -
     limb = Plane(np.array([0.0, 0.0, 1.0]), 12.0, np.array([[33.0, 17.0, 36.0]]))
     searched = with_front(bench, (FrontRow((), 500.0, 0.0, 500.0), FrontRow((limb,), 100.0, 40.0, 140.0, chosen=True)))
     assert searched.locked == frozenset(searched.cuts or ()) == {PlannedPart.of(limb)}
+
+
+def test_two_locked_limbs_of_one_plane_stay_locked_both() -> None:
+    clicked = tuple(PlannedPart((0.0, 0.0, 1.0), 12.0, limbs_mm=((x, 8.0, 14.0),)) for x in (30.0, -30.0))
+    bench = replace(Bench(PROFILE, model()), cuts=clicked, locked=frozenset(clicked))
+    limbs = tuple(Plane(np.array([0.0, 0.0, 1.0]), 12.0, np.array([[x, 17.0, 36.0]])) for x in (-33.0, 33.0))
+    searched = with_front(bench, (FrontRow((), 500.0, 0.0, 500.0), FrontRow(limbs, 100.0, 40.0, 140.0, chosen=True)))
+    assert searched.locked == frozenset(map(PlannedPart.of, limbs))
