@@ -170,7 +170,8 @@ def _share(standing: Stance, lying: Stance, broader: bool) -> float:
         return FROM_FLAT_BASE
     if lying < Stance.FIRM:
         return LESS_FIRMLY
-    return FROM_NO_BASE if standing == Stance.LOOSE else CLEARLY
+    shaky = standing == Stance.LOOSE or (standing == Stance.HELD and lying == Stance.FLAT)
+    return FROM_NO_BASE if shaky else CLEARLY
 
 
 def _scar_mm2(worth: Worth) -> float:

@@ -24,7 +24,7 @@ def firefox(bench: Running) -> Iterator[Firefox]:
     with Firefox((900, 560)) as running:
         running.open(bench.address)
         running.wait("document.documentElement.dataset.line === 'open' && document.documentElement.dataset.busy === ''")
-        choose(running, "tee.stl", stl(tee(8.0, 24.0, 24.0)))
+        choose(running, "tee.stl", stl(tee(6.0, 24.0, 24.0)))
         running.wait("document.documentElement.dataset.shown && $('title').textContent === 'tee.stl'")
         yield running
 
@@ -61,7 +61,7 @@ def undo(firefox: Firefox, before: str) -> None:
 def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) -> None:
     drawn = "document.documentElement.dataset.state === 'ready'"
     assert firefox.value(drawn) is (XVFB is not None)
-    assert "24.0 × 8.0 × 24.0 mm" in firefox.value("$('model-told').textContent")
+    assert "24.0 × 6.0 × 24.0 mm" in firefox.value("$('model-told').textContent")
     standing = firefox.value("$('overhang').textContent")
     firefox.wait("$('resting').children.length > 1")
     firefox.click("#resting button")

@@ -166,6 +166,14 @@ def test_a_file_on_a_flat_base_is_turned_only_for_a_fifth_of_its_cost() -> None:
     assert [other.limit_mm2(1000.0) for other in others] == [800.0] * len(others) != []
 
 
+def test_a_wheel_that_is_hardly_held_on_its_rim_may_cost_more_on_its_face() -> None:
+    wheel = m3.Manifold.cylinder(12.0, 60.0, 60.0, 64) + m3.Manifold.cylinder(32.0, 20.0, 20.0, 64)  # a hub on one side
+    on_its_rim = wheel.rotate((90.0, 0.0, 0.0)).translate((0.0, 0.0, 60.0))
+    upright, *others = glimpses_of(mesh_of(on_its_rim), PROFILE, by_height)
+    assert upright.stance == Stance.HELD
+    assert {other.limit_mm2(1000.0) for other in others if other.stance == Stance.FLAT} == {1100.0}
+
+
 def test_a_slab_on_its_edge_is_laid_down_for_less() -> None:
     _, *others = glimpses_of(box(40, 8, 40), PROFILE, by_height)
     assert others[0].limit_mm2(1000.0) == 950.0
