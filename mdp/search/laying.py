@@ -94,14 +94,14 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
 
 
 def _best_of(tried: Sequence[tuple["Glimpse", Lying]], standing: Lying) -> Lying:
-    """The way to lie with the fewest scars, of those that cost less than they must, and hardly more than the best of them; as the
-    model stands where it costs hardly more, too, or where there are none."""
+    """The way to lie on a flat base, then with the fewest scars, of those that cost less than they must, and hardly more than the
+    best of them; as the model stands where it costs hardly more or less than that, or where there are none."""
     better = [lying for glimpse, lying in tried if lying.total_mm2 < glimpse.limit_of(standing, lying)]
     if not better:
         return standing
-    most_mm2 = EVEN * min(lying.total_mm2 for lying in better)
-    even = [lying for lying in (*better, standing) if lying.total_mm2 <= most_mm2]
-    return min(even, key=lambda lying: round(lying.decomposition.cost_mm2, 3))
+    least_mm2 = min(lying.total_mm2 for lying in better)
+    even = [lying for lying in (*better, standing) if least_mm2 / EVEN <= lying.total_mm2 <= EVEN * least_mm2]
+    return min(even, key=lambda lying: (lying.stance != Stance.FLAT, round(lying.decomposition.cost_mm2, 3)))
 
 
 @dataclass(frozen=True, eq=False)
