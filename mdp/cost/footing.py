@@ -29,35 +29,16 @@ FIRM_BASE, FIRM_LEANING_BASE, FLAT_BASE = 0.05, 0.12, 0.2
 BROAD_DEG = 15.0  # by which a model on a broad stance may be leaned
 
 
-@dataclass(frozen=True)
-class Footing:
-    """The contact of a print with the plate: the greatest tension in it under the nozzle's push and the weight, alone and with a
-    brim."""
-
-    tension_mpa: float
-    tension_with_brim_mpa: float
-
-    @property
-    def holds(self) -> bool:
-        """Whether the contact holds without a brim."""
-        return self.tension_mpa <= ADHESION_MPA
-
-    @property
-    def holds_with_brim(self) -> bool:
-        """Whether the contact holds with a brim around it."""
-        return self.tension_with_brim_mpa <= ADHESION_MPA
-
-
-def measure_footing(solid: Solid, centre: Floats, rotation: Floats, brim_mm: float, density_g_cm3: float) -> Footing:
-    """The footing of a solid that is turned by a rotation (3, 3) and set on the plate. centre (3,): its centre of mass; brim_mm:
-    the width of the brim; density_g_cm3: as if it were printed solid."""
+def plate_tension_mpa(solid: Solid, centre: Floats, rotation: Floats, brim_mm: float, density_g_cm3: float) -> float:
+    """The greatest tension under a solid that is turned by a rotation (3, 3) and set on the plate. centre (3,): its centre of
+    mass; brim_mm: the width of the brim around its contact; density_g_cm3: as if it were printed solid."""
     turned = solid.transform(np.column_stack([rotation, np.zeros(3)]))
     bounds = turned.bounding_box()
     contact = turned.slice(bounds[2] + 0.5 * PLATFORM_TOLERANCE_MM)
-    brim = contact.offset(brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS) if brim_mm > 0.0 else contact
-    weight_n, middle = 1e-3 * density_g_cm3 * solid.volume() * NEWTON_PER_G, (rotation @ centre)[:2]
-    tensions = [_tension_mpa(section_edges(area), bounds[5] - bounds[2], weight_n, middle) for area in (contact, brim)]
-    return Footing(*tensions)
+    if brim_mm > 0.0:
+        contact = contact.offset(brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS)
+    weight_n = 1e-3 * density_g_cm3 * solid.volume() * NEWTON_PER_G
+    return _tension_mpa(section_edges(contact), bounds[5] - bounds[2], weight_n, (rotation @ centre)[:2])
 
 
 class Stance(IntEnum):
@@ -93,13 +74,16 @@ class Plate:
         based = share >= least and lean_deg >= -LEAN_DEG
         if not (stable or based):
             return Stance.LOOSE
-        footing = measure_footing(self.solid, self.centre, orientation.rotation, self.brim_mm, self.density_g_cm3)
-        if not (stable and footing.holds) and not (based and footing.holds_with_brim):
+        if not (stable and self._holds(orientation, 0.0)) and not (based and self._holds(orientation, self.brim_mm)):
             return Stance.LOOSE
         if stable and share >= FLAT_BASE:
             return Stance.FLAT
         firm = share >= (FIRM_BASE if stable else FIRM_LEANING_BASE) or (based and lean_deg >= BROAD_DEG)
         return Stance.FIRM if firm else Stance.HELD
+
+    def _holds(self, orientation: Orientation, brim_mm: float) -> bool:
+        """Whether the plate holds the model in an orientation with such a brim."""
+        return plate_tension_mpa(self.solid, self.centre, orientation.rotation, brim_mm, self.density_g_cm3) <= ADHESION_MPA
 
 
 def tips_over(base: CrossSection, height_mm: float) -> bool:

@@ -13,7 +13,6 @@ from mdp.kernels.processes import side_by_side
 from mdp.search.node import Node
 from mdp.sweep.limbs import limb_faces
 from profiles.profile import Profile
-from profiles.search import Search
 
 # Costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams.
 EQUAL = 0.01
@@ -157,35 +156,23 @@ class Choice:
     note: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Demands:
-    """What cuts must bring to be made. least_saving: what every further part must save, as a share of the cost of one piece with
-    its time; most_left: how much support and seams may scar together, as a share of what support scars in one piece."""
+def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0, most_left: float = 1.0) -> Choice:
+    """The row whose cost, with its time and filament and a charge for every further part, is least. rows: by their number of
+    parts.
 
-    least_saving: float = 0.0
-    most_left: float = 1.0
-
-    @classmethod
-    def of(cls, search: Search) -> "Demands":
-        """What cuts must bring by the settings of a search."""
-        return cls(search.least_saving, search.most_left)
-
-
-def choose(rows: Sequence[FrontRow], worth: Worth, demands: Demands = Demands()) -> Choice:
-    """The row whose cost, with its time and filament and a charge for every part, is least, of the first and those that meet the
-    demands beside it. rows: by their number of parts; worth: what time and filament count.
-
-    Where any row has a time, those without cannot be printed well. Where none has, nothing is demanded; there, and where time
-    counts nothing, the fewest parts are taken whose cost is alike to the least. A first row of several parts is a person's
-    choice: beside it cuts may leave what they like.
+    worth: what time and filament count. least_saving: the charge, as a share of what the first row costs with its time.
+    most_left: how much support and seams may scar together in any but the first row, as a share of what support scars in one
+    piece. Where any row has a time, those without cannot be printed well. Where none has, most_left does not hold; there, and
+    where time counts nothing, the row of the fewest parts is taken whose cost is alike to the least. A first row of several
+    parts is a person's own choice: beside it most_left does not hold either.
     """
     paying = [place for place, good in enumerate(pays(rows)) if good]
     timed = [place for place in paying if rows[place].time_s is not None]
     places, first = timed or paying, (timed or paying)[0]
-    limit_mm2 = inf if rows[0].parts > 1 or not timed else demands.most_left * _unlike_stairs_mm2(rows[0])
+    limit_mm2 = inf if rows[0].parts > 1 or not timed else most_left * _unlike_stairs_mm2(rows[0])
     allowed = [place for place in places if place == first or _unlike_stairs_mm2(rows[place]) <= limit_mm2]
     totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
-    charge_mm2 = demands.least_saving * totals[first]
+    charge_mm2 = least_saving * totals[first]
     if worth and timed:
         taken = min(allowed, key=lambda place: totals[place] + charge_mm2 * (rows[place].parts - rows[first].parts))
     else:
@@ -198,10 +185,10 @@ def choose(rows: Sequence[FrontRow], worth: Worth, demands: Demands = Demands())
         reason = LEAST_PARTS if min(rows[place].cost_mm2 for place in places) <= least_mm2 else PRINTABLE
     elif totals[taken] <= min(totals.values()):
         reason = "the least cost with its time"
-    elif taken == first and len(allowed) == 1:
-        reason = f"cuts would leave more than {demands.most_left:.0%} of the support, their seams counted"
+    elif scars not in allowed:
+        reason = f"cuts would leave more than {most_left:.0%} of the support, their seams counted"
     else:
-        reason = f"more parts would save less than {demands.least_saving:.0%} each"
+        reason = f"more parts would save less than {least_saving:.0%} each"
     return Choice(taken, reason, _given_up(rows[scars], rows[taken]) if taken != scars else ())
 
 

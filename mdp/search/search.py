@@ -26,7 +26,7 @@ from mdp.ranking.record import Trace
 from mdp.search.beam import Beam, search_limbs
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
-from mdp.search.front import ASKED, Choice, Demands, Front, Pricing, choose, front_row, pays, price_row, price_rows
+from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
 from mdp.search.node import Node
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.polish import make_regular, polish
@@ -147,7 +147,7 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
         paying = {place: parts_of(nodes[place]) for place, good in enumerate(pays(rows)) if good}
         sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, profile)}
         rows = price_rows(rows, sound, price)
-    choice = choose(rows, problem.worth, Demands.of(problem.settings))
+    choice = choose(rows, problem.worth, problem.settings.least_saving, problem.settings.most_left)
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:

@@ -7,7 +7,7 @@ from machine.quantities import minutes
 from mdp.cost.footing import Stance
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words, side_in_words
-from mdp.search.front import ASKED, BY_PLAN, Demands, Worth, choose
+from mdp.search.front import ASKED, BY_PLAN, Worth, choose
 from mdp.search.laying import Lying
 from profiles.profile import Profile
 
@@ -55,7 +55,8 @@ def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
     chosen, front = decomposition.chosen, decomposition.front
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen
-    return front[choose(front, Worth.of(profile), Demands.of(profile.search)).place]
+    search = profile.search
+    return front[choose(front, Worth.of(profile), search.least_saving, search.most_left).place]
 
 
 def _without_front(decomposition: Decomposition) -> list[FrontRow]:

@@ -18,7 +18,7 @@ from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
 from mdp.overhang import UP
 from mdp.plans.plan_file import PlanFile, PlannedPart, planned_row
-from mdp.search.front import Demands, Worth, choose, pays
+from mdp.search.front import Worth, choose, pays
 from mdp.zone import NO_ZONES, Zones
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
@@ -280,7 +280,8 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
     ]
     if not bench.recommended:
         return replace(bench, rows=tuple(rows), priced=True)
-    choice = choose(rows, Worth.of(bench.profile), Demands.of(bench.profile.search))
+    search = bench.profile.search
+    choice = choose(rows, Worth.of(bench.profile), search.least_saving, search.most_left)
     marked = [
         replace(row, chosen=number == choice.place, reason=choice.reason if number == choice.place else "")
         for number, row in enumerate(rows)
