@@ -91,8 +91,9 @@ def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[
     """Chosen faces seen from above, (3, 2) counter-clockwise where they look down, by the layers whose strip of the surface they
     belong to."""
     corners = mesh.vertices[mesh.faces[chosen]]
-    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1))
-    last = np.minimum(np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1)), len(cuts_mm) - 1)
+    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1), side="right")  # a section is what lies just below its plane
+    last = np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1))
+    last = np.minimum(np.maximum(last, first), len(cuts_mm) - 1)
     faces: dict[int, list[Floats]] = {}
     for corner, a, b in zip(np.ascontiguousarray(corners[:, ::-1, :2]), first.tolist(), last.tolist(), strict=True):
         for layer in range(a, b + 1):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats, Mesh
 from profiles.errors import SliceError
-from slicer.geometry.cross_section import cross_sections
+from slicer.geometry.cross_section import cross_sections, faces_by_layer
 from slicer.geometry.polygons import CLOSING_MM, area_mm2, clean, contours
 from tests.shapes import ball, bowl, box, from_manifold, hollow
 from tests.slicer.hand import profile, shared
@@ -124,3 +124,10 @@ def test_cleaning_reaches_over_the_section_by_no_more_than_a_twentieth_of_a_line
     closed = m3.CrossSection(clean(contours(block)).to_polygons()).area() == pytest.approx(100.0, abs=0.01)
     assert closed == (slit_mm < 2.0 * CLOSING_MM)
     assert 0.05 * profile().process.line_width_mm >= CLOSING_MM
+
+
+def test_a_level_face_in_a_cutting_plane_belongs_to_the_layer_that_has_what_lies_above_it() -> None:
+    cap = from_manifold(m3.Manifold.cube((20.0, 20.0, 5.0)).translate((0.0, 0.0, 10.0)))
+    cuts, down = np.array([8.0, 10.0, 12.0]), cap.normals[:, 2] < -0.9
+    first = next(layer for layer, loops in enumerate(cross_sections(cap, cuts)) if area(loops) > 0.0)
+    assert list(faces_by_layer(cap, cuts, down)) == [first] == [2]
