@@ -49,8 +49,8 @@ def layer_heights(
     """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
 
     A pedestal is sliced for itself and ends pedestal_gap_mm below the model. A layer ends in each of the limb planes: heights,
-    lowest first, at which the part goes on beside limbs that are printed later; but for planes less than a layer from the
-    top or from the one below. Raises SliceError as equal_heights().
+    lowest first, at which the part goes on beside limbs that are printed later; but for planes less than the least layer
+    from the top or from the one below. Raises SliceError as equal_heights().
     """
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
     roof_mm, bottom, heights = pedestal_mm - process.pedestal_gap_mm, _bottom(process, on_platform), NO_LAYERS
@@ -58,7 +58,7 @@ def layer_heights(
         heights = equal_heights(roof_mm, process, True, nozzle_mm)
         bottom = _Bottom(pedestal_mm, process.first_layer_height_mm)
     for plane_mm in limb_planes_mm:
-        if plane_mm - bottom.from_mm >= bottom.first_mm and top_mm - plane_mm >= process.layer_height_mm:
+        if min(plane_mm - bottom.from_mm, top_mm - plane_mm) >= process.least_layer_height_mm:
             heights += _heights_from(mesh, plane_mm, process, nozzle_mm, bottom)
             bottom = _Bottom(plane_mm, process.layer_height_mm)
     return heights + _heights_from(mesh, top_mm, process, nozzle_mm, bottom)

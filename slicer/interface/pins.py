@@ -52,12 +52,13 @@ def plan_pins(parts: Sequence[Part], profile: Profile) -> Pins:
     planned: dict[int, tuple[Pin, ...]] = {}
     for k, part in enumerate(parts):
         cut = [(upper, planned[upper.index]) for upper in parts[:k] if planned.get(upper.index)]
-        planned[part.index] = tuple(_pins_of(part, parts[:k], cut, profile)) if part.index in wanted else ()
+        planned[part.index] = tuple(_pins_of(part, parts, cut, profile)) if part.index in wanted else ()
     return planned
 
 
-def _pins_of(part: Part, earlier: Sequence[Part], cut: Sequence[tuple[Part, Sequence[Pin]]], profile: Profile) -> Iterator[Pin]:
-    """The pins of a part. cut: the pins that are there already, and the parts that fill them."""
+def _pins_of(part: Part, parts: Sequence[Part], cut: Sequence[tuple[Part, Sequence[Pin]]], profile: Profile) -> Iterator[Pin]:
+    """The pins of one of all parts. cut: the pins that are there already, and the parts that fill them."""
+    earlier = [other for other in parts if other.index < part.index]
     process, wide_mm = profile.of_part(part.index).process, pin_width_mm(profile.of_part(part.index))
     base = clean(cross_sections(part.in_part_frame(), np.array([BELOW_MM]))[0])
     middles = np.zeros((0, 2))
@@ -77,7 +78,7 @@ def _pins_of(part: Part, earlier: Sequence[Part], cut: Sequence[tuple[Part, Sequ
         for x, y in _places(room, process):
             if not len(middles) or np.hypot(*(middles - (x, y)).T).min() >= least_spacing_mm(process, wide_mm):
                 middles = np.vstack([middles, [x, y]])
-                heights = heights or _heights_of(lower, below, part)
+                heights = heights or _heights_of(lower, below, parts)
                 hole = mesh_of(_hole(x, y, wide_mm, -process.pin_depth_mm, 0.0))
                 yield Pin(x, y, _taken_mm3(hole.transform(*frame_change(part, lower)), heights))
 
@@ -153,9 +154,10 @@ def _holes(pins: Sequence[Pin], profile: Profile) -> Mesh:
     return mesh_of(m3.Manifold.compose([_hole(pin.x_mm, pin.y_mm, wide_mm, -depth_mm, MOUTH_MM) for pin in pins]))
 
 
-def _heights_of(part: Part, profile: Profile, later: Part) -> Heights:
+def _heights_of(part: Part, profile: Profile, parts: Sequence[Part]) -> Heights:
+    later = [other for other in parts if other.index > part.index]
     pedestal_mm = profile.search.pedestal_mm if part.index == 1 else 0.0
-    return layer_heights(part.in_part_frame(), profile, part.index == 1, pedestal_mm, limb_planes_mm(part, [later]))
+    return layer_heights(part.in_part_frame(), profile, part.index == 1, pedestal_mm, limb_planes_mm(part, later))
 
 
 def _taken_mm3(hole: Mesh, heights: Heights) -> float:

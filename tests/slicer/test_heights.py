@@ -88,12 +88,22 @@ def test_neither_a_pedestal_nor_what_stands_on_it_has_a_layer_too_thin(pedestal:
     assert at.tip_mm[-1] == pytest.approx(pedestal + model, abs=1e-6)
 
 
-@given(st.lists(st.floats(0.5, 29.0), max_size=3, unique=True), st.sampled_from([0.1, 0.2, 0.3]))
-def test_a_layer_ends_in_every_plane_from_which_a_limb_is_printed(planes_mm: list[float], layer_mm: float) -> None:
-    planes_mm = [z for k, z in enumerate(sorted(planes_mm)) if k == 0 or z - sorted(planes_mm)[k - 1] > 1.0]
-    profile = load(settings=[f"process.layer_height_mm={layer_mm}", "process.first_layer_height_mm=0.3"])
-    heights = layer_heights(box(9, 9, 30), profile, True, limb_planes_mm=planes_mm)
-    for z in [*planes_mm, 30.0]:
+@given(
+    st.lists(st.floats(0.5, 29.0), max_size=4, unique=True),
+    st.sampled_from([0.1, 0.2, 0.3]),
+    st.sampled_from([0.0, 0.05]),
+    st.booleans(),
+)
+def test_a_layer_ends_in_every_plane_from_which_a_limb_is_printed(
+    planes_mm: list[float], layer_mm: float, cusp_mm: float, on_platform: bool
+) -> None:
+    settings = [f"process.layer_height_mm={layer_mm}", "process.first_layer_height_mm=0.3", f"process.adaptive_cusp_mm={cusp_mm}"]
+    profile = load(settings=settings)
+    least, apart = profile.process.least_layer_height_mm, list[float]()
+    for z in sorted(planes_mm):
+        apart += [z] if not apart or z - apart[-1] >= least else []
+    heights = layer_heights(box(9, 9, 30), profile, on_platform, limb_planes_mm=apart)
+    for z in [*apart, 30.0]:
         assert np.abs(heights.tip_mm - z).min() < 1e-9
     assert heights.bottom_mm[1:] == pytest.approx(heights.tip_mm[:-1])
-    assert heights.height_mm.max() <= 1.25 * max(layer_mm, 0.3) + 1e-9
+    assert heights.height_mm.min() >= 0.99 * min(least, heights.height_mm[0])
