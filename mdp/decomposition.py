@@ -56,7 +56,8 @@ class FrontRow:
     """A decomposition: its planes in the order of the cuts, and what it costs.
 
     seam_mm: length of the rims of all cuts; stairs_mm2: what the stairs of all parts count in the cost; time_s, filament_mm:
-    estimates, None where there is none; reason: why it is chosen."""
+    estimates, None where there is none; reason: why it is chosen; sound: whether its joints bear the nozzle's push and no cut
+    passes through the bulk of the model."""
 
     planes: tuple[Plane, ...]
     support_area_mm2: float
@@ -67,6 +68,7 @@ class FrontRow:
     filament_mm: float | None = None
     reason: str = ""
     stairs_mm2: float = 0.0
+    sound: bool = True
 
     @property
     def parts(self) -> int:

@@ -27,7 +27,7 @@ STEPS_OF_MM = 0.2  # search.stair_weight is that of layers so high
 @dataclass(frozen=True, eq=False)
 class SeamPlaces:
     """Where on a model seams cost how much. by_source: (m,) how much a mm of rim counts on each of the model's faces; zones: of
-    the search; where they want no seam it counts NO_SEAM_WEIGHT times; cylinders: its bores."""
+    the search; where they want no seam it counts NO_SEAM_WEIGHT times; cylinders: its bores and turned body."""
 
     surface: ModelSurface
     by_source: Floats
@@ -56,7 +56,7 @@ class SeamPlaces:
         return cls(surface, by_source, zones, cylinders)
 
     def cylinders_of(self, piece: Piece) -> tuple[Cylinder, ...]:
-        """The bores of which cuts have left something."""
+        """The bores and the turned body of which cuts have left something."""
         left = np.unique(piece.sources) if self.cylinders else piece.sources[:0]
         return tuple(cylinder for cylinder in self.cylinders if np.isin(cylinder.faces, left, assume_unique=True).any())
 

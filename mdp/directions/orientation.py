@@ -45,7 +45,7 @@ class Orientation:
 
     @property
     def stable(self) -> bool:
-        """Whether it rests without tipping over when it is leaned a little."""
+        """Whether it stays upright when it is tilted slightly."""
         return self.lean_deg >= LEAN_DEG
 
     @property

@@ -92,5 +92,6 @@ def _priced(
                 parts[place] = chosen_parts
             elif good:
                 parts[place] = make_parts(problem, cut_by_hand(problem, replace(plan, parts=planned[row.parts])))
-    sound = {place: of_row for place, of_row in parts.items() if rows[place].chosen or is_sound(problem.mesh, of_row, profile)}
-    return price_rows(rows, sound, price)
+    sound = {place for place, of_row in parts.items() if is_sound(problem.mesh, of_row, profile)}
+    rows = [replace(row, sound=place in sound or place not in parts) for place, row in enumerate(rows)]
+    return price_rows(rows, {place: parts[place] for place in parts if place in sound or rows[place].chosen}, price)

@@ -162,14 +162,15 @@ def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0, mo
 
     worth: what time and filament count. least_saving: the charge, as a share of what the first row costs with its time.
     most_left: how much support and seams may scar together in any but the first row, as a share of what support scars in one
-    piece. Where any row has a time, those without cannot be printed well. Where none has, most_left does not hold; there, and
-    where time counts nothing, the row of the fewest parts is taken whose cost is alike to the least. A first row of several
-    parts is a person's own choice: beside it most_left does not hold either.
+    piece. Where any row has a time, those without cannot be printed, and those that are not sound are not taken. Where none
+    has, and where time counts nothing, as without support, there is no charge and no limit: the row of the fewest parts is taken
+    whose cost is alike to the least. A first row of several parts is a person's own choice: beside it there is no limit either.
     """
-    paying = [place for place, good in enumerate(pays(rows)) if good]
+    paying = [place for place, good in enumerate(pays(rows)) if good and (place == 0 or rows[place].sound)]
     timed = [place for place in paying if rows[place].time_s is not None]
     places, first = timed or paying, (timed or paying)[0]
-    limit_mm2 = inf if rows[0].parts > 1 or not timed else most_left * _unlike_stairs_mm2(rows[0])
+    free = rows[0].parts > 1 or not timed or not worth
+    limit_mm2 = inf if free else most_left * _unlike_stairs_mm2(rows[0])
     allowed = [place for place in places if place == first or _unlike_stairs_mm2(rows[place]) <= limit_mm2]
     totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
     charge_mm2 = least_saving * totals[first]

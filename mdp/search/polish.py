@@ -119,12 +119,15 @@ def _pair(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
 
 
 def _image(mirror: Mirror, plane: Plane, vertices: Floats) -> Plane:
-    """A plane's mirror image; its limbs are named by the vertices nearest to the images of their points."""
+    """A plane's mirror image; its limbs are named by the vertices above it that are nearest to the images of their points."""
     image = mirror.image(plane)
     if image.limbs_mm is None:
         return image
-    nearest = [int(np.argmin(np.linalg.norm(vertices - point, axis=1))) for point in image.limbs_mm]
-    return replace(image, limbs_mm=vertices[nearest])
+    above = vertices[image.heights_mm(vertices) > 0.0]
+    if len(above) == 0:
+        return image
+    nearest = [int(np.argmin(np.linalg.norm(above - point, axis=1))) for point in image.limbs_mm]
+    return replace(image, limbs_mm=above[nearest])
 
 
 def _drop_cuts(problem: Problem, best: Chain) -> Chain:

@@ -232,7 +232,7 @@ def _spread_down(highest_first: NDArray[np.int64], heights: Floats, rings: Rings
 
 
 def cylinders_cut(remainder: Remainder, cylinders: tuple[Cylinder, ...], plane: Plane) -> tuple[Cylinder, ...]:
-    """Those of some bores that have a face in what a plane cuts off."""
+    """Those of some cylinders that have a face in what a plane cuts off."""
     if plane.limbs_mm is None or not cylinders:
         return cylinders
     sources = np.unique(remainder.sources[limb_faces(remainder, plane)])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mdp.cut import Solid, mesh_of
 from mdp.decomposition import Part
-from mdp.joint import Joint, joints_of, weakest_of
+from mdp.joint import Joint, is_sound, joints_of, weakest_of
 from mdp.mesh import Floats
 from tests.slicer.hand import cut, profile
 
@@ -105,3 +105,25 @@ def test_one_piece_has_no_joint() -> None:
     parts: list[Part] = cut(mesh_of(m3.Manifold.cube((5.0, 5.0, 5.0))))
     assert joints_of(parts, PROFILE) == ()
     assert weakest_of(()) is None
+
+
+def sound(solid: Solid, *planes: tuple[Sequence[float], float], **search: float) -> bool:
+    own = PROFILE.model_copy(update={"search": PROFILE.search.model_copy(update=search)})
+    mesh = mesh_of(solid)
+    return is_sound(mesh, cut(mesh, *planes), own)
+
+
+def test_parts_are_sound_while_their_weakest_joint_bears_the_nozzle_with_the_safety_asked_for() -> None:
+    post, plane = m3.Manifold.cube((4.0, 6.0, 40.0), True), (UP, -10.0)
+    (joint,) = joints(post, plane)
+    for push_n, safety, holds in ((0.99, 1.0, True), (1.01, 1.0, False), (0.5, 1.9, True), (0.5, 2.1, False)):
+        assert sound(post, plane, nozzle_load_n=push_n * joint.load_n, strength_safety=safety) is holds
+
+
+@pytest.mark.parametrize(("side_mm", "holds"), [(8.0, True), (17.8, True), (18.0, False), (40.0, False)])
+def test_a_cut_through_more_than_a_fifth_of_the_square_of_the_longest_side_is_not_sound(side_mm: float, holds: bool) -> None:
+    assert sound(m3.Manifold.cube((side_mm, side_mm, 40.0), True), (UP, 0.0)) is holds
+
+
+def test_the_papers_terms_know_no_unsound_parts() -> None:
+    assert sound(m3.Manifold.cube((40.0, 40.0, 40.0), True), (UP, 0.0), seam_mm=0.0)

@@ -27,8 +27,8 @@ def advice(decomposition: Decomposition, profile: Profile) -> str:
 
 
 def laid_in_words(lying: Lying, otherwise: str) -> tuple[str, ...]:
-    """How a model was laid down, what that is better by, and how a person has it otherwise; nothing where it stays, unless the
-    plate hardly holds it."""
+    """How a model was laid down, what that is better by, and how to change it; nothing where it stays, unless the plate hardly
+    holds it."""
     orientation, standing, laid = lying.orientation, lying.standing, lying.decomposition.chosen
     if orientation is None:
         return (HARDLY_HELD,) if lying.stance == Stance.LOOSE else ()

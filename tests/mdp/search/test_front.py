@@ -143,6 +143,17 @@ def test_the_share_that_may_be_left_is_of_one_piece_even_where_that_cannot_be_pr
     assert choose(rows, Worth(0.5), most_left=0.25).place == 2
 
 
-def test_where_time_counts_nothing_cuts_must_take_the_support_away_all_the_same() -> None:
-    assert choose(THREE, Worth(0.0), most_left=0.3).place == 0
-    assert choose(THREE, Worth(0.0), most_left=0.4).place == 2
+def test_where_time_counts_nothing_as_without_support_there_is_no_limit() -> None:
+    assert choose(THREE, Worth(0.0), least_saving=1.0, most_left=0.3).place == 2
+
+
+def test_a_row_that_is_not_sound_is_not_taken_though_it_has_a_time() -> None:
+    rows = [*THREE[:2], replace(THREE[2], sound=False)]
+    assert choose(rows, Worth(0.5)).place == 1
+
+
+def test_the_reason_for_one_piece_is_the_limit_where_it_bars_the_row_with_the_fewest_scars() -> None:
+    rows = front((1000.0, 200.0), (800.0, 200.0), (400.0, 200.0))
+    rows[1] = replace(rows[1], stairs_mm2=500.0)
+    choice = choose(rows, Worth(0.5), least_saving=0.3, most_left=0.35)
+    assert (choice.place, choice.reason) == (0, "cuts would leave more than 35% of the support, their seams counted")

@@ -14,7 +14,7 @@ from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.pose import about, unit
 from mdp.search.search import decompose
-from mdp.sweep.cylinders import Cylinder, crossings, find_cylinders
+from mdp.sweep.cylinders import Cylinder, crossings, find_cylinders, spoiled_by_cuts
 from profiles.profile import load
 
 Solid: TypeAlias = m3.Manifold
@@ -146,3 +146,20 @@ def test_a_cut_across_the_axis_of_a_bore_or_beside_it_costs_nothing_for_it() -> 
     assert not bore.is_crossed(Plane(np.array([0.0, 0.0, 1.0]), 30.0))
     assert not bore.is_crossed(Plane(np.array([1.0, 0.0, 0.0]), 5.0))
     assert bore.is_crossed(Plane(np.array([1.0, 0.0, 0.0]), 4.0))
+
+
+def test_a_turned_body_counts_by_its_surface_where_a_cut_is_not_square_to_its_axis() -> None:
+    wheel = mesh_of(rod(60.0, 20.0, 96))
+    (body,) = spoiled_by_cuts(wheel)
+    assert (body.is_bore, body.in_words) == (False, "a turned body of 60 mm")
+    around_mm2 = np.pi * 60.0 * 20.0
+    square, askew, beside = (
+        float(crossings([body], unit(normal)[None], np.array([[offset]]))[0, 0])
+        for normal, offset in (((0, 0, 1), 3.0), ((1, 0, 0), 10.0), ((1, 0, 0), 30.5))
+    )
+    assert (square, beside) == (0.0, 0.0)
+    assert askew == pytest.approx(around_mm2 / 500.0, rel=1e-2)
+
+
+def test_a_body_with_large_arms_is_no_turned_body_that_cuts_spoil() -> None:
+    assert spoiled_by_cuts(mesh_of(rod(16.0) + block(80.0, 10.0, 10.0))) == ()

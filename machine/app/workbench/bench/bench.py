@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -220,21 +221,22 @@ def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
     """The front of a search, cut by the row that it has chosen. A limb may be named by another point there than it was before."""
     chosen = next(row for row in rows if row.chosen)
     parts = parts_of(chosen)
-    names, left = {}, list(parts)
-    for before in bench.cuts or ():
-        same = [part for part in left if _is_same_cut(before, part)]
-        if same:
-            names[before] = before if before in same else same[0]
-            left.remove(names[before])
+    same_cuts = {before: _same_cuts(before, parts) for before in bench.cuts or ()}
+    names = {before: min(same, key=partial(_apart_mm, before)) for before, same in same_cuts.items() if same}
     cuts, locked = (tuple(names.get(part, part) for part in several) for several in (bench.cuts or (), bench.locked))
     named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked))
     return with_cuts(named, parts)
 
 
-def _is_same_cut(part: PlannedPart, other: PlannedPart) -> bool:
-    """Whether two parts have the same plane and the same number of limbs above it."""
-    same_plane = (part.normal, part.offset_mm) == (other.normal, other.offset_mm)
-    return same_plane and len(part.limbs_mm) == len(other.limbs_mm)
+def _same_cuts(part: PlannedPart, parts: Sequence[PlannedPart]) -> list[PlannedPart]:
+    """The parts that have the plane of one and as many limbs above it."""
+    plane = part.normal, part.offset_mm, len(part.limbs_mm)
+    return [other for other in parts if (other.normal, other.offset_mm, len(other.limbs_mm)) == plane]
+
+
+def _apart_mm(part: PlannedPart, other: PlannedPart) -> float:
+    """How far the points that name the limbs of two parts are from each other."""
+    return float(np.linalg.norm(np.array(part.limbs_mm) - np.array(other.limbs_mm)))
 
 
 def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:

@@ -104,11 +104,12 @@ def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ..
 
 
 def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
-    """A row of the front on the bench with its time and plastic; as it is where it cannot be cut any more, or is not sound."""
+    """A row of the front on the bench with its time and plastic; without where it cannot be cut any more, or is not
+    sound."""
     row = bench.rows[number]
     with suppress(PlanError):
         cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts_of(row), front=()), prices=True)
-        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile) else row
+        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile) else replace(row, sound=False)
     return row
 
 

@@ -108,9 +108,11 @@ def test_a_locked_limb_stays_locked_where_a_search_names_it_by_another_point() -
     assert searched.locked == frozenset(searched.cuts or ()) == {PlannedPart.of(limb)}
 
 
-def test_two_locked_limbs_of_one_plane_stay_locked_both() -> None:
+def test_each_of_two_limbs_of_one_plane_keeps_its_own_lock() -> None:
     clicked = tuple(PlannedPart((0.0, 0.0, 1.0), 12.0, limbs_mm=((x, 8.0, 14.0),)) for x in (30.0, -30.0))
-    bench = replace(Bench(PROFILE, model()), cuts=clicked, locked=frozenset(clicked))
-    limbs = tuple(Plane(np.array([0.0, 0.0, 1.0]), 12.0, np.array([[x, 17.0, 36.0]])) for x in (-33.0, 33.0))
-    searched = with_front(bench, (FrontRow((), 500.0, 0.0, 500.0), FrontRow(limbs, 100.0, 40.0, 140.0, chosen=True)))
-    assert searched.locked == frozenset(map(PlannedPart.of, limbs))
+    limbs = tuple(Plane(np.array([0.0, 0.0, 1.0]), 12.0, np.array([[x, 17.0, 36.0]])) for x in (33.0, -33.0))
+    for locked in (clicked, clicked[:1], clicked[1:]):
+        bench = replace(Bench(PROFILE, model()), cuts=clicked, locked=frozenset(locked))
+        for planes in (limbs, limbs[::-1]):
+            searched = with_front(bench, (FrontRow((), 500.0, 0.0, 500.0), FrontRow(planes, 100.0, 40.0, 140.0, chosen=True)))
+            assert searched.locked == {PlannedPart.of(limbs[clicked.index(part)]) for part in locked}
