@@ -73,15 +73,17 @@ def weakest_of(joints: Sequence[Joint]) -> Joint | None:
     return min(joints, key=lambda joint: joint.load_n, default=None)
 
 
-def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile) -> bool:
+def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int = 0) -> bool:
     """Whether no joint of a model's parts breaks when the nozzle pushes the far end of what it holds, and no cut passes through
-    the bulk of the model, where its seam runs round all that one sees of it; always on the paper's terms, which know neither."""
+    the bulk of the model, where its seam runs round all that one sees of it; always on the paper's terms, which know neither.
+    by_hand: how many of the last parts a person cut off; theirs are not tested."""
     search = profile.search.effective
     if search.seam_mm <= 0.0:
         return True
-    weakest, most_mm2 = weakest_of(joints_of(parts, profile)), BULK * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
+    end, most_mm2 = len(parts) - by_hand, BULK * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
+    weakest = weakest_of(joints_of(parts, profile)[: end - 1])
     firm = weakest is None or weakest.load_n >= search.strength_safety * search.nozzle_load_n
-    return firm and all(_base_hull_mm2(part) <= most_mm2 for part in parts[1:])
+    return firm and all(_base_hull_mm2(part) <= most_mm2 for part in parts[1:end])
 
 
 def _base_hull_mm2(part: Part) -> float:

@@ -145,7 +145,8 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
     rows = [front_row(node) for node in nodes]
     if price is not None:
         paying = {place: parts_of(nodes[place]) for place, good in enumerate(pays(rows)) if good}
-        sound = {place: parts for place, parts in paying.items() if place == 0 or is_sound(problem.mesh, parts, profile)}
+        by_hand = len(problem.start.cuts)
+        sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, profile, by_hand)}
         rows = [replace(row, sound=place in sound or place not in paying) for place, row in enumerate(rows)]
         rows = price_rows(rows, sound, price)
     choice = choose(rows, problem.worth, problem.settings.least_saving, problem.settings.most_left)

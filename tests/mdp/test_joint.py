@@ -127,3 +127,9 @@ def test_a_cut_through_more_than_a_fifth_of_the_square_of_the_longest_side_is_no
 
 def test_the_papers_terms_know_no_unsound_parts() -> None:
     assert sound(m3.Manifold.cube((40.0, 40.0, 40.0), True), (UP, 0.0), seam_mm=0.0)
+
+
+def test_a_cut_that_a_person_asked_for_is_not_tested_but_those_beside_it_are() -> None:
+    mesh = mesh_of(m3.Manifold.cube((40.0, 40.0, 40.0), True))
+    parts = cut(mesh, (UP, 10.0), (UP, -10.0))
+    assert [is_sound(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1, 2)] == [False, False, True]

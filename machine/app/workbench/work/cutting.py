@@ -108,8 +108,10 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
     sound."""
     row = bench.rows[number]
     with suppress(PlanError):
-        cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts_of(row), front=()), prices=True)
-        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile) else replace(row, sound=False)
+        parts = parts_of(row)
+        cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts, front=()), prices=True)
+        by_hand = sum(part in bench.locked for part in parts)
+        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile, by_hand) else replace(row, sound=False)
     return row
 
 
