@@ -21,6 +21,7 @@ from profiles.profile import Profile
 BESIDE_MM = 0.02  # of a base plane sections are taken: on it they would be those of a face
 # Of the square of a model's longest side: the convex hull of a cut through a neck or the root of a limb is smaller.
 BULK = 0.2
+FIRST = 0.15  # of the volume: a first part that is less is a sliver, and no foot for all that leans on it
 TOUCHING_MM2 = 0.01  # sections that share less only meet in an edge
 
 
@@ -74,16 +75,17 @@ def weakest_of(joints: Sequence[Joint]) -> Joint | None:
 
 
 def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int = 0) -> bool:
-    """Whether no joint of a model's parts breaks when the nozzle pushes the far end of what it holds, and no cut passes through
-    the bulk of the model, where its seam runs round all that one sees of it; always on the paper's terms, which know neither.
-    by_hand: how many of the last parts a person cut off; theirs are not tested."""
+    """Whether no joint of a model's parts breaks when the nozzle pushes the far end of what it holds, no cut passes through the
+    bulk of the model, where its seam runs round all that one sees of it, and the first part is no sliver of it; always on the
+    paper's terms, which know none of this. by_hand: how many of the last parts a person cut off; theirs are not tested."""
     search = profile.search.effective
     if search.seam_mm <= 0.0:
         return True
     end, most_mm2 = len(parts) - by_hand, BULK * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
     weakest = weakest_of(joints_of(parts, profile)[: end - 1])
     firm = weakest is None or weakest.load_n >= search.strength_safety * search.nozzle_load_n
-    return firm and all(_base_hull_mm2(part) <= most_mm2 for part in parts[1:end])
+    large = end == 1 or parts[0].volume_mm3 >= FIRST * sum(part.volume_mm3 for part in parts)
+    return firm and large and all(_base_hull_mm2(part) <= most_mm2 for part in parts[1:end])
 
 
 def _base_hull_mm2(part: Part) -> float:

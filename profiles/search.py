@@ -35,11 +35,11 @@ class Search(Frozen):
         "the terms of the 2020 paper",
     )
     seam_mm: float = Field(
-        0.8,
+        5.0,
         ge=0,
         le=100,
-        description="width of the scar that a seam leaves: a cut must make more surface safe than its rim takes, mm; 0: the "
-        "paper's objective",
+        description="width of the scar that a seam leaves on a model of 100 mm, in proportion on others, mm: a cut must make "
+        "more surface safe than its rim takes; 0: the paper's objective",
     )
     feather_weight: float = Field(
         0.5,
@@ -56,7 +56,7 @@ class Search(Frozen):
         "than its seam and this is not made",
     )
     stair_weight: float = Field(
-        0.15,
+        0.1,
         ge=0,
         le=10,
         description="how much an area counts that shows stairs as high as a layer of 0.2 mm, beside 1 where support scars it; "
@@ -64,27 +64,21 @@ class Search(Frozen):
         "faces; 0: stairs do not count",
     )
     second_mm2: float = Field(
-        0.5,
+        0.1,
         ge=0,
         le=1000,
         description="what a second of printing counts in the choice between numbers of parts and orientations: so much surface "
-        "that a seam or support blemishes, mm2 (1 cm2 is worth 200 s); 0: time is free, as it is without support",
+        "that a seam or support blemishes, mm2 (1 cm2 is worth 1000 s); 0: time is free, as it is without support",
     )
     metre_mm2: float = Field(
-        50.0,
+        100.0,
         ge=0,
         le=1e5,
-        description="what a metre of filament counts there, mm2 (as 100 s do: 3 g cost about what a machine does in that time); "
+        description="what a metre of filament counts there, mm2 (as 1000 s do: support has to be removed again); "
         "0: it is free, as it is without support",
     )
-    turning_mm2: float = Field(
-        50.0,
-        ge=0,
-        le=1e6,
-        description="what a model must save in blemished surface and time to be laid down otherwise than its file says, mm2",
-    )
     hidden_seam_share: float = Field(
-        0.5,
+        0.25,
         gt=0,
         le=1,
         description="how much a seam counts deep in a crease or neck or out of sight, as a share of what it counts across a "
@@ -112,18 +106,11 @@ class Search(Frozen):
         "and holds less well",
     )
     least_saving: float = Field(
-        0.03,
+        0.04,
         ge=0,
         le=1,
         description="share of what one piece costs, with its time and filament, that every further part must save; where more "
         "parts would save less, a note says so, and --parts N takes them",
-    )
-    most_left: float = Field(
-        0.33,
-        ge=0,
-        le=1,
-        description="how much support and seams may scar together where a model is cut, as a share of what support scars in one "
-        "piece; where that is more, the model stays in one piece, a note says so, and --parts N cuts it",
     )
     polish: bool = Field(
         True,

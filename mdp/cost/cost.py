@@ -1,8 +1,8 @@
 """Cost: what a person pays for a decomposition, in mm2 of blemished surface.
 
-Area that needs support is scarred where support touches it, every cut leaves a seam, a scar along its rim that is search.seam_mm
-wide, less of one where it is hidden, and faces that neither stand nor lie along their part's direction show stairs. The paper's
-J is the special case of a seam without width, stairs not looked at."""
+Area that needs support is scarred where support touches it. Every cut leaves a seam, a scar along its rim that is search.seam_mm
+wide on a model of 100 mm, less where it is hidden. Faces that neither stand nor lie along their part's direction show stairs. The
+paper's J is the special case of a seam without width and no stairs."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

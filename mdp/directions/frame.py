@@ -6,6 +6,8 @@ import numpy as np
 
 from mdp.mesh import Floats
 
+AXES = np.eye(3)
+
 
 class FramedDirections(NamedTuple):
     """(k, 3) unit directions and (k, 2, 3) vectors across each of them, for kernels."""
@@ -14,9 +16,10 @@ class FramedDirections(NamedTuple):
     frames: Floats
 
 
-def framed(directions: Floats) -> FramedDirections:
-    """Directions, and with each of them the vector across it and the axis that it leans on least, and the one across both."""
-    aside = np.cross(np.eye(3)[np.abs(directions).argmin(axis=1)], directions)
+def framed(directions: Floats, axes: Floats = AXES) -> FramedDirections:
+    """Directions, and with each of them the vector across it and the one of (3, 3) axes that it leans on least, and the one
+    across both."""
+    aside = np.cross(axes[np.abs(np.round(directions @ axes.T, 9)).argmin(axis=1)], directions)
     aside /= np.sqrt(np.vecdot(aside, aside))[:, None]
     return FramedDirections(np.array(directions), np.stack([aside, np.cross(directions, aside)], axis=1))
 

@@ -26,6 +26,7 @@ SAME_FACET_DEG = 0.5
 LYING_DEG = 15.0  # a model that leans less lies on a side
 SPREAD = 1000
 MOST_FACETS = 1000
+MOST_CORNERS = 1000
 EQUAL_MM2 = 1e-6  # areas that differ less are equal but for rounding
 SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 32)])
 
@@ -212,6 +213,13 @@ def _lean_deg(mesh: Mesh, directions: Floats) -> Floats:
         reach = (base @ _rotation(direction)[:2].T @ SIDES).max(axis=0)
         lean_rad[k] = atan2(float(reach.min()), float(centre @ direction) - lowest)
     return np.degrees(lean_rad)
+
+
+def diameter_mm(mesh: Mesh) -> float:
+    """The greatest distance between two vertices of the convex hull, of a fine one between some of them."""
+    corners = convex_hull(mesh.vertices).vertices
+    corners = corners[:: max(1, len(corners) // MOST_CORNERS)]
+    return max(float(np.linalg.norm(corners - corner, axis=1).max()) for corner in corners)
 
 
 def centre_of_mass(mesh: Mesh) -> Floats:

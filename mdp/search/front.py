@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf
 
 import numpy as np
 
@@ -156,28 +155,23 @@ class Choice:
     note: tuple[str, ...] = ()
 
 
-def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0, most_left: float = 1.0) -> Choice:
+def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0) -> Choice:
     """The row whose cost, with its time and filament and a charge for every further part, is least. rows: by their number of
     parts.
 
-    worth: what time and filament count. least_saving: the charge, as a share of what the first row costs with its time.
-    most_left: how much support and seams may scar together in any but the first row, as a share of what support scars in one
-    piece. Where any row has a time, those without cannot be printed, and those that are not sound are not taken. Where none
-    has, and where time counts nothing, as without support, there is no charge and no limit: the row of the fewest parts is taken
-    whose cost is alike to the least. A first row of several parts is a person's own choice: beside it there is no limit either.
+    worth: what time and filament count. least_saving: the charge, as a share of what the first row costs with its time. Where any
+    row has a time, those without cannot be printed, and those that are not sound are not taken. Where none has, and where time
+    counts nothing, as without support, there is no charge: the row of the fewest parts is taken whose cost is alike to the least.
     """
     paying = [place for place, good in enumerate(pays(rows)) if good and (place == 0 or rows[place].sound)]
     timed = [place for place in paying if rows[place].time_s is not None]
     places, first = timed or paying, (timed or paying)[0]
-    free = rows[0].parts > 1 or not timed or not worth
-    limit_mm2 = inf if free else most_left * _unlike_stairs_mm2(rows[0])
-    allowed = [place for place in places if place == first or _unlike_stairs_mm2(rows[place]) <= limit_mm2]
     totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
     charge_mm2 = least_saving * totals[first]
     if worth and timed:
-        taken = min(allowed, key=lambda place: totals[place] + charge_mm2 * (rows[place].parts - rows[first].parts))
+        taken = min(places, key=lambda place: totals[place] + charge_mm2 * (rows[place].parts - rows[first].parts))
     else:
-        taken = allowed[_first_alike([rows[place].cost_mm2 for place in allowed])]
+        taken = places[_first_alike([rows[place].cost_mm2 for place in places])]
     scars = places[_first_alike([rows[place].cost_mm2 for place in places])]
     least_mm2 = min(row.cost_mm2 for row in rows)
     if rows[taken].cost_mm2 <= least_mm2:
@@ -186,16 +180,9 @@ def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0, mo
         reason = LEAST_PARTS if min(rows[place].cost_mm2 for place in places) <= least_mm2 else PRINTABLE
     elif totals[taken] <= min(totals.values()):
         reason = "the least cost with its time"
-    elif scars not in allowed:
-        reason = f"cuts would leave more than {most_left:.0%} of the support, their seams counted"
     else:
         reason = f"more parts would save less than {least_saving:.0%} each"
     return Choice(taken, reason, _given_up(rows[scars], rows[taken]) if taken != scars else ())
-
-
-def _unlike_stairs_mm2(row: FrontRow) -> float:
-    """What support, seams and cuts cost: all but the stairs, which cuts hardly change."""
-    return row.cost_mm2 - row.stairs_mm2
 
 
 def _first_alike(costs_mm2: Sequence[float]) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from mdp.cost.forecast import Surface
 from mdp.cost.symmetry import Mirror
 from mdp.cut import passing_places
-from mdp.directions.frame import frame_across
+from mdp.directions.frame import framed
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
@@ -94,7 +94,7 @@ def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Nod
 def _align(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane]]:
     """The planes from a position on, the first of them turned to where its part shows fewer stairs on large flats."""
     here, *later = chain.planes[position:]
-    middle = _middle(chain.nodes[position + 1])
+    middle = _cut_face(chain.nodes[position + 1]).mean(axis=0)
     for normal in problem.flats.beside(here.normal, problem.least_z):
         yield [replace(here, normal=normal, offset_mm=float(normal @ middle)), *later]
 
@@ -102,7 +102,7 @@ def _align(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane
 def _stand_upright(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
     """The planes from a position on, the first of them upright on a mirror where it nearly is."""
     here, *later = chain.planes[position:]
-    upright = mirror.upright(here, _middle(chain.nodes[position + 1]))
+    upright = mirror.upright(here, _cut_face(chain.nodes[position + 1]).mean(axis=0))
     if upright is not None:
         yield [upright, *later]
 
@@ -196,11 +196,11 @@ def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> I
     classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own
     reach = surface.reach([here, *later])
     least_mm2 = surface.left_mm2([here, *later], classes, reach)
-    pivot = _middle(chain.nodes[position + 1])
+    pivots = _pivots(_cut_face(chain.nodes[position + 1]))
     for share, turn_deg in STEPS:
         for _ in range(ROUNDS):
             before_mm2 = least_mm2
-            for plane in _neighbours(here, pivot, share * problem.settings.offset_step_mm, turn_deg):
+            for plane in _neighbours(problem, here, pivots, share, turn_deg):
                 left_mm2 = surface.left_mm2([plane, *later], classes, reach)
                 if left_mm2 < least_mm2 - SAME_MM2 and problem.allowed(chain.nodes[position], plane):
                     here, least_mm2 = plane, left_mm2
@@ -209,24 +209,34 @@ def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> I
                 break
 
 
-def _neighbours(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) -> Iterator[Plane]:
-    """The planes next to one: shifted both ways, and leaning four ways about a point with and without a shift."""
+def _neighbours(problem: Problem, plane: Plane, pivots: Floats, share: float, turn_deg: float) -> Iterator[Plane]:
+    """The planes next to one: shifted both ways by a share of the offset step, leaning four ways about the first pivot with and
+    without a shift, and about the others without one."""
+    step_mm = share * problem.settings.offset_step_mm
     yield from (replace(plane, offset_mm=plane.offset_mm + shift) for shift in (-step_mm, step_mm))
-    aside, across = frame_across(plane.normal)
-    height_mm = plane.offset_mm - float(plane.normal @ pivot)
+    ((aside, across),) = framed(plane.normal[None], problem.axes).frames
     for lean in (-aside, aside, -across, across):
         normal = cos(radians(turn_deg)) * plane.normal + sin(radians(turn_deg)) * lean
-        offset_mm = float(normal @ pivot) + height_mm
-        yield from (replace(plane, normal=normal, offset_mm=offset_mm + shift) for shift in (0.0, -step_mm, step_mm))
+        for number, pivot in enumerate(pivots):
+            offset_mm = plane.offset_mm + float((normal - plane.normal) @ pivot)
+            for shift in (0.0, -step_mm, step_mm) if number == 0 else (0.0,):
+                yield replace(plane, normal=normal, offset_mm=offset_mm + shift)
 
 
-def _middle(node: Node) -> Floats:
-    """(3,) middle of the corners of a node's last cut face, of a limb's that of its section."""
+def _pivots(corners: Floats) -> Floats:
+    """(3, 3) the middle of the corners of a cut face, and the two of them that are farthest from each other: a plane that ends in
+    a concave edge stays there when it leans about it."""
+    middle = corners.mean(axis=0)
+    one = corners[int(np.argmax(np.round(np.linalg.norm(corners - middle, axis=1), 6)))]
+    other = corners[int(np.argmax(np.round(np.linalg.norm(corners - one, axis=1), 6)))]
+    return np.stack([middle, one, other])
+
+
+def _cut_face(node: Node) -> Floats:
+    """(n, 3) corners of a node's last cut face, of a limb's those of its section."""
     base, points = node.cuts[-1].base, node.remainder.mesh.vertices
     if base.limbs_mm is not None and node.parent is not None:
-        corners = passing_places(limb_mesh(node.parent.remainder, base), base)
-    else:
-        heights = base.heights_mm(points)
-        corners = points[heights >= heights.max() - BASE_TOLERANCE_MM]
-    middle: Floats = corners.mean(axis=0)
-    return middle
+        return passing_places(limb_mesh(node.parent.remainder, base), base)
+    heights = base.heights_mm(points)
+    face: Floats = points[heights >= heights.max() - BASE_TOLERANCE_MM]
+    return face

@@ -13,6 +13,7 @@ from mdp.cost.model_need import ModelNeed, ModelSurface
 from mdp.cut import Solid, below, corners_above, cut, mesh_of, solid_of
 from mdp.directions.flats import Flats
 from mdp.directions.frame import frame_across
+from mdp.directions.orientation import diameter_mm
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
@@ -47,6 +48,7 @@ from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
 from profiles.profile import Profile
 
+SIZE_MM = 100.0  # of a model on which a seam counts as wide as search.seam_mm
 FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
 
 
@@ -70,7 +72,7 @@ class Problem:
         self.terms = CostTerms(
             angle_deg=profile.process.self_supporting_angle_deg,
             count_platform_faces=settings.count_platform_faces,
-            seam_mm=settings.seam_mm,
+            seam_mm=settings.seam_mm * diameter_mm(mesh) / SIZE_MM,
             feather=settings.feather_weight,
             cut_mm2=settings.cut_mm2,
             stair_weight=weight_of_stairs(profile),
@@ -103,10 +105,15 @@ class Problem:
     def limits(self) -> Bounds:
         """The bounds of the sampled directions, where stairs count also of those along the model's flats; a plane by hand needs
         but those of its own."""
-        sampled = directions(self.settings)
+        sampled = directions(self.settings) @ self.axes
         if self.terms.stair_weight > 0.0:
             sampled = np.concatenate([sampled, self.flats.directions(self.least_z)])
         return self.bounds_along(sampled)
+
+    @property
+    def axes(self) -> Floats:
+        """(3, 3) rows: the axes of a frame that turns about z with the model; on the paper's terms those of the workpiece."""
+        return np.eye(3) if self.terms.need is None else self.terms.need.need.axes
 
     @cached_property
     def flats(self) -> Flats:

@@ -29,7 +29,7 @@ from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
 from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
 from mdp.search.node import Node
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
-from mdp.search.polish import make_regular, polish
+from mdp.search.polish import make_regular, polish, settle
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
 from mdp.sweep.limbs import cylinders_cut
@@ -149,7 +149,7 @@ def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price:
         sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, profile, by_hand)}
         rows = [replace(row, sound=place in sound or place not in paying) for place, row in enumerate(rows)]
         rows = price_rows(rows, sound, price)
-    choice = choose(rows, problem.worth, problem.settings.least_saving, problem.settings.most_left)
+    choice = choose(rows, problem.worth, problem.settings.least_saving)
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
@@ -197,7 +197,7 @@ def _search_beam(
         limbs = search_limbs(problem, beam.first) if problem.settings.single_limb else []
         best = _polish_finalists(problem, beam, limbs, partial(_report, problem, report, stage, 1))
         if problem.settings.polish and problem.terms.seam_mm > 0.0:
-            _prefer_regular(problem, beam.front)
+            _polish_rows(problem, beam.front)
         return best, beam.front, stage
     except KeyboardInterrupt:
         problem.stop()
@@ -223,13 +223,21 @@ def _polish_finalists(problem: Problem, beam: Beam, limbs: Sequence[Node], repor
     return best
 
 
-def _prefer_regular(problem: Problem, front: Front) -> None:
-    """Lay the planes of the rows of a front that may be taken along flats and symmetric where the model is, at the same cost."""
-    nodes = [node for node in front.nodes if all(node.cost_mm2 < fewer.cost_mm2 for fewer in front.nodes[: len(node.cuts)])]
-    cut = [node for node in nodes if len(node.cuts) > len(problem.start.cuts)]
+def _polish_rows(problem: Problem, front: Front) -> None:
+    """Move the planes of the rows of a front that may be taken to where they cost less, after a beam of two or more; then lay
+    them along flats, and symmetric where the model is, at the same cost."""
+    for node in _paying(problem, front) if problem.settings.beam_width > 1 else ():
+        front.offer(settle(problem, node))
+    cut = _paying(problem, front)
     mirrors = find_mirrors(problem.mesh) if cut else []
     for node in cut if mirrors or len(problem.flats.shares) else []:
         front.replace(node, make_regular(problem, node, mirrors))
+
+
+def _paying(problem: Problem, front: Front) -> list[Node]:
+    """The nodes of a front that the search has cut and that cost less than all with fewer cuts."""
+    nodes = [node for node in front.nodes if all(node.cost_mm2 < fewer.cost_mm2 for fewer in front.nodes[: len(node.cuts)])]
+    return [node for node in nodes if len(node.cuts) > len(problem.start.cuts)]
 
 
 def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:

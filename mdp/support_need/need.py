@@ -5,7 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mdp.directions.frame import framed
+from mdp.directions.azimuth import axes_along, azimuth_rad
+from mdp.directions.frame import AXES, FramedDirections, framed
 from mdp.directions.spread import spread
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
@@ -50,19 +51,20 @@ class SupportNeed:
     surface: LinkedFaces
     process: Process
     weight: float
+    axes: Floats
     _cached: dict[bytes, Classes] = field(default_factory=dict)
     _tables: dict[bytes, Classes] = field(default_factory=dict)
 
     @classmethod
     def of(cls, mesh: Mesh, process: Process, weight: float) -> "SupportNeed":
         """The need of a model that stands on the platform."""
-        return cls(link(mesh), process, weight)
+        return cls(link(mesh), process, weight, axes_along(azimuth_rad(mesh)))
 
     @cached_property
     def upright(self) -> Mask:
         """(m,) False for the faces that overhang printed straight up but carry themselves. Support stands on the platform."""
         limits = limits_of(self.process, PLATFORM_TOLERANCE_MM)
-        return _needing_upright(self.surface, limits)
+        return _needing_upright(self.surface, limits, self.axes)
 
     def along(self, directions: Floats) -> Classes:
         """(k, m) for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, meant for the faces that are
@@ -86,31 +88,37 @@ class SupportNeed:
         return row
 
     def _classes(self, directions: Floats) -> Classes:
-        nearest = np.argsort(-(directions @ COARSE.T), axis=1, kind="stable")[:, :LEANS].T
+        nearest = np.argsort(-(directions @ self._coarse.T), axis=1, kind="stable")[:, :LEANS].T
         over_air = self._over_air[nearest[0]]
         for lean in nearest[1:]:
             over_air &= self._over_air[lean]
-        return _classify(self.surface, directions, limits_of(self.process, NO_BASE_MM), NEEDS_SUPPORT + over_air)
+        limits = limits_of(self.process, NO_BASE_MM)
+        return _classify(self.surface, framed(directions, self.axes), limits, NEEDS_SUPPORT + over_air)
+
+    @cached_property
+    def _coarse(self) -> Floats:
+        """(37, 3) the coarse directions, turned with the model."""
+        return COARSE @ self.axes
 
     @cached_property
     def _over_air(self) -> Classes:
         """(37, m) which faces are over air along each of the coarse directions, flat places as a whole: of their faces what
         cuts leave remembers but one."""
         over_air = np.zeros((len(COARSE), len(self.surface.faces)), np.uint8)
-        in_threads(find_over_air, len(COARSE), self.surface, flat_places(self.surface), framed(COARSE), over_air)
+        in_threads(find_over_air, len(COARSE), self.surface, flat_places(self.surface), framed(self._coarse, self.axes), over_air)
         return over_air
 
 
-def _classify(surface: LinkedFaces, directions: Floats, limits: Limits, classes: Classes) -> Classes:
+def _classify(surface: LinkedFaces, directions: FramedDirections, limits: Limits, classes: Classes) -> Classes:
     """The classes with CARRIES_ITSELF filled in."""
-    in_threads(classify, len(directions), surface, framed(directions), limits, classes)
+    in_threads(classify, len(directions.directions), surface, directions, limits, classes)
     return classes
 
 
-def _needing_upright(surface: LinkedFaces, limits: Limits) -> Mask:
+def _needing_upright(surface: LinkedFaces, limits: Limits, axes: Floats = AXES) -> Mask:
     """(m,) False for the faces that overhang straight up but carry themselves."""
     classes = np.full((1, len(surface.faces)), NEEDS_SUPPORT, np.uint8)
-    needing: Mask = np.not_equal(_classify(surface, UP[None], limits, classes)[0], CARRIES_ITSELF)
+    needing: Mask = np.not_equal(_classify(surface, framed(UP[None], axes), limits, classes)[0], CARRIES_ITSELF)
     return needing
 
 

@@ -24,7 +24,7 @@ PATIENCE_S = 60.0
 COARSE = ("layer_height_mm=0.4", "first_layer_height_mm=0.4", "line_width_mm=0.8")
 QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2", *(f"--set=process.{setting}" for setting in COARSE))
 # Else so coarse a T, whose arms show high stairs and are small beside their seams, would be printed in one piece.
-QUICK += ("--set=search.stair_weight=0.01", "--set=search.most_left=1", "--set=search.least_saving=0")
+QUICK += ("--set=search.seam_mm=0.8", "--set=search.stair_weight=0.01", "--set=search.least_saving=0")
 
 
 class Running:

@@ -14,7 +14,8 @@ from tests import shapes
 
 
 def _decomposed(mesh: Mesh, *settings: str) -> Decomposition:
-    return decompose(mesh, "hard", load(settings=[f"search.{word}" for word in ("directions=60", "most_parts=3", *settings)]))
+    words = ("directions=60", "most_parts=3", "seam_mm=0.8", *settings)
+    return decompose(mesh, "hard", load(settings=[f"search.{word}" for word in words]))
 
 
 def _lattice(cells: int) -> m3.Manifold:

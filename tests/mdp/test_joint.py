@@ -125,6 +125,11 @@ def test_a_cut_through_more_than_a_fifth_of_the_square_of_the_longest_side_is_no
     assert sound(m3.Manifold.cube((side_mm, side_mm, 40.0), True), (UP, 0.0)) is holds
 
 
+@pytest.mark.parametrize(("height_mm", "holds"), [(5.9, False), (6.1, True)])
+def test_a_first_part_of_less_than_three_twentieths_of_the_volume_is_no_foot(height_mm: float, holds: bool) -> None:
+    assert sound(m3.Manifold.cube((10.0, 10.0, 40.0)), (UP, height_mm)) is holds
+
+
 def test_the_papers_terms_know_no_unsound_parts() -> None:
     assert sound(m3.Manifold.cube((40.0, 40.0, 40.0), True), (UP, 0.0), seam_mm=0.0)
 

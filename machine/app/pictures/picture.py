@@ -1,5 +1,6 @@
 """Picture: a decomposition as images: the model and its parts side by side, and the print as a sheet of frames."""
 
+from collections.abc import Sequence
 from math import ceil, sqrt
 
 import numpy as np
@@ -33,11 +34,17 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
     risky = needing_upright(model, profile)
     floor, view, half = floor_of(model), best_view(model, risky), (size[0] // 2, size[1])
     plain = draw([floor, model], [FLOOR, PLAIN], reds=[None, risky], view=view, size=half)
-    gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
-    apart = [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
+    apart = parts_apart(parts)
     reds = [residual_faces(part, profile) for part in parts]
     exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], reds=[None, *reds], view=view, size=half)
     return np.concatenate([plain, exploded], axis=1)
+
+
+def parts_apart(parts: Sequence[Part]) -> list[Mesh]:
+    """The meshes of parts, each moved away from the part that it stands on."""
+    low, high = np.min([part.mesh.bounds_mm[0] for part in parts], axis=0), np.max([part.mesh.bounds_mm[1] for part in parts], axis=0)
+    gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(high - low))
+    return [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
 
 
 def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[int, int]) -> Image:
@@ -66,7 +73,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
     return add_title(tile(frames), decomposition.name, frame_pixels)
 
 
-def _shifts(parts: tuple[Part, ...], gap_mm: float) -> list[Floats]:
+def _shifts(parts: Sequence[Part], gap_mm: float) -> list[Floats]:
     """Where each part is moved: along its direction away from the part it stands on, which has moved itself."""
     shifts: list[Floats] = [np.zeros(3)]
     for position, part in enumerate(parts[1:], start=1):

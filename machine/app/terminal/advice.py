@@ -56,7 +56,7 @@ def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen
     search = profile.search
-    return front[choose(front, Worth.of(profile), search.least_saving, search.most_left).place]
+    return front[choose(front, Worth.of(profile), search.least_saving).place]
 
 
 def _without_front(decomposition: Decomposition) -> list[FrontRow]:

@@ -16,7 +16,7 @@ from mdp.save import FOLDER_FILES, stl
 from tests import shapes
 
 # So coarse a T, whose arms show high stairs and are small beside their seams, is cut all the same.
-IN_PARTS = ["--as-is", "--set", "search.stair_weight=0.01", "--set", "search.most_left=1"]
+IN_PARTS = ["--as-is", "--set", "search.seam_mm=0.8", "--set", "search.stair_weight=0.01"]
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "process.first_layer_height_mm=0.3"]
 FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6"]
 

@@ -31,7 +31,7 @@ FREE = "search.clearance=false"
 
 
 def _profile(*settings: str, machine: str = "generic_ac") -> Profile:
-    return load(machine=machine, settings=("search.directions=200", *settings))
+    return load(machine=machine, settings=("search.directions=200", "search.seam_mm=0.8", *settings))
 
 
 def _by_hand(*parts: tuple[Vector | None, float | None], zones: Zones | None = None) -> PlanFile:
@@ -258,7 +258,7 @@ def test_seams_keep_out_of_a_zone_where_they_weigh_a_hundred_times() -> None:
     by_hand = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0), zones=Zones(no_seam=(everywhere,))))
     free = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0)))
     assert by_hand.seam_mm == free.seam_mm == pytest.approx(100.0)
-    assert by_hand.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.8 * 100.0)
+    assert by_hand.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.8 * np.linalg.norm([25.0, 10.0, 40.0]) / 100.0 * 100.0)
 
 
 def _painted_tee() -> Mesh:
@@ -294,7 +294,7 @@ def test_seams_weigh_a_hundred_times_on_faces_of_a_colour_alone_whatever_earlier
     green = cut_by_plan(painted, "shape", profile, _by_hand(*planes, zones=Zones(no_seam=(Painted(GREEN),))))
     free = cut_by_plan(painted, "shape", profile, _by_hand(*planes))
     assert green.seam_mm == free.seam_mm == pytest.approx(160.0)
-    assert green.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.6 * 80.0)
+    assert green.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.6 * 80.0 * np.linalg.norm([20.0, 20.0, 20.0]) / 100.0)
 
 
 def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:

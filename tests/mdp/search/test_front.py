@@ -60,32 +60,16 @@ def test_every_further_part_saves_at_least_that_share_of_the_cost_of_one_piece(l
     assert choose(THREE, Worth(0.5), least_saving=least_saving).place + 1 == parts
 
 
-@pytest.mark.parametrize(("most_left", "parts"), [(1.0, 3), (0.6, 3), (0.4, 3), (0.39, 1)])
-def test_cuts_leave_at_most_that_share_of_the_scars_of_support(most_left: float, parts: int) -> None:
-    assert choose(THREE, Worth(0.5), most_left=most_left).place + 1 == parts
-
-
-def test_stairs_are_no_support_that_cuts_take_away() -> None:
-    rows = [replace(row, stairs_mm2=300.0) for row in THREE]  # 700, 300 and 100 mm2 of support
-    assert [choose(rows, Worth(0.5), most_left=left).place + 1 for left in (0.5, 0.15, 0.14)] == [3, 3, 1]
-
-
-def test_of_rows_that_leave_few_scars_the_one_is_taken_that_costs_least() -> None:
-    assert choose(THREE, Worth(0.5), least_saving=0.19, most_left=0.5).place + 1 == 3
-    assert choose(THREE, Worth(0.5), least_saving=0.19, most_left=0.6).place + 1 == 2
-
-
 def test_the_reason_names_the_demand_that_more_parts_do_not_meet() -> None:
-    assert choose(THREE, Worth(0.5), most_left=0.3).reason == "cuts would leave more than 30% of the support, their seams counted"
     assert choose(THREE, Worth(0.5), least_saving=0.19).reason == "more parts would save less than 19% each"
 
 
 def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:
-    choice = choose(THREE, Worth(0.5), most_left=0.3)
+    choice = choose(THREE, Worth(0.5), least_saving=0.4)
     assert choice.note == ("3 parts would save 600 mm2 of scars with 2 more cuts: --parts 3",)
     rows = front((1000.0, 900.0), (500.0, 800.0))
     rows = [replace(row, filament_mm=filament_mm) for row, filament_mm in zip(rows, (10_000.0, 12_000.0), strict=True)]
-    choice = choose(rows, Worth(0.5), most_left=0.3)
+    choice = choose(rows, Worth(0.5), least_saving=0.6)
     assert choice.note == ("2 parts would save 500 mm2 of scars but take 2.0 m more filament: --parts 2",)
 
 
@@ -133,27 +117,10 @@ def test_a_row_without_a_time_is_said_to_be_no_choice() -> None:
     assert choose(front((200.0, 900.0), (100.0, None)), Worth(1.0)).reason == "the least cost of what can be printed well"
 
 
-def test_beside_a_persons_own_planes_cuts_may_leave_what_they_like() -> None:
-    rows = [replace(row, planes=(PLANE,) * (count + 2)) for count, row in enumerate(THREE)]
-    assert choose(rows, Worth(0.5), most_left=0.1).place == 2
-
-
-def test_the_share_that_may_be_left_is_of_one_piece_even_where_that_cannot_be_printed() -> None:
-    rows = front((1000.0, None), (400.0, 10.0), (200.0, 10.0))
-    assert choose(rows, Worth(0.5), most_left=0.25).place == 2
-
-
-def test_where_time_counts_nothing_as_without_support_there_is_no_limit() -> None:
-    assert choose(THREE, Worth(0.0), least_saving=1.0, most_left=0.3).place == 2
+def test_where_time_counts_nothing_as_without_support_there_is_no_charge() -> None:
+    assert choose(THREE, Worth(0.0), least_saving=1.0).place == 2
 
 
 def test_a_row_that_is_not_sound_is_not_taken_though_it_has_a_time() -> None:
     rows = [*THREE[:2], replace(THREE[2], sound=False)]
     assert choose(rows, Worth(0.5)).place == 1
-
-
-def test_the_reason_for_one_piece_is_the_limit_where_it_bars_the_row_with_the_fewest_scars() -> None:
-    rows = front((1000.0, 200.0), (800.0, 200.0), (400.0, 200.0))
-    rows[1] = replace(rows[1], stairs_mm2=500.0)
-    choice = choose(rows, Worth(0.5), least_saving=0.3, most_left=0.35)
-    assert (choice.place, choice.reason) == (0, "cuts would leave more than 35% of the support, their seams counted")

@@ -45,7 +45,8 @@ def test_a_tee_is_laid_on_its_side_where_nothing_needs_support() -> None:
     found = laid_down(tee())
     assert found.orientation is not None
     assert (len(found.decomposition.parts), found.decomposition.cost_mm2) == (1, 0.0)
-    assert found.total_mm2 == pytest.approx(0.5 * 10.0 * 10.0 + 50.0)  # 100 s and a metre
+    surface_mm2 = 2 * 700.0 + 160.0 * 10.0  # of a T of 7 cm2 that is 10 mm thick
+    assert found.total_mm2 == pytest.approx(0.1 * 10.0 * 10.0 + 100.0 + 0.06 * surface_mm2)  # 100 s, a metre, turned
 
 
 def test_what_lies_best_stays_as_it_stands() -> None:
@@ -53,18 +54,18 @@ def test_what_lies_best_stays_as_it_stands() -> None:
 
 
 @pytest.mark.parametrize("mesh", [tee(), branch(), box(10, 20, 60)], ids=["tee", "branch", "box"])
-def test_laid_down_it_costs_no_more_than_as_it_stands(mesh: Mesh) -> None:
-    upright = decompose(mesh, "mesh", PROFILE, price=by_height(PROFILE))
-    assert laid_down(mesh).total_mm2 <= total_mm2(upright.chosen, Worth.of(PROFILE))
+def test_laid_down_it_costs_no_more_than_in_one_piece_as_it_stands(mesh: Mesh) -> None:
+    whole = decompose(mesh, "mesh", PROFILE, price=by_height(PROFILE)).front[0]
+    footing_mm2 = glimpses_of(mesh, PROFILE, by_height)[0].footing_mm2
+    assert laid_down(mesh).total_mm2 <= total_mm2(whole, Worth.of(PROFILE)) + footing_mm2
 
 
-def test_a_model_stays_where_turning_it_saves_less_than_is_asked_for() -> None:
-    standing = decompose(tee(), "mesh", PROFILE, price=by_height(PROFILE))
-    saved_mm2 = total_mm2(standing.chosen, Worth.of(PROFILE)) - laid_down(tee()).total_mm2
-    for turning_mm2, turned in ((0.3 * saved_mm2, True), (saved_mm2 + 1.0, False)):
-        profile = load(settings=["search.directions=20", "search.polish=false", f"search.turning_mm2={turning_mm2}"])
-        search = partial(decompose, name="mesh", profile=profile, price=by_height(profile))
-        assert (lay_down(tee(), profile, by_height, search).orientation is not None) == turned
+def test_a_model_stays_where_turning_it_saves_less_than_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    standing = decompose(tee(), "mesh", PROFILE, price=by_height(PROFILE)).front[0]
+    saved_mm2 = total_mm2(standing, Worth.of(PROFILE)) - 110.0  # of 100 s and a metre
+    for share, turned in ((0.9, True), (1.1, False)):
+        monkeypatch.setattr(laying, "TURNED", share * saved_mm2 / 3000.0)
+        assert (laid_down(tee()).orientation is not None) == turned
 
 
 def leaning_plate() -> Mesh:
@@ -93,7 +94,7 @@ def searches(mesh: Mesh, price_by: Callable[[Profile], Pricing]) -> tuple[Lying,
 
 
 def test_what_can_be_told_without_a_search_is_not_searched() -> None:
-    lying, count = searches(tee(), by_height)
+    lying, count = searches(tee(arm=80.0), by_height)
     assert (lying.orientation is None, lying.standing, count) == (False, None, 1)
     lying, count = searches(box(40, 30, 10), by_height)
     assert (lying.orientation, count) == (None, 1)
@@ -160,23 +161,22 @@ def test_another_facet_near_that_of_the_file_or_of_another_way_is_none() -> None
     assert [side_in_words(orientation) != "" for orientation in distinct_orientations(barrel, PROFILE)] == [True]
 
 
-def test_a_file_on_a_flat_base_is_turned_only_for_a_fifth_of_its_cost() -> None:
-    tower = m3.Manifold.cube((40.0, 40.0, 10.0), True).translate((0.0, 0.0, 5.0)) + m3.Manifold.cube((8.0, 8.0, 30.0))
-    _, *others = glimpses_of(mesh_of(tower), PROFILE, by_height)
-    assert [other.limit_mm2(1000.0) for other in others] == [800.0] * len(others) != []
-
-
-def test_a_wheel_that_is_hardly_held_on_its_rim_may_cost_more_on_its_face() -> None:
+def test_how_a_model_stands_and_that_it_is_turned_count_as_shares_of_its_surface() -> None:
     wheel = m3.Manifold.cylinder(12.0, 60.0, 60.0, 64) + m3.Manifold.cylinder(32.0, 20.0, 20.0, 64)  # a hub on one side
-    on_its_rim = wheel.rotate((90.0, 0.0, 0.0)).translate((0.0, 0.0, 60.0))
-    upright, *others = glimpses_of(mesh_of(on_its_rim), PROFILE, by_height)
-    assert upright.stance == Stance.HELD
-    assert {other.limit_mm2(1000.0) for other in others if other.stance == Stance.FLAT} == {1100.0}
+    on_its_rim = mesh_of(wheel.rotate((90.0, 0.0, 0.0)).translate((0.0, 0.0, 60.0)))
+    upright, *others = glimpses_of(on_its_rim, PROFILE, by_height)
+    surface_mm2 = on_its_rim.areas_mm2.sum()
+    assert (upright.stance, upright.footing_mm2) == (Stance.HELD, pytest.approx(0.11 * surface_mm2))
+    on_its_face = next(other for other in others if other.stance == Stance.FLAT)
+    assert on_its_face.footing_mm2 == pytest.approx(0.06 * surface_mm2)
 
 
-def test_a_slab_on_its_edge_is_laid_down_for_less() -> None:
-    _, *others = glimpses_of(box(40, 8, 40), PROFILE, by_height)
-    assert others[0].limit_mm2(1000.0) == 950.0
+def test_a_glimpse_counts_its_footing_in_all_that_it_forecasts() -> None:
+    upright, *others = glimpses_of(box(40, 8, 40), PROFILE, by_height)
+    assert upright.footing_mm2 == 0.0
+    lying = others[0]
+    assert lying.bare_mm2 == pytest.approx(0.1 * 80.0 + 100.0 + 0.06 * (2 * 1600.0 + 4 * 320.0))  # 80 s, a metre
+    assert lying.hopeful_mm2 == lying.forecast_mm2 == lying.whole_mm2 == lying.bare_mm2
 
 
 def test_a_turned_body_stands_or_lies_along_its_axis(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from profiles.errors import PlanError
 from profiles.profile import load
 from tests import shapes
 
-DEAR_SEAMS = load(machine="generic_ac", settings=("search.directions=200", "search.seam_mm=8"))
+DEAR_SEAMS = load(machine="generic_ac", settings=("search.directions=200", "search.seam_mm=8", "search.hidden_seam_share=0.5"))
 UNDER_AN_ARM = Grown((-12.0, 0.0, 30.0), 1.0)
 ARM_BOX = Zone((-25.0, -10.0, 25.0), (-5.5, 10.0, 35.0))
 

@@ -283,7 +283,7 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
     if not bench.recommended:
         return replace(bench, rows=tuple(rows), priced=True)
     search = bench.profile.search
-    choice = choose(rows, Worth.of(bench.profile), search.least_saving, search.most_left)
+    choice = choose(rows, Worth.of(bench.profile), search.least_saving)
     marked = [
         replace(row, chosen=number == choice.place, reason=choice.reason if number == choice.place else "")
         for number, row in enumerate(rows)

@@ -52,9 +52,9 @@ def test_stairs_of_a_model_in_one_piece_are_those_of_its_slanted_faces_searched_
     wedge, profile = mesh_of(Manifold.hull_points(sides)), load(settings=COARSE)
     searched = in_parts(build(decompose(wedge, "wedge", profile), profile), profile)
     up = straight_up(alone(wedge, 0.0), profile)
-    # 10 x 10 mm of plate lie under the slanted face, by 0.15 for layers of 0.2 mm
-    assert searched.stairs_mm2 == pytest.approx(30.0)
-    assert [row["stairs_mm2"] for row in alternatives_json((searched, up, up))] == pytest.approx([30.0] * 3)
+    # 10 x 10 mm of plate lie under the slanted face, by 0.1 for layers of 0.2 mm
+    assert searched.stairs_mm2 == pytest.approx(20.0)
+    assert [row["stairs_mm2"] for row in alternatives_json((searched, up, up))] == pytest.approx([20.0] * 3)
 
 
 def test_a_joint_of_a_print_tells_how_its_first_layer_lies_as_its_dry_run_has_it() -> None:

@@ -32,7 +32,8 @@ QUICK += ["search.seam_mm=0", "search.cut_mm2=0"]  # else nobody would cut what 
 
 def _built(model: str, machine: str) -> Program:
     smaller = ["process.scale=0.25"] if model.endswith(LARGE) else []
-    profile = load(machine=machine, settings=[*QUICK, *smaller])
+    finer = ["search.directions=200"] if model.endswith("deer.ply") else []
+    profile = load(machine=machine, settings=[*QUICK, *smaller, *finer])
     return build(decompose_model(ModelRequest(model, profile, orient=False)).decomposition, profile)
 
 

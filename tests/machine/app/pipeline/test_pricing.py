@@ -28,7 +28,7 @@ def test_parts_that_cannot_be_sliced_have_none() -> None:
 def test_the_dearer_a_second_the_quicker_the_print() -> None:
     times_s = []
     for second_mm2 in (0.0, 0.1, 1.0, 100.0):
-        own = ["search.metre_mm2=0", f"search.second_mm2={second_mm2}", "search.most_left=1"]
+        own = ["search.metre_mm2=0", f"search.second_mm2={second_mm2}"]
         profile = load(settings=[COARSE, *own])
         chosen = decompose(shapes.branch(), "branch", profile, price=pricing(profile)).chosen
         times_s.append(0.0 if chosen is None or chosen.time_s is None else chosen.time_s)

@@ -1,0 +1,53 @@
+"""Which alternatives are offered to a judge."""
+
+import importlib
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from mdp.directions.turns import turned_by
+from mdp.mesh import Floats
+from mdp.plane import Plane
+from profiles.profile import load
+from tests.shapes import branch
+
+TOOLS = Path(__file__).parents[2] / "tools"
+UPRIGHT = np.eye(3)
+
+
+@pytest.fixture
+def offering(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(TOOLS))
+    return importlib.import_module("offer_parts")
+
+
+def plane(offset_mm: float, lean_deg: float = 0.0) -> Plane:
+    return Plane(np.array([np.sin(np.radians(lean_deg)), 0.0, np.cos(np.radians(lean_deg))]), offset_mm)
+
+
+@pytest.mark.parametrize(
+    ("rotation", "planes", "like"),
+    [
+        (UPRIGHT, (plane(20.0),), True),
+        (UPRIGHT, (plane(22.0, 10.0),), True),
+        (UPRIGHT, (plane(23.0),), False),  # of 60 mm more than 4 %
+        (UPRIGHT, (plane(20.0, 16.0),), False),
+        (UPRIGHT, (), False),
+        (UPRIGHT, (plane(20.0), plane(40.0)), False),
+        (turned_by((0.0, 0.0, 50.0)), (plane(20.0),), True),  # about the vertical
+        (turned_by((20.0, 0.0, 0.0)), (plane(20.0),), False),
+    ],
+)
+def test_an_alternative_that_a_person_sees_no_difference_to_is_like_another_one(
+    offering: ModuleType, rotation: Floats, planes: tuple[Plane, ...], like: bool
+) -> None:
+    assert offering.Offer(UPRIGHT, (plane(20.0),)).is_like(offering.Offer(rotation, planes), 60.0) is like
+
+
+def test_a_branch_is_offered_whole_and_cut_and_no_two_alternatives_are_alike(offering: ModuleType) -> None:
+    offers = offering.offers_of(branch(), load(settings=["search.directions=60"]))
+    assert {bool(offer.planes) for offer in offers} == {False, True}
+    assert [offer.today for offer in offers] == [True] + [False] * (len(offers) - 1)
+    assert len(offering.distinct([], offers, 50.0, 99)) == len(offers) >= offering.LEAST
