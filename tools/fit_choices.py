@@ -28,7 +28,7 @@ from machine.app.pipeline.pricing import pricing
 from mdp.cost.cost import measure_seam, weight_of_stairs
 from mdp.cost.footing import Plate, Stance
 from mdp.cost.model_need import MADE_BY_A_CUT
-from mdp.directions.orientation import diameter_mm, measure_upright, standing_still
+from mdp.directions.orientation import diameter_mm, standing_still
 from mdp.directions.revolution import find_revolution
 from mdp.joint import is_sound
 from mdp.mesh import Floats
@@ -123,8 +123,8 @@ def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[
     row, parts, of_file = front_row(node), make_parts(problem, node), turn[2][2] > 1.0 - 1e-6
     price = pricing(profile)(parts) or Price(nan, nan)
     seen_mm, hidden_mm = seams_by_sight(node)
-    upright, revolution = measure_upright(problem.mesh, profile.process.self_supporting_angle_deg), find_revolution(problem.mesh)
-    stance = Plate.under(problem.mesh, profile).stance(upright, of_file=of_file)
+    revolution = find_revolution(problem.mesh)
+    stance = Plate.under(problem.mesh, profile).stance(np.eye(3), of_file=of_file)
     askew = revolution is not None and not revolution.is_square_to(UP)
     scars_mm2, stairs_mm2 = sum(cut.cost.seam_mm2 for cut in node.cuts), row.stairs_mm2 / weight_of_stairs(profile)
     support_mm2 = row.cost_mm2 - scars_mm2 - row.stairs_mm2

@@ -7,13 +7,14 @@ of the contact, less what the weight presses on it.
 
 from dataclasses import dataclass
 from enum import IntEnum
+from math import atan2, degrees
 
 import numpy as np
 from manifold3d import CrossSection, JoinType
 
 from mdp.cut import Solid, solid_of
-from mdp.directions.orientation import LEAN_DEG, Orientation, centre_of_mass
-from mdp.mesh import Floats, Mesh
+from mdp.directions.orientation import LEAN_DEG, SIDES, centre_of_mass, diameter_mm
+from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
 from profiles.profile import Profile
@@ -22,23 +23,12 @@ PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact
 ADHESION_MPA = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give
 NEWTON_PER_G = 9.81e-3
 BRIM_SEGMENTS = 32  # of a full turn around a corner
-# Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does, and for
-# every degree less; by which it stands firmly, where it rests and however it leans; and of a flat base.
-SMALL_BASE, LEANING_BASE, LEANING_BASE_DEG = 0.015, 0.03, 0.0015
-FIRM_BASE, FIRM_LEANING_BASE, FLAT_BASE = 0.05, 0.12, 0.2
-BROAD_DEG = 15.0  # by which a model on a broad stance may be leaned
-
-
-def plate_tension_mpa(solid: Solid, centre: Floats, rotation: Floats, brim_mm: float, density_g_cm3: float) -> float:
-    """The greatest tension under a solid that is turned by a rotation (3, 3) and set on the plate. centre (3,): its centre of
-    mass; brim_mm: the width of the brim around its contact; density_g_cm3: as if it were printed solid."""
-    turned = solid.transform(np.column_stack([rotation, np.zeros(3)]))
-    bounds = turned.bounding_box()
-    contact = turned.slice(bounds[2] + 0.5 * PLATFORM_TOLERANCE_MM)
-    if brim_mm > 0.0:
-        contact = contact.offset(brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS)
-    weight_n = 1e-3 * density_g_cm3 * solid.volume() * NEWTON_PER_G
-    return _tension_mpa(section_edges(contact), bounds[5] - bounds[2], weight_n, (rotation @ centre)[:2])
+# Of the diameter: so high above the plate a rounded end is as wide as its base; brim and support fill in what is rounded below.
+BLUNT = 0.01
+# Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does; by
+# which it stands firmly; and of a flat base. The last two tell best what people choose (tools/RESULTS.md).
+SMALL_BASE, LEANING_BASE, FIRM_BASE, FLAT_BASE = 0.015, 0.03, 0.1, 0.2
+BROAD_DEG = 15.0  # by which a model on a broad stance may be tilted
 
 
 class Stance(IntEnum):
@@ -52,10 +42,13 @@ class Stance(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """The plate under a model: its solid and centre of mass, the width of the brim that a small base gets, and the density."""
+    """The plate under a model: its mesh and solid, its centre of mass and diameter, the width of the brim that a small base gets,
+    and the density, as if it were printed solid."""
 
+    mesh: Mesh
     solid: Solid
     centre: Floats
+    diameter_mm: float
     brim_mm: float
     density_g_cm3: float
 
@@ -63,27 +56,52 @@ class Plate:
     def under(cls, mesh: Mesh, profile: Profile) -> "Plate":
         """The plate under a mesh, by a profile."""
         brim_mm = profile.process.brim_mm or profile.process.small_base_brim_mm
-        return cls(solid_of(mesh), centre_of_mass(mesh), brim_mm, profile.material.density_g_cm3)
+        return cls(mesh, solid_of(mesh), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, profile.material.density_g_cm3)
 
-    def stance(self, orientation: Orientation, of_file: bool = False) -> Stance:
-        """How the model stands in an orientation; of_file: in that of its file, which is believed to stand if it does not tip
-        over by itself."""
-        share, lean_deg, stable = orientation.standing_share, orientation.lean_deg, orientation.stable
-        rests = stable or (of_file and lean_deg >= 0.0)
-        least = SMALL_BASE if rests else LEANING_BASE + LEANING_BASE_DEG * (LEAN_DEG - lean_deg)
-        based = share >= least and lean_deg >= -LEAN_DEG
-        if not (stable or based):
+    def stance(self, rotation: Floats, of_file: bool = False) -> Stance:
+        """How the model stands when it is turned by a rotation (3, 3); of_file: as in its file, where it is believed to stand if
+        it does not tip over by itself."""
+        base = self._base(rotation)
+        share, lean_deg = base.area() / self._shadow_mm2(rotation), self._lean_deg(rotation, base)
+        rests = lean_deg >= (0.0 if of_file else LEAN_DEG)
+        based = share >= (SMALL_BASE if rests else LEANING_BASE) and lean_deg >= -LEAN_DEG
+        alone, with_brim = (self.tension_mpa(rotation, brim_mm) <= ADHESION_MPA for brim_mm in (0.0, self.brim_mm))
+        if not (lean_deg >= LEAN_DEG and alone) and not (based and with_brim):
             return Stance.LOOSE
-        if not (stable and self._holds(orientation, 0.0)) and not (based and self._holds(orientation, self.brim_mm)):
-            return Stance.LOOSE
-        if stable and share >= FLAT_BASE:
+        if lean_deg >= LEAN_DEG and share >= FLAT_BASE:
             return Stance.FLAT
-        firm = share >= (FIRM_BASE if stable else FIRM_LEANING_BASE) or (based and lean_deg >= BROAD_DEG)
-        return Stance.FIRM if firm else Stance.HELD
+        return Stance.FIRM if share >= FIRM_BASE or (based and lean_deg >= BROAD_DEG) else Stance.HELD
 
-    def _holds(self, orientation: Orientation, brim_mm: float) -> bool:
-        """Whether the plate holds the model in an orientation with such a brim."""
-        return plate_tension_mpa(self.solid, self.centre, orientation.rotation, brim_mm, self.density_g_cm3) <= ADHESION_MPA
+    def tension_mpa(self, rotation: Floats, brim_mm: float = 0.0) -> float:
+        """The greatest tension under the model, with a brim around its base."""
+        base, (low, high) = self._base(rotation), self._heights_mm(rotation)
+        if brim_mm > 0.0:
+            base = base.offset(brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS)
+        weight_n = 1e-3 * self.density_g_cm3 * self.solid.volume() * NEWTON_PER_G
+        return _tension_mpa(section_edges(base), high - low, weight_n, (rotation @ self.centre)[:2])
+
+    def _base(self, rotation: Floats) -> CrossSection:
+        """What the model stands on: the larger of the sections where it touches the plate and a little above."""
+        turned, (low, _) = self.solid.transform(np.column_stack([rotation, np.zeros(3)])), self._heights_mm(rotation)
+        heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm)
+        return max((turned.slice(low + height_mm) for height_mm in heights_mm), key=CrossSection.area)
+
+    def _heights_mm(self, rotation: Floats) -> tuple[float, float]:
+        heights = self.mesh.vertices @ rotation[2]
+        return float(heights.min()), float(heights.max())
+
+    def _shadow_mm2(self, rotation: Floats) -> float:
+        """The area of the model's shadow, surfaces above each other counted each."""
+        return 0.5 * float(np.abs(dot(self.mesh.normals, rotation[2])) @ self.mesh.areas_mm2)
+
+    def _lean_deg(self, rotation: Floats, base: CrossSection) -> float:
+        """The least angle by which the model, tilted to any of 64 sides, has its centre of mass over the edge of a base; below 0
+        where it is not over the base to begin with."""
+        corners, centre = section_edges(base)[:, :2], rotation @ self.centre
+        if len(corners) == 0:
+            return -90.0
+        reach_mm = float(((corners - centre[:2]) @ SIDES).max(axis=0).min())
+        return degrees(atan2(reach_mm, float(centre[2]) - self._heights_mm(rotation)[0]))
 
 
 def tips_over(base: CrossSection, height_mm: float) -> bool:

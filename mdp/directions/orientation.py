@@ -33,13 +33,11 @@ SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 3
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """A model turned as a whole: rotation (3, 3), what is risky then, which share of the model's shadow the faces are that stand
-    on the plate, by what angle it may be leaned before it tips over (below 0: it tips over by itself), how high it stands, and
-    the area of its stairs, each face times the height of its steps in layers."""
+    """A model turned as a whole: rotation (3, 3), what is risky then, by what angle it may be tilted before it tips over, below 0
+    where it tips over by itself, how high it stands, and the area of its stairs: each face times the height of its steps."""
 
     rotation: Floats
     risky_mm2: float
-    standing_share: float
     lean_deg: float
     height_mm: float
     stairs_mm2: float
@@ -163,12 +161,10 @@ def facet_orientations(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
 def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
     facing_down, standing = _areas_down(mesh, directions, angle_deg)
     lean_deg, corners = _lean_deg(mesh, directions), convex_hull(mesh.vertices).vertices
-    shadows = [0.5 * float(np.abs(dot(mesh.normals, direction)) @ mesh.areas_mm2) for direction in directions]
     return [
         Orientation(
             rotation=_rotation(direction),
             risky_mm2=max(float(facing_down[k] - standing[k]), 0.0),
-            standing_share=float(standing[k]) / shadows[k],
             lean_deg=float(lean_deg[k]),
             height_mm=float(np.ptp(dot(corners, direction))),
             stairs_mm2=float(step_shares(dot(mesh.normals, direction)) @ mesh.areas_mm2),

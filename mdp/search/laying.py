@@ -125,7 +125,7 @@ def glimpses_of(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[Glimps
     glimpses, plate, surface_mm2 = [], Plate.under(mesh, profile), float(mesh.areas_mm2.sum())
     for orientation, turned, bare in zip(orientations, meshes, prices, strict=True):
         of_file = orientation is upright
-        stance = plate.stance(orientation, of_file=of_file)
+        stance = plate.stance(orientation.rotation, of_file=of_file)
         footing_mm2 = surface_mm2 * (FOOTING[stance] + (0.0 if of_file else TURNED))
         bare_mm2 = footing_mm2 + (inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm))
         scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
@@ -175,7 +175,7 @@ def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
     others = [other for other in others if revolution is None or revolution.is_square_to(other.rotation[2])]
     worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
     distinct, stances, plate = [upright], [Stance.LOOSE], Plate.under(mesh, profile)
-    loose = plate.stance(upright, of_file=True) == Stance.LOOSE
+    loose = plate.stance(upright.rotation, of_file=True) == Stance.LOOSE
     for orientation in sorted(others, key=lambda other: round(costs_mm2(other), 6)):
         if len(distinct) > RESTING:
             break
@@ -183,7 +183,7 @@ def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
         near = any(float(orientation.rotation[2] @ other.rotation[2]) > NEAR for other in known)
         if near or any(_alike(orientation, other, worst_mm2) for other in known):
             continue
-        stance = plate.stance(orientation)
+        stance = plate.stance(orientation.rotation)
         if stance > Stance.LOOSE:
             distinct.append(orientation)
             stances.append(stance)

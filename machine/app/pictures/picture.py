@@ -42,7 +42,7 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
 
 def parts_apart(parts: Sequence[Part]) -> list[Mesh]:
     """The meshes of parts, each moved away from the part that it stands on."""
-    low, high = np.min([part.mesh.bounds_mm[0] for part in parts], axis=0), np.max([part.mesh.bounds_mm[1] for part in parts], axis=0)
+    low, high = (pick([part.mesh.bounds_mm[side] for part in parts], axis=0) for side, pick in enumerate((np.min, np.max)))
     gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(high - low))
     return [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
 
