@@ -110,8 +110,9 @@ def test_a_model_becomes_the_plan_and_the_parts_of_the_command_line(bench: Runni
 
 def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: Running, folder: Path) -> None:
     (folder / "tee.stl").write_bytes(stl(tee()))
-    assert main(["decompose", "tee.stl", *QUICK, "--ranker", "learned", "-o", "parts"]) == 0
+    assert main(["decompose", "tee.stl", *QUICK, "--set=search.seam_mm=100", "--ranker", "learned", "-o", "parts"]) == 0
     with bench.line() as page:
+        page.do("set", key="search.seam_mm", value="100")  # too dear to be cut
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
         assert "Ranked as none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
@@ -127,6 +128,7 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
         assert bench.ask("plan.toml")[1] == (folder / "parts" / "plan.toml").read_bytes()
         page.do("undo")
         page.until(lambda state: state["rotation"] == as_it_lies["rotation"] and state["front"] == as_it_lies["front"])
+        page.do("set", key="search.seam_mm", value="0.8")
 
 
 @pytest.mark.parametrize("kept", ["turned", "locked", "marked", "set"])
