@@ -84,7 +84,7 @@ def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int =
     end, most_mm2 = len(parts) - by_hand, BULK * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
     weakest = weakest_of(joints_of(parts, profile)[: end - 1])
     firm = weakest is None or weakest.load_n >= search.strength_safety * search.nozzle_load_n
-    large = end == 1 or parts[0].volume_mm3 >= FIRST * sum(part.volume_mm3 for part in parts)
+    large = end == 1 or parts[0].volume_mm3 >= FIRST * sum(part.volume_mm3 for part in parts[:end])
     return firm and large and all(_base_hull_mm2(part) <= most_mm2 for part in parts[1:end])
 
 

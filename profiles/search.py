@@ -38,8 +38,8 @@ class Search(Frozen):
         5.0,
         ge=0,
         le=100,
-        description="width of the scar that a seam leaves on a model of 100 mm, in proportion on others, mm: a cut must make "
-        "more surface safe than its rim takes; 0: the paper's objective",
+        description="width of the scar that a seam leaves on a model of 100 mm from end to end, in proportion on others, mm: a "
+        "cut must make more surface safe than its rim takes; 0: the paper's objective",
     )
     feather_weight: float = Field(
         0.5,

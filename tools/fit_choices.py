@@ -82,11 +82,20 @@ def add_to_book(models: Path, offers: Path, verdicts: Sequence[Path], profile: P
     known, said = {entry["sheet"]: entry for entry in read_book(BOOK)}, [read_verdicts(file) for file in verdicts]
     for entry in read_book(offers):
         name, own = entry["sheet"], [file[entry["sheet"]] for file in said if entry["sheet"] in file]
+        for verdict in own:
+            if set(verdict["marks"]) != set(entry["alternatives"]):
+                raise SystemExit(
+                    f"{name}: every letter of {''.join(entry['alternatives'])} needs one mark, not {verdict['marks']}"
+                )
         if name not in known and own:
             measure(entry, files[name], profile)
             known[name] = entry | {"verdicts": []}
+        elif own and [len(one["planes"]) for one in known[name]["alternatives"].values()] != [
+            len(one["planes"]) for one in entry["alternatives"].values()
+        ]:
+            raise SystemExit(f"{name}: the book has other alternatives by these letters")
         if name in known:
-            known[name]["verdicts"] += own
+            known[name]["verdicts"] += [verdict for verdict in own if verdict not in known[name]["verdicts"]]
     BOOK.write_text("".join(json.dumps(entry) + "\n" for _, entry in sorted(known.items())))
 
 
@@ -95,7 +104,9 @@ def read_verdicts(file: Path) -> dict[str, dict[str, Any]]:
     said: dict[str, dict[str, Any]] = {}
     for row in csv.reader(file.read_text().splitlines()):
         if len(row) >= 4 and row[0].strip() != "sheet":
-            marks = {letter: mark for mark, cell in zip(MARKS, row[1:4], strict=True) for letter in cell if letter.isalpha()}
+            marks = {
+                letter: mark for mark, cell in zip(MARKS, row[1:4], strict=True) for letter in cell.upper() if letter.isalpha()
+            }
             said[row[0].strip().removesuffix(".png")] = {"marks": marks, "reason": ",".join(row[4:]).strip()}
     return said
 
@@ -122,7 +133,7 @@ def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[
     node = cut_by_hand(problem, PlanFile("", parts=tuple(PlannedPart.of(plane_of(p)) for p in reversed(alternative["planes"]))))
     row, parts, of_file = front_row(node), make_parts(problem, node), turn[2][2] > 1.0 - 1e-6
     price = pricing(profile)(parts) or Price(nan, nan)
-    seen_mm, hidden_mm = seams_by_sight(node)
+    seen_mm, hidden_mm = seams_by_sight(node, profile.search.hidden_seam_share)
     revolution = find_revolution(problem.mesh)
     stance = Plate.under(problem.mesh, profile).stance(np.eye(3), of_file=of_file)
     askew = revolution is not None and not revolution.is_square_to(UP)
@@ -140,13 +151,15 @@ def plane_of(known: dict[str, Any]) -> Plane:
     return Plane(np.array(known["normal"]), known["offset_mm"], limbs_mm)
 
 
-def seams_by_sight(node: Node) -> tuple[float, float]:
-    """How long the seams of a node's cuts are in plain sight, and hidden, mm; half hidden counts half in both."""
-    weights = node.places.by_source
-    least, seen_mm, hidden_mm = float(weights.min()), 0.0, 0.0
+def seams_by_sight(node: Node, hidden_share: float) -> tuple[float, float]:
+    """How long the seams of a node's cuts are in plain sight, and hidden, mm; half hidden counts half in both. hidden_share: how
+    much a hidden mm counts."""
+    weights, seen_mm, hidden_mm = node.places.by_source, 0.0, 0.0
     for step, before in _cuts(node):
         sources, base = before.piece.sources, step.cuts[-1].base
-        seen = np.where(sources == MADE_BY_A_CUT, 0.0, np.clip((weights[sources] - least) / max(1.0 - least, 1e-9), 0.0, 1.0))
+        seen = np.where(
+            sources == MADE_BY_A_CUT, 0.0, np.clip((weights[sources] - hidden_share) / (1.0 - hidden_share), 0.0, 1.0)
+        )
         cut: Mask = np.ones(len(sources), np.bool_) if base.limbs_mm is None else limb_faces(before.remainder, base)
         rim = measure_seam(before.remainder.mesh, np.where(cut, seen, 0.0), base, 0.0)
         seen_mm, hidden_mm = seen_mm + rim.weighted_mm, hidden_mm + max(step.seams[-1].length_mm - rim.weighted_mm, 0.0)

@@ -1,4 +1,4 @@
-"""Sheets of alternatives for the book of choices (tools/choices): how a model could be laid down and cut, for blind judging.
+"""Sheets of alternatives for the book of choices (tools/choices.jsonl): ways to orient and cut a model, for blind judging.
 
 `python tools/offer_parts.py LIST.csv FOLDER` reads lines of id, file, class, source, size_mm. For each model, scaled to a longest
 side of size_mm, it gathers one piece in its best orientations and rows of several fronts: at the standard weights, with dearer
@@ -44,7 +44,7 @@ WHOLE = 3  # orientations in which one piece is offered
 FURTHER = 4  # orientations in which cuts are sought where there is little to choose from
 SAME = cos(radians(15.0))  # between the directions of orientations and planes that are one
 SAME_MM = 0.04  # between the heights of planes that are one, as a share of the longest side
-SEAMS: tuple[dict[str, float], ...] = ({}, {"seam_mm": 1.6, "hidden_seam_share": 0.25})
+SEAMS: tuple[dict[str, float], ...] = ({}, {"seam_mm": 10.0})
 CHEAP = ({"seam_mm": 0.1, "cut_mm2": 0.0, "feature_mm2": 0.0},)  # where those find little
 PIXELS = 400
 
@@ -127,14 +127,14 @@ def offers_of(mesh: Mesh, profile: Profile) -> list[Offer]:
     resting = [Offer(turn.rotation, ()) for turn in resting_orientations(mesh, profile.process.self_supporting_angle_deg)]
     for seams, poses in ((SEAMS, whole[:2]), (CHEAP, whole), (CHEAP, resting[:FURTHER])):
         rows = [cut_rows(mesh, pose.rotation, profile, seams) for pose in poses]
-        for several in zip_longest(rows):
+        for several in in_turns(rows):
             offers += distinct(offers, several, size_mm, MOST - len(offers))
         if len(offers) >= LEAST:
             break
     return offers + distinct(offers, resting, size_mm, LEAST - len(offers))
 
 
-def zip_longest(rows: Sequence[Sequence[Offer]]) -> Iterator[list[Offer]]:
+def in_turns(rows: Sequence[Sequence[Offer]]) -> Iterator[list[Offer]]:
     """The first of each list, then the second of each, as far as they go."""
     for place in range(max(map(len, rows), default=0)):
         yield [row[place] for row in rows if place < len(row)]

@@ -65,8 +65,8 @@ class Plate:
         share, lean_deg = base.area() / self._shadow_mm2(rotation), self._lean_deg(rotation, base)
         rests = lean_deg >= (0.0 if of_file else LEAN_DEG)
         based = share >= (SMALL_BASE if rests else LEANING_BASE) and lean_deg >= -LEAN_DEG
-        alone, with_brim = (self.tension_mpa(rotation, brim_mm) <= ADHESION_MPA for brim_mm in (0.0, self.brim_mm))
-        if not (lean_deg >= LEAN_DEG and alone) and not (based and with_brim):
+        alone = lean_deg >= LEAN_DEG and self._tension_mpa(rotation, base, 0.0) <= ADHESION_MPA
+        if not alone and not (based and self._tension_mpa(rotation, base, self.brim_mm) <= ADHESION_MPA):
             return Stance.LOOSE
         if lean_deg >= LEAN_DEG and share >= FLAT_BASE:
             return Stance.FLAT
@@ -74,7 +74,10 @@ class Plate:
 
     def tension_mpa(self, rotation: Floats, brim_mm: float = 0.0) -> float:
         """The greatest tension under the model, with a brim around its base."""
-        base, (low, high) = self._base(rotation), self._heights_mm(rotation)
+        return self._tension_mpa(rotation, self._base(rotation), brim_mm)
+
+    def _tension_mpa(self, rotation: Floats, base: CrossSection, brim_mm: float) -> float:
+        low, high = self._heights_mm(rotation)
         if brim_mm > 0.0:
             base = base.offset(brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS)
         weight_n = 1e-3 * self.density_g_cm3 * self.solid.volume() * NEWTON_PER_G

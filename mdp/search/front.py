@@ -155,6 +155,13 @@ class Choice:
     note: tuple[str, ...] = ()
 
 
+def charge_mm2(rows: Sequence[FrontRow], worth: Worth, least_saving: float) -> float:
+    """What every part more than the first of some rows has is charged: a share of what that costs with its time; nothing where
+    time counts nothing, as without support, or where no row has a time."""
+    timed = [row for row in rows if row.time_s is not None]
+    return least_saving * (timed[0].cost_mm2 + (worth.of_row(timed[0]) or 0.0)) if worth and timed else 0.0
+
+
 def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0) -> Choice:
     """The row whose cost, with its time and filament and a charge for every further part, is least. rows: by their number of
     parts.
@@ -167,9 +174,9 @@ def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0) ->
     timed = [place for place in paying if rows[place].time_s is not None]
     places, first = timed or paying, (timed or paying)[0]
     totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
-    charge_mm2 = least_saving * totals[first]
+    charge = charge_mm2([rows[place] for place in places], worth, least_saving)
     if worth and timed:
-        taken = min(places, key=lambda place: totals[place] + charge_mm2 * (rows[place].parts - rows[first].parts))
+        taken = min(places, key=lambda place: totals[place] + charge * (rows[place].parts - rows[first].parts))
     else:
         taken = places[_first_alike([rows[place].cost_mm2 for place in places])]
     scars = places[_first_alike([rows[place].cost_mm2 for place in places])]

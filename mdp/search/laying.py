@@ -19,7 +19,7 @@ from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import side_by_side
 from mdp.mesh import Mesh
 from mdp.search.coarse import as_it_is, coarse_copy
-from mdp.search.front import EQUAL, Price, Pricing, Worth, front_row, price_row
+from mdp.search.front import EQUAL, Price, Pricing, Worth, charge_mm2, front_row, price_row
 from mdp.search.parts import one_piece
 from mdp.search.problem import Problem
 from mdp.search.search import decompose
@@ -29,19 +29,19 @@ from profiles.profile import Profile
 RESTING = 20  # orientations that are ranked, those that a symmetry makes alike counted once
 PRICED = 3  # of them whose bare time is looked at
 # Shares of a model's surface that it counts as blemished surface how it stands on the plate, and that it lies otherwise than its
-# file has it: learned from choices between orientations (tools/fit_choices.py).
+# file has it: learned from choices between orientations (tools/fit_choices.py), TURNED also from what judges objected to.
 FOOTING = {Stance.LOOSE: 0.14, Stance.HELD: 0.11, Stance.FIRM: 0.1, Stance.FLAT: 0.0}
 TURNED = 0.06
 NEAR = cos(radians(15.0))  # orientations that differ by less are one
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
-# Fitted to whole searches of 429 orientations of 66 models (tools/RESULTS.md).
+# Fitted to whole searches of 429 orientations of 66 models with seams of 0.8 mm (tools/RESULTS.md).
 LEFT, STAIRS_LEFT = 0.6, 0.75  # share of what needs support in one piece that cuts leave, and of the stairs
 LEAST_LEFT, LEAST_STAIRS_LEFT = 0.3, 0.45  # where they do well: chosen on 34 models more, on which LEFT promised too much
 # Of what the model costs as it stands: a forecast below the first leaves no doubt, one above the second no hope.
 NO_DOUBT, DOUBT = 0.9, 1.3
 PROMISING = 1.03  # of the same: narrow searches end higher
-SEARCHED, COARSER = 2, 3  # ways to lie that a narrow search cuts, in so many times fewer directions
+SEARCHED, COARSER = 2, 3  # orientations that a narrow search cuts, in so many times fewer directions
 PricingBy = Callable[[Profile], Pricing]
 
 
@@ -92,9 +92,9 @@ def _lying(
     glimpse: "Glimpse", decomposition: Decomposition, upright: Orientation, profile: Profile, standing: FrontRow | None = None
 ) -> Lying:
     """A model in an orientation and cut, with all that this costs."""
-    worth, row, one_piece = Worth.of(profile), decomposition.chosen, decomposition.front[:1]
-    charge_mm2 = profile.search.least_saving * min(total_mm2(one_piece[0], worth), total_mm2(row, worth)) if one_piece else 0.0
-    total = total_mm2(row, worth) + glimpse.footing_mm2 + (len(decomposition.parts) - 1) * charge_mm2
+    worth, row, further = Worth.of(profile), decomposition.chosen, len(decomposition.parts) - 1
+    charge = charge_mm2(decomposition.front, worth, profile.search.least_saving) if further else 0.0
+    total = total_mm2(row, worth) + glimpse.footing_mm2 + further * charge
     orientation = None if glimpse.orientation is upright else glimpse.orientation
     return Lying(orientation, decomposition, total, standing or (row if orientation is None else None), upright, glimpse.stance)
 

@@ -224,8 +224,8 @@ def _neighbours(problem: Problem, plane: Plane, pivots: Floats, share: float, tu
 
 
 def _pivots(corners: Floats) -> Floats:
-    """(3, 3) the middle of the corners of a cut face, and the two of them that are farthest from each other: a plane that ends in
-    a concave edge stays there when it leans about it."""
+    """(3, 3) the middle of the corners of a cut face, the corner that is farthest from it, and the one farthest from that: a
+    plane that ends in a concave edge stays there when it leans about it."""
     middle = corners.mean(axis=0)
     one = corners[int(np.argmax(np.round(np.linalg.norm(corners - middle, axis=1), 6)))]
     other = corners[int(np.argmax(np.round(np.linalg.norm(corners - one, axis=1), 6)))]

@@ -236,8 +236,9 @@ def _polish_rows(problem: Problem, front: Front) -> None:
 
 def _paying(problem: Problem, front: Front) -> list[Node]:
     """The nodes of a front that the search has cut and that cost less than all with fewer cuts."""
-    nodes = [node for node in front.nodes if all(node.cost_mm2 < fewer.cost_mm2 for fewer in front.nodes[: len(node.cuts)])]
-    return [node for node in nodes if len(node.cuts) > len(problem.start.cuts)]
+    nodes = front.nodes
+    paying = [node for place, node in enumerate(nodes) if all(node.cost_mm2 < fewer.cost_mm2 for fewer in nodes[:place])]
+    return [node for node in paying if len(node.cuts) > len(problem.start.cuts)]
 
 
 def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:

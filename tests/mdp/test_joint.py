@@ -134,6 +134,12 @@ def test_the_papers_terms_know_no_unsound_parts() -> None:
     assert sound(m3.Manifold.cube((40.0, 40.0, 40.0), True), (UP, 0.0), seam_mm=0.0)
 
 
+def test_the_first_part_is_a_share_of_what_a_person_has_left_of_the_model() -> None:
+    mesh = mesh_of(m3.Manifold.cube((10.0, 10.0, 100.0)))
+    parts = cut(mesh, (UP, 20.0), (UP, 5.0))  # 5 of 20 mm, of 100 mm in all
+    assert [is_sound(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1)] == [False, True]
+
+
 def test_a_cut_that_a_person_asked_for_is_not_tested_but_those_beside_it_are() -> None:
     mesh = mesh_of(m3.Manifold.cube((40.0, 40.0, 40.0), True))
     parts = cut(mesh, (UP, 10.0), (UP, -10.0))

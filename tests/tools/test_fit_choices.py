@@ -8,7 +8,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from mdp.plane import Plane
+from mdp.search.problem import Problem
 from profiles.profile import load
+from tests.shapes import box
 
 TOOLS = Path(__file__).parents[2] / "tools"
 
@@ -66,6 +69,12 @@ def test_every_cut_is_charged_before_the_least_cost_is_taken(choices: ModuleType
     }
     entry, only_support = {"surface_mm2": 1.0, "diameter_mm": 60.0, "alternatives": alternatives}, np.eye(len(costs))[0]
     assert [choices.taken(entry, only_support, share) for share in (0.0, 0.05, 0.07, 0.09)] == ["C", "C", "B", "A"]
+
+
+def test_no_seam_is_hidden_on_a_convex_model(choices: ModuleType) -> None:
+    problem = Problem(box(20, 30, 40), load())
+    node = problem.cut(problem.root, Plane(np.array([0.0, 0.0, 1.0]), 15.0))
+    assert choices.seams_by_sight(node, 0.25) == pytest.approx((100.0, 0.0))
 
 
 def test_verdicts_are_read_with_their_reasons(choices: ModuleType, tmp_path: Path) -> None:

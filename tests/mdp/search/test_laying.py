@@ -142,6 +142,16 @@ def test_no_orientation_is_taken_that_the_machine_has_no_room_for() -> None:
     assert lay_down(tee(), PROFILE, on_a_small_plate, search).orientation is None
 
 
+def test_a_model_that_cannot_be_printed_as_it_stands_once_it_is_searched_is_laid_down() -> None:
+    def too_high(profile: Profile) -> Pricing:
+        bare = profile.process.support == "none"  # a forecast's
+        return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) < 39 else None
+
+    lying, _ = searches(tee(), too_high)
+    assert lying.orientation is not None
+    assert np.isfinite(lying.total_mm2)
+
+
 def test_the_side_that_a_model_lies_on_has_a_name() -> None:
     assert side_in_words(measure_upright(tee(), 45.0)) == "as it stands"
     sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}

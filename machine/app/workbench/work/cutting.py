@@ -4,6 +4,7 @@ import zipfile
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -110,7 +111,7 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
     with suppress(PlanError):
         parts = parts_of(row)
         cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts, front=()), prices=True)
-        by_hand = sum(part in bench.locked for part in parts)
+        by_hand = sum(1 for _ in takewhile(bench.locked.__contains__, reversed(parts)))
         return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile, by_hand) else replace(row, sound=False)
     return row
 
