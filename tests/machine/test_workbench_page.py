@@ -116,6 +116,9 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.click("#undo")
     browser.wait("$('front').value === $('front').max && !$('redo').disabled")
     assert "laid down" not in browser.value("$('front-notes').textContent")
+    with bench.line() as second_page:
+        second_page.do("set", key="search.seam_mm", value="100")  # too dear to be cut
+        second_page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
     browser.click("#orient")
     browser.value("$('ranker').value = 'learned'")
     browser.click("#find")
@@ -124,6 +127,9 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.wait(f"{SHARES_DRAWN}.every((share) => share > 0.05 && share < 0.9)")  # of both small pictures
     browser.click("#undo")
     browser.wait("!$('laid').checkVisibility()")
+    with bench.line() as second_page:
+        second_page.do("set", key="search.seam_mm", value="0.8")
+        second_page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
 
 
 def test_red_follows_the_model_while_it_turns_and_the_server_says_the_same(browser: Browser, bench: Running) -> None:

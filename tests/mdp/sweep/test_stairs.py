@@ -83,7 +83,7 @@ def test_the_forecast_counts_the_stairs_that_the_parts_have_after_cutting(
 
 
 def found(mesh: Mesh, *given_settings: str) -> Decomposition:
-    return decompose(mesh, "mesh", load(settings=["search.directions=200", *given_settings]))
+    return decompose(mesh, "mesh", load(settings=["search.directions=200", f"search.stair_weight={WEIGHT}", *given_settings]))
 
 
 @pytest.mark.parametrize("layer_mm", [0.1, 0.2])

@@ -113,6 +113,7 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
     assert main(["decompose", "tee.stl", *QUICK, "--set=search.seam_mm=100", "--ranker", "learned", "-o", "parts"]) == 0
     with bench.line() as page:
         page.do("set", key="search.seam_mm", value="100")  # too dear to be cut
+        page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
         assert "Ranked as none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
