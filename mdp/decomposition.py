@@ -56,8 +56,8 @@ class FrontRow:
     """A decomposition: its planes in the order of the cuts, and what it costs.
 
     seam_mm: length of the rims of all cuts; stairs_mm2: what the stairs of all parts count in the cost; time_s, filament_mm:
-    estimates, None where there is none; reason: why it is chosen; sound: whether its joints bear the nozzle's push and no cut
-    passes through the bulk of the model."""
+    estimates, None where there is none; reason: why it is chosen; sound: whether its joints bear the nozzle's push, no cut
+    passes through the bulk of the model, and the first part is no sliver of it."""
 
     planes: tuple[Plane, ...]
     support_area_mm2: float

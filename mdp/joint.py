@@ -14,13 +14,14 @@ from manifold3d import CrossSection
 from mdp.cost.footing import section_edges
 from mdp.cut import Solid, mesh_of, solid_of
 from mdp.decomposition import Part
+from mdp.directions.orientation import diameter_mm
 from mdp.mesh import Floats, Mesh
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
 from profiles.profile import Profile
 
 BESIDE_MM = 0.02  # of a base plane sections are taken: on it they would be those of a face
-# Of the square of a model's longest side: the convex hull of a cut through a neck or the root of a limb is smaller.
-BULK = 0.2
+# Of the square of a model's diameter: the convex hull of a cut through a neck or the root of a limb is smaller.
+BULK = 0.15
 FIRST = 0.15  # of the volume: a first part that is less is a sliver, and no foot for all that leans on it
 TOUCHING_MM2 = 0.01  # sections that share less only meet in an edge
 
@@ -81,7 +82,7 @@ def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int =
     search = profile.search.effective
     if search.seam_mm <= 0.0:
         return True
-    end, most_mm2 = len(parts) - by_hand, BULK * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
+    end, most_mm2 = len(parts) - by_hand, BULK * diameter_mm(mesh) ** 2
     weakest = weakest_of(joints_of(parts, profile)[: end - 1])
     firm = weakest is None or weakest.load_n >= search.strength_safety * search.nozzle_load_n
     large = end == 1 or parts[0].volume_mm3 >= FIRST * sum(part.volume_mm3 for part in parts[:end])

@@ -49,7 +49,7 @@ class Search(Frozen):
         "such edges are thin, warp and break",
     )
     cut_mm2: float = Field(
-        20.0,
+        10.0,
         ge=0,
         le=10000,
         description="what a cut costs beside its seam: one more turn, one more joint that can fail, mm2; a cut that saves less "
@@ -106,7 +106,7 @@ class Search(Frozen):
         "and holds less well",
     )
     least_saving: float = Field(
-        0.04,
+        0.03,
         ge=0,
         le=1,
         description="share of what one piece costs, with its time and filament, that every further part must save; where more "

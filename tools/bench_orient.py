@@ -17,7 +17,7 @@ from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words
 from mdp.model_file import locate
 from mdp.read import read_mesh
-from mdp.search.laying import lay_down
+from mdp.search.orient import orient_and_decompose
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
 
@@ -53,10 +53,14 @@ def row(model: str, profile: Profile) -> str:
     mesh, _ = read_mesh(locate(model), profile.process.scale, profile.process.rotate_deg)
     search = partial(decompose, name=model, profile=profile, price=pricing(profile))
     upright, search_s = timed(lambda: search(mesh))
-    lying, lay_s = timed(lambda: lay_down(mesh, profile, pricing, search))
-    whole, laid = upright.front[0], lying.decomposition
+    oriented, lay_s = timed(lambda: orient_and_decompose(mesh, profile, pricing, search))
+    whole, laid = upright.front[0], oriented.decomposition
     cells = [model.rsplit("/", 1)[-1], f"{whole.cost_mm2:.0f}, {(whole.time_s or 0.0) / 60:.0f}"]
-    cells += [str(len(upright.parts)), figures(upright, whole), "-" if lying.orientation is None else in_words(lying.orientation)]
+    cells += [
+        str(len(upright.parts)),
+        figures(upright, whole),
+        "-" if oriented.orientation is None else in_words(oriented.orientation),
+    ]
     cells += [str(len(laid.parts)), figures(laid, whole), f"{search_s:.1f}", f"{lay_s / search_s:.1f}"]
     return "| " + " | ".join(cells) + " |"
 

@@ -34,7 +34,7 @@ from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats, Indices
 from mdp.model_file import locate
 from mdp.pose import Pose, rotation
-from mdp.search.laying import lay_down
+from mdp.search.orient import orient_and_decompose
 from mdp.search.search import decompose
 from profiles.machine import Machine
 from profiles.profile import Profile, load
@@ -279,7 +279,7 @@ def played(model: str, settings: list[str]) -> tuple[DryRun, Profile]:
     profile = load(settings=settings)
 
     search = partial(decompose, name=model, profile=profile, price=pricing(profile))
-    decomposition = lay_down(mesh_of(locate(model), profile), profile, pricing, search).decomposition
+    decomposition = orient_and_decompose(mesh_of(locate(model), profile), profile, pricing, search).decomposition
     return build(decomposition, profile).run, profile
 
 

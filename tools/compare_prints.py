@@ -20,7 +20,7 @@ from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.pricing import pricing
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
-from mdp.search.laying import lay_down
+from mdp.search.orient import orient_and_decompose
 from mdp.search.search import decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
@@ -86,7 +86,7 @@ def row(file: Path, profile: Profile, orient: bool) -> str:
     try:
         mesh = mesh_of(file, profile)
         search = partial(decompose, name=file.name, profile=profile, price=pricing(profile))
-        decomposition = lay_down(mesh, profile, pricing, search).decomposition if orient else search(mesh)
+        decomposition = orient_and_decompose(mesh, profile, pricing, search).decomposition if orient else search(mesh)
         if len(decomposition.parts) == 1 and not orient:
             return f"| {file.name} | 1 | 1 | 1 | | {decomposition.risky_area_mm2:.0f} | | | stays whole |"
         program = build(decomposition, profile)

@@ -1,4 +1,4 @@
-"""The book of choices, tools/choices.jsonl: what people mark as best, acceptable and wrong, and the weights of a cost from it.
+"""The book of choices, tools/choices.jsonl: what judges mark as best, acceptable and wrong, and the weights of a cost from it.
 
 `python tools/fit_choices.py add LIST.csv OFFERS.jsonl VERDICTS.csv...` measures the alternatives of tools/offer_parts.py and adds
 them to the book; a file of verdicts has lines of sheet, the letters that are best, acceptable and wrong, and a reason. `fit` fits
@@ -26,7 +26,7 @@ from offer_parts import sheet_name
 
 from machine.app.pipeline.pricing import pricing
 from mdp.cost.cost import measure_seam, weight_of_stairs
-from mdp.cost.footing import Plate, Stance
+from mdp.cost.footing import Plate
 from mdp.cost.model_need import MADE_BY_A_CUT
 from mdp.directions.orientation import diameter_mm, standing_still
 from mdp.directions.revolution import find_revolution
@@ -38,8 +38,8 @@ from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.read import read_mesh
 from mdp.search.by_hand import cut_by_hand
 from mdp.search.front import Price, front_row
-from mdp.search.laying import FOOTING, TURNED
 from mdp.search.node import Node
+from mdp.search.orient import NARROW, TURNED, UNSTEADY
 from mdp.search.parts import make_parts
 from mdp.search.problem import SIZE_MM, Problem
 from mdp.sweep.limbs import limb_faces
@@ -47,9 +47,9 @@ from profiles.profile import Profile, load
 
 BOOK = Path(__file__).parent / "choices.jsonl"
 MARKS = ("best", "acceptable", "wrong")
-# What the cost of an alternative is made of: mm2, mm, seconds and metres; then 1 or 0, which count as shares of the surface.
+# What the cost of an alternative is made of: mm2, mm, seconds and metres; then numbers from 0 to 1, shares of the surface.
 COSTS = ("support_mm2", "seam_mm", "hidden_seam_mm", "stairs_mm2", "cuts", "time_s", "filament_m")
-SHARES = ("loose", "held", "firm", "turned", "axis_askew", "unsound")
+SHARES = ("narrow", "unsteady", "turned", "axis_askew", "unsound")
 NEVER = 1.0  # of the surface: what the search does not take
 RIDGE, ROUNDS, FOLDS = 1e-3, 3000, 10
 DIGITS = 9  # of what the book says of orientations and planes
@@ -95,19 +95,23 @@ def add_to_book(models: Path, offers: Path, verdicts: Sequence[Path], profile: P
         ]:
             raise SystemExit(f"{name}: the book has other alternatives by these letters")
         if name in known:
-            known[name]["verdicts"] += [verdict for verdict in own if verdict not in known[name]["verdicts"]]
+            judges = {verdict["judge"] for verdict in own}
+            known[name]["verdicts"] = [verdict for verdict in known[name]["verdicts"] if verdict["judge"] not in judges] + own
     BOOK.write_text("".join(json.dumps(entry) + "\n" for _, entry in sorted(known.items())))
 
 
 def read_verdicts(file: Path) -> dict[str, dict[str, Any]]:
-    """What a judge says of each sheet: the mark of each letter, and why."""
+    """What a judge, named by the file, says of each sheet: the mark of each letter, and why."""
     said: dict[str, dict[str, Any]] = {}
     for row in csv.reader(file.read_text().splitlines()):
         if len(row) >= 4 and row[0].strip() != "sheet":
-            marks = {
-                letter: mark for mark, cell in zip(MARKS, row[1:4], strict=True) for letter in cell.upper() if letter.isalpha()
-            }
-            said[row[0].strip().removesuffix(".png")] = {"marks": marks, "reason": ",".join(row[4:]).strip()}
+            sheet = row[0].strip().removesuffix(".png")
+            marked = [
+                (letter, mark) for mark, cell in zip(MARKS, row[1:4], strict=True) for letter in cell.upper() if letter.isalpha()
+            ]
+            if len(dict(marked)) < len(marked):
+                raise SystemExit(f"{file}: {sheet}: a letter has two marks")
+            said[sheet] = {"judge": file.stem, "marks": dict(marked), "reason": ",".join(row[4:]).strip()}
     return said
 
 
@@ -135,13 +139,12 @@ def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[
     price = pricing(profile)(parts) or Price(nan, nan)
     seen_mm, hidden_mm = seams_by_sight(node, profile.search.hidden_seam_share)
     revolution = find_revolution(problem.mesh)
-    stance = Plate.under(problem.mesh, profile).stance(np.eye(3), of_file=of_file)
+    footing = Plate.under(problem.mesh, profile).footing(np.eye(3))
     askew = revolution is not None and not revolution.is_square_to(UP)
     scars_mm2, stairs_mm2 = sum(cut.cost.seam_mm2 for cut in node.cuts), row.stairs_mm2 / weight_of_stairs(profile)
     support_mm2 = row.cost_mm2 - scars_mm2 - row.stairs_mm2
     costs = (support_mm2, seen_mm, hidden_mm, stairs_mm2, len(node.cuts), price.time_s, price.filament_mm / 1000.0)
-    stands = (stance == Stance.LOOSE, stance == Stance.HELD, stance == Stance.FIRM)
-    shares = (*stands, not of_file, askew, not is_sound(problem.mesh, parts, profile))
+    shares = (footing.narrow, footing.unsteady, not of_file, askew, not is_sound(problem.mesh, parts, profile))
     return {name: round(float(value), 3) for name, value in zip((*COSTS, *SHARES), (*costs, *shares), strict=True)}
 
 
@@ -211,7 +214,7 @@ def weights_of(profile: Profile) -> Floats:
     search = profile.search.effective
     seams = (search.seam_mm, search.seam_mm * search.hidden_seam_share)
     costs = (1.0, *seams, weight_of_stairs(profile), search.cut_mm2, search.second_mm2, search.metre_mm2)
-    return np.array([*costs, *(FOOTING[stance] for stance in (Stance.LOOSE, Stance.HELD, Stance.FIRM)), TURNED, NEVER, NEVER])
+    return np.array([*costs, NARROW, UNSTEADY, TURNED, NEVER, NEVER])
 
 
 def fitted(differences: Floats) -> Floats:

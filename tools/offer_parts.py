@@ -1,10 +1,11 @@
 """Sheets of alternatives for the book of choices (tools/choices.jsonl): ways to orient and cut a model, for blind judging.
 
 `python tools/offer_parts.py LIST.csv FOLDER` reads lines of id, file, class, source, size_mm. For each model, scaled to a longest
-side of size_mm, it gathers one piece in its best orientations and rows of several fronts: at the standard weights, with dearer
-and with cheaper seams, in two orientations. Each sheet shows four to seven of them, without figures and in random order: every
-alternative from its best side and from below, what needs support red. FOLDER/offers.jsonl has them as plans. Models that are in
-it already are left out, so that a run can go on where another one has ended.
+side of size_mm, it gathers one piece in its best orientations and rows of several fronts, at the standard weights and with dearer
+seams, in two orientations; where that gives too few, also with cheaper seams and in more orientations. Each sheet shows four to
+seven of them, without figures and in random order: every alternative from its best side and from below, what needs support red.
+FOLDER/offers.jsonl has them as plans. Models that are in it already are left out, so that a run can go on where another one has
+ended.
 """
 
 import argparse
@@ -34,7 +35,7 @@ from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.read import read_mesh
 from mdp.search.by_plan import cut_by_plan
-from mdp.search.laying import glimpses_of, lay_down
+from mdp.search.orient import forecast_orientations, orient_and_decompose
 from mdp.search.search import decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
@@ -117,12 +118,12 @@ def sheet(row: dict[str, str], folder: Path, profile: Profile) -> dict[str, Any]
 def offers_of(mesh: Mesh, profile: Profile) -> list[Offer]:
     """What is chosen today, one piece in the best orientations and as the file has it, and the most different rows of fronts."""
     size_mm, price = float(np.ptp(mesh.vertices, axis=0).max()), pricing(profile)
-    lying = lay_down(mesh, profile, pricing, partial(decompose, name="", profile=profile, price=price))
-    taken = np.eye(3) if lying.orientation is None else lying.orientation.rotation
-    glimpses = sorted(glimpses_of(mesh, profile, pricing), key=lambda glimpse: glimpse.whole_mm2)
+    oriented = orient_and_decompose(mesh, profile, pricing, partial(decompose, name="", profile=profile, price=price))
+    taken = np.eye(3) if oriented.orientation is None else oriented.orientation.rotation
+    glimpses = sorted(forecast_orientations(mesh, profile, pricing), key=lambda glimpse: glimpse.whole_mm2)
     printable = [glimpse.orientation.rotation for glimpse in glimpses if np.isfinite(glimpse.whole_mm2)]
     whole = distinct([], [Offer(turn, ()) for turn in (taken, *printable[:1], np.eye(3), *printable)], size_mm, WHOLE)
-    offers = [Offer(taken, tuple(part.base for part in reversed(lying.decomposition.parts[1:])), True)]
+    offers = [Offer(taken, tuple(part.base for part in reversed(oriented.decomposition.parts[1:])), True)]
     offers += distinct(offers, whole, size_mm, WHOLE)
     resting = [Offer(turn.rotation, ()) for turn in resting_orientations(mesh, profile.process.self_supporting_angle_deg)]
     for seams, poses in ((SEAMS, whole[:2]), (CHEAP, whole), (CHEAP, resting[:FURTHER])):
@@ -141,7 +142,7 @@ def in_turns(rows: Sequence[Sequence[Offer]]) -> Iterator[list[Offer]]:
 
 
 def distinct(known: Sequence[Offer], offers: Sequence[Offer], size_mm: float, most: int) -> list[Offer]:
-    """Up to so many of the offers that are like none before them."""
+    """At most `most` offers that are like none before them."""
     new: list[Offer] = []
     for offer in offers:
         if len(new) < most and not any(offer.is_like(other, size_mm) for other in (*known, *new)):

@@ -6,14 +6,12 @@ of the contact, less what the weight presses on it.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum
-from math import atan2, degrees
 
 import numpy as np
 from manifold3d import CrossSection, JoinType
 
 from mdp.cut import Solid, solid_of
-from mdp.directions.orientation import LEAN_DEG, SIDES, centre_of_mass, diameter_mm
+from mdp.directions.orientation import LEAN_DEG, centre_of_mass, diameter_mm, tipping_angle_deg
 from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
@@ -23,21 +21,42 @@ PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact
 ADHESION_MPA = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give
 NEWTON_PER_G = 9.81e-3
 BRIM_SEGMENTS = 32  # of a full turn around a corner
-# Of the diameter: so high above the plate a rounded end is as wide as its base; brim and support fill in what is rounded below.
+# Height above the plate, as a share of the diameter, at which the base of a rounded end is measured: brim and support fill in
+# what is rounded below.
 BLUNT = 0.01
-# Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does; by
-# which it stands firmly; and of a flat base. The last two tell best what people choose (tools/RESULTS.md).
-SMALL_BASE, LEANING_BASE, FIRM_BASE, FLAT_BASE = 0.015, 0.03, 0.1, 0.2
-BROAD_DEG = 15.0  # by which a model on a broad stance may be tilted
+# Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does.
+SMALL_BASE, LEANING_BASE = 0.015, 0.03
+# A base that is this share of the shadow is as good as any larger one, and so is a stance that may be tilted by this angle.
+BROAD_BASE, STEADY_DEG = 0.2, 30.0
 
 
-class Stance(IntEnum):
-    """How a model stands on the plate: it may come off, it is held, it stands firmly, it stands on a flat base."""
+@dataclass(frozen=True)
+class Footing:
+    """How a model stands on the plate. base_share: the area of its base as a share of its shadow's; lean_deg: the least angle by
+    which it can be tilted before it tips over, below 0 where it tips over by itself; tension_mpa: the greatest tension under it,
+    brimmed_mpa: the same with the brim that a small base gets."""
 
-    LOOSE = 0
-    HELD = 1
-    FIRM = 2
-    FLAT = 3
+    base_share: float
+    lean_deg: float
+    tension_mpa: float
+    brimmed_mpa: float
+
+    def held(self, of_file: bool = False) -> bool:
+        """Whether the plate holds the model. of_file: as in its file it is believed to stand unless it tips over by itself."""
+        if self.lean_deg >= LEAN_DEG and self.tension_mpa <= ADHESION_MPA:
+            return True
+        least_share = SMALL_BASE if self.lean_deg >= (0.0 if of_file else LEAN_DEG) else LEANING_BASE
+        return self.base_share >= least_share and self.lean_deg >= -LEAN_DEG and self.brimmed_mpa <= ADHESION_MPA
+
+    @property
+    def narrow(self) -> float:
+        """How much the base lacks of a broad one: 0 to 1."""
+        return min(1.0, max(0.0, 1.0 - self.base_share / BROAD_BASE))
+
+    @property
+    def unsteady(self) -> float:
+        """How much lean_deg lacks of a steady stance's: 0 to 1."""
+        return min(1.0, max(0.0, 1.0 - self.lean_deg / STEADY_DEG))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,53 +77,28 @@ class Plate:
         brim_mm = profile.process.brim_mm or profile.process.small_base_brim_mm
         return cls(mesh, solid_of(mesh), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, profile.material.density_g_cm3)
 
-    def stance(self, rotation: Floats, of_file: bool = False) -> Stance:
-        """How the model stands when it is turned by a rotation (3, 3); of_file: as in its file, where it is believed to stand if
-        it does not tip over by itself."""
-        base = self._base(rotation)
-        share, lean_deg = base.area() / self._shadow_mm2(rotation), self._lean_deg(rotation, base)
-        rests = lean_deg >= (0.0 if of_file else LEAN_DEG)
-        based = share >= (SMALL_BASE if rests else LEANING_BASE) and lean_deg >= -LEAN_DEG
-        alone = lean_deg >= LEAN_DEG and self._tension_mpa(rotation, base, 0.0) <= ADHESION_MPA
-        if not alone and not (based and self._tension_mpa(rotation, base, self.brim_mm) <= ADHESION_MPA):
-            return Stance.LOOSE
-        if lean_deg >= LEAN_DEG and share >= FLAT_BASE:
-            return Stance.FLAT
-        return Stance.FIRM if share >= FIRM_BASE or (based and lean_deg >= BROAD_DEG) else Stance.HELD
-
-    def tension_mpa(self, rotation: Floats, brim_mm: float = 0.0) -> float:
-        """The greatest tension under the model, with a brim around its base."""
-        return self._tension_mpa(rotation, self._base(rotation), brim_mm)
-
-    def _tension_mpa(self, rotation: Floats, base: CrossSection, brim_mm: float) -> float:
-        low, high = self._heights_mm(rotation)
-        if brim_mm > 0.0:
-            base = base.offset(brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS)
+    def footing(self, rotation: Floats) -> Footing:
+        """How the model stands when it is turned by a rotation (3, 3)."""
+        heights, centre = self.mesh.vertices @ rotation[2], rotation @ self.centre
+        low, high = float(heights.min()), float(heights.max())
+        base = self._base(rotation, low, high)
+        brim = base.offset(self.brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS) if self.brim_mm > 0.0 else base
         weight_n = 1e-3 * self.density_g_cm3 * self.solid.volume() * NEWTON_PER_G
-        return _tension_mpa(section_edges(base), high - low, weight_n, (rotation @ self.centre)[:2])
+        tensions = [_tension_mpa(section_edges(area), high - low, weight_n, centre[:2]) for area in (base, brim)]
+        corners = section_edges(base)[:, :2] - centre[:2]
+        lean_deg = tipping_angle_deg(corners, float(centre[2]) - low) if len(corners) else -90.0
+        return Footing(base.area() / self._shadow_mm2(rotation), lean_deg, *tensions)
 
-    def _base(self, rotation: Floats) -> CrossSection:
+    def _base(self, rotation: Floats, low: float, high: float) -> CrossSection:
         """What the model stands on: the larger of the sections where it touches the plate and a little above."""
-        turned, (low, _) = self.solid.transform(np.column_stack([rotation, np.zeros(3)])), self._heights_mm(rotation)
+        turned = self.solid.transform(np.column_stack([rotation, np.zeros(3)]))
         heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm)
-        return max((turned.slice(low + height_mm) for height_mm in heights_mm), key=CrossSection.area)
-
-    def _heights_mm(self, rotation: Floats) -> tuple[float, float]:
-        heights = self.mesh.vertices @ rotation[2]
-        return float(heights.min()), float(heights.max())
+        sections = (turned.slice(low + min(height_mm, 0.5 * (high - low))) for height_mm in heights_mm)
+        return max(sections, key=CrossSection.area)
 
     def _shadow_mm2(self, rotation: Floats) -> float:
-        """The area of the model's shadow, surfaces above each other counted each."""
+        """The area of the model's shadow, overlapping surfaces each counted."""
         return 0.5 * float(np.abs(dot(self.mesh.normals, rotation[2])) @ self.mesh.areas_mm2)
-
-    def _lean_deg(self, rotation: Floats, base: CrossSection) -> float:
-        """The least angle by which the model, tilted to any of 64 sides, has its centre of mass over the edge of a base; below 0
-        where it is not over the base to begin with."""
-        corners, centre = section_edges(base)[:, :2], rotation @ self.centre
-        if len(corners) == 0:
-            return -90.0
-        reach_mm = float(((corners - centre[:2]) @ SIDES).max(axis=0).min())
-        return degrees(atan2(reach_mm, float(centre[2]) - self._heights_mm(rotation)[0]))
 
 
 def tips_over(base: CrossSection, height_mm: float) -> bool:

@@ -8,13 +8,13 @@ from mdp.directions.orientation import centre_of_mass
 from mdp.mesh import Floats, Mesh
 from mdp.pose import UP, about
 
-HIGHEST = 6  # moments that are looked at
+HIGHEST = 6  # the order of the highest moment that is measured
 PLAIN = 1e-3  # of the largest that a moment can be: less is rounding, or a symmetry
 
 
 def azimuth_rad(mesh: Mesh) -> float:
     """Where the first moment of a mesh points that is not 0: the integral over the surface of (x + i y)^m about the centre of
-    mass points in m directions at once, of which the higher moments choose; 0 for a body of revolution.
+    mass points in m directions at once, of which the higher moments choose; 0 where there is none, as of a body of revolution.
 
     Over a triangle with the corners a, b, c as complex numbers it is 2 A m! / (m + 2)! times the sum of all a^i b^j c^k with
     i + j + k = m, A its area.
@@ -30,7 +30,7 @@ def azimuth_rad(mesh: Mesh) -> float:
 
 
 def axes_along(azimuth_rad: float) -> Floats:
-    """(3, 3) rows: the axes of a frame that is turned about z by so much."""
+    """(3, 3) rows: the axes of a frame that is turned about z by an angle."""
     return about(UP, azimuth_rad).T
 
 

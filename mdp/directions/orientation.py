@@ -1,9 +1,9 @@
 """Orientation: how a whole model prints best in one piece, the rival of every decomposition.
 
-Two kinds of orientation are looked at: those in which the model rests on a facet of its convex hull without tipping over, and
-directions spread over the whole sphere, in most of which only a raft could hold it. A cube balanced on a corner has no
-risky face at all, so areas of the second kind are a lower bound rather than an advice: `best_orientation` takes what rests
-unless it is asked for the other.
+A model may rest on a facet of its convex hull (`facet_orientations`), or stand straight on a rounded end, along a side of the
+file's box or a principal axis (`straight_orientations`). In most directions spread over the whole sphere only a raft could hold
+it. A cube balanced on a corner has no risky face at all, so the areas of those are a lower bound rather than an advice:
+`best_orientation` takes what rests unless it is asked for the other.
 """
 
 from collections.abc import Callable
@@ -25,6 +25,7 @@ LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips o
 SAME_FACET_DEG = 0.5
 LYING_DEG = 15.0  # a model that leans less lies on a side
 SPREAD = 1000
+SAME_MOMENT = 0.02  # of the largest second moment: axes whose moments differ by less are not told apart
 MOST_FACETS = 1000
 MOST_CORNERS = 1000
 EQUAL_MM2 = 1e-6  # areas that differ less are equal but for rounding
@@ -158,6 +159,28 @@ def facet_orientations(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
     return tuple(_measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)])))
 
 
+@cached_with_mesh
+def straight_orientations(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
+    """On each side of the box that the model's file has around it, and along its principal axes, which a model that stands on a
+    rounded end is best turned to; without as it stands."""
+    axes = np.concatenate([np.eye(3), _principal_axes(mesh)])
+    directions = np.concatenate([axes, -axes])
+    return tuple(_measure(mesh, angle_deg, directions[directions @ UP < cos(radians(SAME_FACET_DEG))]))
+
+
+def _principal_axes(mesh: Mesh) -> Floats:
+    """(k, 3) the principal axes of the surface whose moments differ from those of the others."""
+    corners = mesh.vertices[mesh.faces]
+    centres = corners.mean(axis=1)
+    middle = np.average(centres, axis=0, weights=mesh.areas_mm2)
+    # Over a triangle with the corners v and the centre g, x x^T integrates to A / 12 times the sum of v v^T + 9 g g^T.
+    points = np.concatenate([corners - middle, 3.0 * (centres - middle)[:, None]], axis=1)
+    moments, axes = np.linalg.eigh(np.einsum("i,ijk,ijl->kl", mesh.areas_mm2, points, points))
+    differ = np.diff(moments) > SAME_MOMENT * moments[-1]
+    own: Floats = axes.T[np.concatenate([[True], differ]) & np.concatenate([differ, [True]])]
+    return own
+
+
 def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
     facing_down, standing = _areas_down(mesh, directions, angle_deg)
     lean_deg, corners = _lean_deg(mesh, directions), convex_hull(mesh.vertices).vertices
@@ -201,16 +224,22 @@ def _lean_deg(mesh: Mesh, directions: Floats) -> Floats:
     """
     hull = convex_hull(mesh.vertices)
     centre = centre_of_mass(mesh)
-    lean_rad = np.zeros(len(directions))
+    lean_deg = np.zeros(len(directions))
     for k, direction in enumerate(directions):
         heights = hull.vertices @ direction
         lowest = float(heights.min())
         base = hull.vertices[heights <= lowest + PLATFORM_TOLERANCE_MM] - centre
-        reach = (base @ _rotation(direction)[:2].T @ SIDES).max(axis=0)
-        lean_rad[k] = atan2(float(reach.min()), float(centre @ direction) - lowest)
-    return np.degrees(lean_rad)
+        lean_deg[k] = tipping_angle_deg(base @ _rotation(direction)[:2].T, float(centre @ direction) - lowest)
+    return lean_deg
 
 
+def tipping_angle_deg(base: Floats, height_mm: float) -> float:
+    """The least angle by which a body, leaned to any of 64 sides, has its centre of mass over the edge of its base; below 0 where
+    it is not over the base to begin with. base: (n, 2) points of it from below the centre; height_mm: of the centre above it."""
+    return degrees(atan2(float((base @ SIDES).max(axis=0).min()), height_mm))
+
+
+@cached_with_mesh
 def diameter_mm(mesh: Mesh) -> float:
     """The greatest distance between two vertices of the convex hull, of a fine one between some of them."""
     corners = convex_hull(mesh.vertices).vertices

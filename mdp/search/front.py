@@ -113,8 +113,8 @@ def _with_price(row: FrontRow, price: Price | None) -> FrontRow:
     return row if price is None else replace(row, time_s=price.time_s, filament_mm=price.filament_mm)
 
 
-def pays(rows: Sequence[FrontRow]) -> list[bool]:
-    """Whether each row, of ever more parts, costs less than all with fewer parts: nobody takes the others."""
+def pays(rows: Sequence[FrontRow | Node]) -> list[bool]:
+    """Whether each row, or node, of ever more parts costs less than all with fewer parts: nobody takes the others."""
     return [all(row.cost_mm2 < fewer.cost_mm2 for fewer in rows[:place]) for place, row in enumerate(rows)]
 
 
@@ -156,8 +156,8 @@ class Choice:
 
 
 def charge_mm2(rows: Sequence[FrontRow], worth: Worth, least_saving: float) -> float:
-    """What every part more than the first of some rows has is charged: a share of what that costs with its time; nothing where
-    time counts nothing, as without support, or where no row has a time."""
+    """The charge for each part beyond those of the first row: a share of what that costs with its time; nothing where time counts
+    nothing, as without support, or where no row has a time."""
     timed = [row for row in rows if row.time_s is not None]
     return least_saving * (timed[0].cost_mm2 + (worth.of_row(timed[0]) or 0.0)) if worth and timed else 0.0
 

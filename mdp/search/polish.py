@@ -16,11 +16,13 @@ from mdp.cost.forecast import Surface
 from mdp.cost.symmetry import Mirror
 from mdp.cut import passing_places
 from mdp.directions.frame import framed
+from mdp.directions.orientation import diameter_mm
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
 from mdp.ranking.ranking import rank_by_trade_off
 from mdp.search.front import EQUAL
+from mdp.search.neck import find_neck
 from mdp.search.node import Node
 from mdp.search.problem import Problem
 from mdp.sweep.limbs import limb_mesh
@@ -31,6 +33,7 @@ TRIES = 2  # moved planes that are cut before one stays where it is
 ENOUGH = 1e-3  # a move that saves a smaller share of the risky area is not worth a cut
 SAME_MM2 = 1e-6
 PARTNER_COSINE, PARTNER_MM = cos(radians(20.0)), 5.0  # two planes so near to each other's image are meant to be it
+NECK_REACH = 0.06  # of the model's diameter: how far from a plane necks are sought
 TRADE_OFF = 4.0  # of further cuts, as the beam's second slot
 
 
@@ -55,7 +58,7 @@ class Chain:
 
     @property
     def cost_mm2(self) -> float:
-        """Risky area that the parts leave."""
+        """What the parts cost."""
         return self.nodes[-1].cost_mm2
 
 
@@ -69,19 +72,19 @@ def polish(problem: Problem, node: Node) -> Node:
 
 
 def settle(problem: Problem, node: Node) -> Node:
-    """The node with every plane moved to where less stays risky, nothing else changed."""
+    """The node with every plane moved to where the cost is less, nothing else changed."""
     return _move_planes(problem, Chain.to(node)).nodes[-1]
 
 
 def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Node:
-    """The node with its planes as a person would lay them, as far as it stays alike in cost: along the model's large flats, and
-    more symmetric about its mirror planes; planes that lean a little across a mirror stand upright on it, and of two that are
-    nearly each other's image one becomes it."""
+    """The node with its planes as a person would lay them, as far as it stays alike in cost: at necks, along the model's large
+    flats, and more symmetric about its mirror planes; planes that lean a little across a mirror stand upright on it, and of two
+    that are nearly each other's image one becomes it."""
     most_mm2 = node.cost_mm2 * (1.0 + EQUAL)
     best = Chain.to(node)
     of_mirrors = [partial(change, mirror=mirror) for change, mirror in product((_stand_upright, _pair), mirrors)]
     along = [partial(_align, problem)] if problem.terms.stair_weight > 0.0 else []
-    for change in (*along, *of_mirrors):
+    for change in (partial(_at_neck, problem), *along, *of_mirrors):
         for position in range(len(problem.start.cuts), len(best.planes)):
             for planes in change(best, position):
                 changed = None if problem.late() else _recut(problem, best, position, planes)
@@ -89,6 +92,20 @@ def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Nod
                     best = changed
                     break
     return best.nodes[-1]
+
+
+def _at_neck(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane]]:
+    """The planes from a position on, the first of them moved to the neck near it."""
+    here, *later = chain.planes[position:]
+    node, face = chain.nodes[position], _cut_face(chain.nodes[position + 1])
+    mesh, seen = node.remainder.mesh, node.seam_weights
+    reach_mm = NECK_REACH * diameter_mm(problem.mesh)
+    if here.limbs_mm is not None:  # rims of other limbs do not count
+        away_mm = np.linalg.norm(mesh.vertices[mesh.faces].mean(axis=1) - face.mean(axis=0), axis=1)
+        seen = np.where(away_mm < np.ptp(face, axis=0).max() + reach_mm, seen, 0.0)
+    neck = find_neck(mesh, seen, here, reach_mm)
+    if neck is not None:
+        yield [replace(neck, limbs_mm=here.limbs_mm), *later]
 
 
 def _align(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane]]:
@@ -146,7 +163,7 @@ def _drop_cuts(problem: Problem, best: Chain) -> Chain:
 
 
 def _move_planes(problem: Problem, best: Chain) -> Chain:
-    """The chain with every plane moved to where less stays risky, the one cut first moved first."""
+    """The chain with every plane moved to where the cost is less, the one cut first moved first."""
     enough_mm2 = ENOUGH * problem.model.risky_mm2
     for position in range(len(problem.start.cuts), len(best.planes)):
         if problem.late():

@@ -37,7 +37,7 @@ from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
-PROMISING = 1.02  # times the beam's best that cuts of single limbs may cost to be polished
+NEARLY_BEST = 1.02  # times the beam's best that cuts of single limbs may cost to be polished
 WITHOUT_SEAMS = {
     "hidden_seam_share": 1.0,
     "feature_mm2": 0.0,
@@ -212,7 +212,7 @@ def _polish_finalists(problem: Problem, beam: Beam, limbs: Sequence[Node], repor
     finalists = beam.finalists() if problem.settings.polish and problem.model.risky_mm2 > 0 else []
     for node in limbs:
         beam.front.offer(node)
-    if limbs and limbs[-1].cost_mm2 < PROMISING * best.cost_mm2:
+    if limbs and limbs[-1].cost_mm2 < NEARLY_BEST * best.cost_mm2:
         finalists += limbs[-1:] if finalists else []
         best = min(best, limbs[-1], key=lambda node: node.cost_mm2)
     for coming in [ahead(polish, problem, node) for node in finalists]:
@@ -224,21 +224,20 @@ def _polish_finalists(problem: Problem, beam: Beam, limbs: Sequence[Node], repor
 
 
 def _polish_rows(problem: Problem, front: Front) -> None:
-    """Move the planes of the rows of a front that may be taken to where they cost less, after a beam of two or more; then lay
-    them along flats, and symmetric where the model is, at the same cost."""
+    """Move the planes of the rows of a front that may be taken to where they cost less, after a beam of two or more; then to
+    necks, along flats, and symmetric where the model is."""
     for node in _paying(problem, front) if problem.settings.beam_width > 1 else ():
         front.offer(settle(problem, node))
     cut = _paying(problem, front)
     mirrors = find_mirrors(problem.mesh) if cut else []
-    for node in cut if mirrors or len(problem.flats.shares) else []:
+    for node in cut:
         front.replace(node, make_regular(problem, node, mirrors))
 
 
 def _paying(problem: Problem, front: Front) -> list[Node]:
     """The nodes of a front that the search has cut and that cost less than all with fewer cuts."""
     nodes = front.nodes
-    paying = [node for place, node in enumerate(nodes) if all(node.cost_mm2 < fewer.cost_mm2 for fewer in nodes[:place])]
-    return [node for node in paying if len(node.cuts) > len(problem.start.cuts)]
+    return [node for node, good in zip(nodes, pays(nodes), strict=True) if good and len(node.cuts) > len(problem.start.cuts)]
 
 
 def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:

@@ -1,6 +1,7 @@
 """The book of choices and the weights that follow from it."""
 
 import importlib
+import json
 from collections import Counter
 from pathlib import Path
 from types import ModuleType
@@ -81,4 +82,26 @@ def test_verdicts_are_read_with_their_reasons(choices: ModuleType, tmp_path: Pat
     file = tmp_path / "judge.csv"
     file.write_text("sheet,best,acceptable,wrong,reason\npost_60.png,B,AC,,stands, without a seam\n")
     marks = {"B": "best", "A": "acceptable", "C": "acceptable"}
-    assert choices.read_verdicts(file) == {"post_60": {"marks": marks, "reason": "stands, without a seam"}}
+    assert choices.read_verdicts(file) == {"post_60": {"judge": "judge", "marks": marks, "reason": "stands, without a seam"}}
+
+
+def test_a_letter_with_two_marks_is_refused(choices: ModuleType, tmp_path: Path) -> None:
+    file = tmp_path / "judge.csv"
+    file.write_text("post_60,A,BC,AD,which is it\n")
+    with pytest.raises(SystemExit, match="post_60: a letter has two marks"):
+        choices.read_verdicts(file)
+
+
+def test_two_judges_of_one_mind_count_twice_and_one_who_judges_again_once(
+    choices: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choices, "BOOK", tmp_path / "book.jsonl")
+    choices.BOOK.write_text(json.dumps({"sheet": "post_60", "alternatives": {"A": {"planes": []}}, "verdicts": []}) + "\n")
+    models, offers = tmp_path / "list.csv", tmp_path / "offers.jsonl"
+    models.write_text("id,file,class,source,size_mm\npost,post.stl,other,us,60\n")
+    offers.write_text(json.dumps({"sheet": "post_60", "alternatives": {"A": {"planes": []}}}) + "\n")
+    for name in ("one", "other", "one"):
+        (tmp_path / f"{name}.csv").write_text("post_60,A,,,good\n")
+        choices.add_to_book(models, offers, [tmp_path / f"{name}.csv"], load())
+    (entry,) = choices.read_book(choices.BOOK)
+    assert sorted(verdict["judge"] for verdict in entry["verdicts"]) == ["one", "other"]

@@ -16,7 +16,7 @@ from machine.app.pipeline.given_plan import as_turned, check_parts_named, lays_d
 from machine.app.pipeline.memory import return_unused
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
-from machine.app.terminal.advice import laid_in_words
+from machine.app.terminal.advice import orientation_in_words
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
@@ -39,7 +39,7 @@ from mdp.ranking.ranker import ranker_named
 from mdp.read import read_mesh
 from mdp.search.by_plan import cut_by_plan
 from mdp.search.front import Worth
-from mdp.search.laying import lay_down
+from mdp.search.orient import orient_and_decompose
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
@@ -91,9 +91,9 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     with reporting() as report:
         asked = _Search(request, given, to_build and not laying, report)
         if laying:
-            lying = lay_down(mesh, profile, pricing, asked.search)
-            decomposition, notes = lying.decomposition, laid_in_words(lying, "--as-is keeps it as it stands")
-            orientation = None if lying.orientation is None else lying.orientation.rotation
+            oriented = orient_and_decompose(mesh, profile, pricing, asked.search)
+            decomposition, notes = oriented.decomposition, orientation_in_words(oriented, "--as-is keeps it as it stands")
+            orientation = None if oriented.orientation is None else oriented.orientation.rotation
         else:
             decomposition = asked.search(mesh)
     if record_file is not None:

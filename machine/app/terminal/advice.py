@@ -4,11 +4,10 @@ from collections.abc import Sequence
 
 from machine.app.terminal.report import estimates, table
 from machine.quantities import minutes
-from mdp.cost.footing import Stance
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words, side_in_words
 from mdp.search.front import ASKED, BY_PLAN, Worth, choose
-from mdp.search.laying import Lying
+from mdp.search.orient import Oriented
 from profiles.profile import Profile
 
 HARDLY_HELD = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
@@ -26,18 +25,19 @@ def advice(decomposition: Decomposition, profile: Profile) -> str:
     return _ways_table(ways) + f"advice: {best}\n"
 
 
-def laid_in_words(lying: Lying, otherwise: str) -> tuple[str, ...]:
-    """How a model was laid down, what that is better by, and how to change it; nothing where it stays, unless the plate hardly
-    holds it."""
-    orientation, standing, laid = lying.orientation, lying.standing, lying.decomposition.chosen
+def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
+    """How a model was laid down, what that is better by, and how to change it; nothing where it stays. Then a warning where the
+    plate hardly holds it."""
+    orientation, standing, laid = oriented.orientation, oriented.standing, oriented.decomposition.chosen
+    warning = () if oriented.held else (HARDLY_HELD,)
     if orientation is None:
-        return (HARDLY_HELD,) if lying.stance == Stance.LOOSE else ()
+        return warning
     side, turns = side_in_words(orientation), in_words(orientation, held=True)
     where, better = f"{side} ({turns})" if side else turns, ""
     if laid is not None:
-        was = f"{lying.upright.risky_mm2:.0f} mm2 hang over" if standing is None else _with_scars(standing)
+        was = f"{oriented.upright.risky_mm2:.0f} mm2 hang over" if standing is None else _with_scars(standing)
         better = f": {_with_scars(laid)}, as it stands {was}"
-    return (f"it is laid down {where}{better}; {otherwise}",)
+    return (f"it is laid down {where}{better}; {otherwise}", *warning)
 
 
 def _with_scars(row: FrontRow) -> str:

@@ -24,7 +24,7 @@ def apart_deg(one: float, other: float, period_deg: float = 360.0) -> float:
 
 
 def star(corners: int) -> Solid:
-    """An upright prism over a circle with so many waves, one of them along x."""
+    """An upright prism over a circle with waves on it, a crest along x."""
     turns = np.linspace(0.0, 2.0 * np.pi, 240, endpoint=False)
     radius = 10.0 + 3.0 * np.cos(corners * turns)
     return m3.CrossSection([np.stack([radius * np.cos(turns), radius * np.sin(turns)], axis=1)]).extrude(5.0)

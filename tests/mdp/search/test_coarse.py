@@ -13,7 +13,7 @@ from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.by_hand import Refusal, cut_near, cut_or_refuse
 from mdp.search.coarse import coarse_copy
 from mdp.search.front import Price
-from mdp.search.laying import lay_down
+from mdp.search.orient import orient_and_decompose
 from mdp.search.problem import Problem
 from mdp.search.search import decompose
 from mdp.zone import NO_ZONES, Painted, Zone, Zones
@@ -117,10 +117,10 @@ def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itse
         searched.append(mesh)
         return decompose(mesh, "tee", profile, price=lambda parts: Price(100.0, 1000.0))
 
-    lying = lay_down(mesh, profile, lambda profile: lambda parts: Price(100.0, 1000.0), search)
-    assert lying.orientation is not None
+    oriented = orient_and_decompose(mesh, profile, lambda profile: lambda parts: Price(100.0, 1000.0), search)
+    assert oriented.orientation is not None
     assert [len(mesh.faces) for mesh in searched] == [len(mesh.faces)]
-    assert lying.decomposition.mesh is searched[0]
+    assert oriented.decomposition.mesh is searched[0]
 
 
 def test_a_search_that_is_recorded_is_one_of_the_model_itself(fine: Mesh) -> None:

@@ -1,5 +1,6 @@
 """Polish: a sequence of cuts made shorter and better."""
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ from mdp.plane import Plane
 from mdp.search.node import Node
 from mdp.search.polish import make_regular, polish
 from mdp.search.problem import Problem
+from mdp.search.search import decompose
 from profiles.profile import load
 from tests import shapes
 
@@ -121,3 +123,26 @@ def test_a_cut_that_is_a_little_askew_to_the_model_lies_along_its_flats_where_th
     along = make_regular(problem, node, [])
     assert along.cost_mm2 <= 1.01 * node.cost_mm2
     assert problem.flats.share_along(along.cuts[0].base.normal[None]) > problem.flats.share_along(node.cuts[0].base.normal[None])
+
+
+def test_a_cut_near_a_neck_moves_to_the_neck() -> None:
+    """A column of 20 mm that narrows to 10 mm at a height of 30 mm, cut askew 2 mm above that."""
+    profile = [(0.0, 0.0), (10.0, 0.0), (10.0, 20.0), (5.0, 30.0), (10.0, 40.0), (10.0, 60.0), (0.0, 60.0)]
+    waisted = mesh_of(m3.CrossSection([profile]).revolve(64))
+    problem = Problem(waisted, load(settings=["search.clearance=false", "search.directions=200"]))
+    askew = np.array([np.sin(np.radians(4.0)), 0.0, np.cos(np.radians(4.0))])
+    node = _after(problem, _through(32.0, 0.0, askew))
+    base = make_regular(problem, node, []).cuts[0].base
+    assert base.offset_mm == pytest.approx(30.0, abs=0.1)
+    assert base.normal == pytest.approx([0.0, 0.0, 1.0], abs=0.02)
+
+
+def test_the_plane_at_a_concave_edge_costs_no_more_than_the_best_of_a_grid() -> None:
+    """The round arm of a post is cut along the post, where the plane can lean about an end of the cut."""
+    profile = load(settings=["search.directions=300"])
+    problem, tried = Problem(shapes.branch(), profile), []
+    for elevation_rad in np.radians([0.0, 3.0, 6.0, 9.0]):
+        normal = np.array([np.cos(elevation_rad), 0.0, np.sin(elevation_rad)])
+        nodes = [problem.replay(problem.root, [Plane(normal, offset_mm)]) for offset_mm in np.arange(-6.0, 6.0, 0.5)]
+        tried += [node[-1].cost_mm2 for node in nodes if node is not None]
+    assert decompose(shapes.branch(), "branch", profile, parts=2).cost_mm2 <= min(tried)

@@ -12,7 +12,7 @@ import numpy as np
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import lies_freely
 from machine.app.pipeline.pricing import pricing
-from machine.app.terminal.advice import laid_in_words
+from machine.app.terminal.advice import orientation_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.processes import Tell
 from mdp.decomposition import Decomposition, FrontRow
@@ -24,7 +24,7 @@ from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
 from mdp.search.by_plan import cut_by_plan
-from mdp.search.laying import lay_down
+from mdp.search.orient import orient_and_decompose
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
@@ -69,8 +69,8 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
     price, best = pricing(profile.of_all_parts), None
 
-    def search(lying: Mesh) -> Decomposition:
-        otherwise = "" if lying is mesh else "laid down otherwise: "
+    def search(oriented: Mesh) -> Decomposition:
+        otherwise = "" if oriented is mesh else "laid down otherwise: "
 
         def say(phase: str) -> None:
             tell(Searched(f"{otherwise}{phase}", best))
@@ -82,19 +82,19 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
                 tell(Searched(f"{otherwise}looking for the first cut along {profile.search.directions:,} directions", best))
                 return
             left = f"{100 * progress.best_share:.1f} % of the overhangs left"
-            if lying is mesh:
+            if oriented is mesh:
                 best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
             tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
 
-        return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=locked, price=price)
+        return decompose(oriented, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=locked, price=price)
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if way.orient and untouched and lies_freely(profile):
         tell(Searched(f"weighing the ways in which {len(mesh.faces):,} faces may lie"))
-        lying = lay_down(mesh, profile, pricing, search)
-        turn = None if lying.orientation is None else lying.orientation.rotation
-        decomposition = lying.decomposition
-        return Found(decomposition.front, (*decomposition.notes, *laid_in_words(lying, AS_IT_STANDS)), turn)
+        oriented = orient_and_decompose(mesh, profile, pricing, search)
+        turn = None if oriented.orientation is None else oriented.orientation.rotation
+        decomposition = oriented.decomposition
+        return Found(decomposition.front, (*decomposition.notes, *orientation_in_words(oriented, AS_IT_STANDS)), turn)
     decomposition = search(mesh)
     return Found(decomposition.front, decomposition.notes)
 

@@ -13,7 +13,7 @@ from machine.app.workbench.bench.model import Model
 from machine.app.workbench.work.processes import Tell
 from mdp.directions.orientation import in_words, resting_facets, side_in_words
 from mdp.read import SizeError, read_mesh
-from mdp.search.laying import distinct_orientations
+from mdp.search.orient import distinct_orientations
 from profiles.errors import MeshError
 from profiles.profile import Profile
 

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from machine.app.terminal.advice import advice, laid_in_words
-from mdp.cost.footing import Stance
+from machine.app.terminal.advice import advice, orientation_in_words
 from mdp.decomposition import FrontRow
 from mdp.directions.orientation import best_orientation, measure_upright
 from mdp.plane import Plane
-from mdp.search.laying import Lying
+from mdp.search.orient import Oriented
 from profiles.profile import load
 from tests.machine.app.terminal.test_report import alone, tee_in_parts
 from tests.shapes import box, hollow, tee
@@ -36,24 +35,25 @@ def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
 
 
 def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> None:
-    lying = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
+    oriented = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
     side, upright = best_orientation(tee(), 45.0), measure_upright(tee(), 45.0)
-    assert laid_in_words(Lying(side, lying, 900.0, CUT, upright, Stance.FIRM), "--as-is keeps it so") == (
+    assert orientation_in_words(Oriented(side, oriented, 900.0, CUT, upright, True), "--as-is keeps it so") == (
         "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands in 3 parts with"
         " 78 mm2 of scars in 1h 0m; --as-is keeps it so",
     )
-    assert laid_in_words(Lying(side, lying, 900.0, None, upright, Stance.FIRM), "--as-is keeps it so") == (
+    assert orientation_in_words(Oriented(side, oriented, 900.0, None, upright, True), "--as-is keeps it so") == (
         "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands 300 mm2 hang"
         " over; --as-is keeps it so",
     )
-    assert laid_in_words(Lying(None, lying, 900.0, WHOLE, upright, Stance.HELD), "--as-is keeps it so") == ()
+    assert orientation_in_words(Oriented(None, oriented, 900.0, WHOLE, upright, True), "--as-is keeps it so") == ()
 
 
 def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
-    lying = Lying(None, alone(tee(), 300.0), 900.0, WHOLE, measure_upright(tee(), 45.0), Stance.LOOSE)
-    assert laid_in_words(lying, "--as-is keeps it so") == (
-        "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)",
-    )
+    oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, measure_upright(tee(), 45.0), False)
+    warning = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
+    assert orientation_in_words(oriented, "--as-is keeps it so") == (warning,)
+    turned = replace(oriented, orientation=best_orientation(tee(), 45.0))
+    assert orientation_in_words(turned, "--as-is keeps it so")[1:] == (warning,)
 
 
 def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:

@@ -1,0 +1,249 @@
+"""Orienting: how a model is turned as a whole and into which parts it is cut, chosen together by what both cost with their time.
+
+How well it stands on the plate, and whether it is turned from how its file has it, counts as a share of its surface. Orientations
+that differ by a symmetry count once. What the first few would cost after a search is forecast from the support that they need in
+one piece and from their time without any. Where one forecast leaves no doubt, and what its search finds costs less than good cuts
+would leave of the model as it stands, only that orientation is searched. Otherwise the model is searched as it stands, and in
+another orientation if a narrow search promises more.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil, cos, inf, radians
+
+from mdp.cost.cost import weight_of_stairs
+from mdp.cost.footing import Footing, Plate
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import (
+    Orientation,
+    facet_orientations,
+    measure_upright,
+    standing_still,
+    straight_orientations,
+)
+from mdp.directions.revolution import find_revolution
+from mdp.kernels.processes import side_by_side
+from mdp.mesh import Mesh
+from mdp.search.coarse import as_it_is, coarse_copy
+from mdp.search.front import EQUAL, Price, Pricing, Worth, charge_mm2, front_row, price_row
+from mdp.search.parts import one_piece
+from mdp.search.problem import Problem
+from mdp.search.search import decompose
+from mdp.zone import NO_ZONES
+from profiles.profile import Profile
+
+RANKED = 20  # orientations that are ranked
+MOST_FOOTINGS = 120  # orientations whose footing is measured
+FORECAST = 3  # orientations whose time is estimated, beside the model as it stands
+# Shares of a model's surface that count as blemished for a narrow base, for an unsteady stance, and for being turned from how the
+# file has it: set by choices between orientations and by verdicts on them (tools/fit_choices.py, tools/RESULTS.md).
+NARROW, UNSTEADY, TURNED = 0.12, 0.08, 0.055
+NEAR = cos(radians(15.0))  # orientations that differ by less count as one
+# Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
+SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
+# Fitted to whole searches of 429 orientations of 66 models with seams of 0.8 mm (tools/RESULTS.md).
+LEFT, STAIRS_LEFT = 0.6, 0.75  # share of what needs support in one piece that cuts leave, and of the stairs
+LEAST_LEFT, LEAST_STAIRS_LEFT = (
+    0.3,
+    0.45,
+)  # where they do well (34 more models)
+# Of what the model costs as it stands: a forecast below the first leaves no doubt, one above the second no hope.
+NO_DOUBT, HOPELESS = 0.9, 1.3
+PROMISING = 1.03  # of the same: narrow searches end higher
+# Orientations that a narrow search cuts, and the factor by which it tries fewer directions.
+SEARCHED, COARSER = 2, 3
+PricingBy = Callable[[Profile], Pricing]
+
+
+@dataclass(frozen=True, eq=False)
+class Oriented:
+    """A model turned and cut: turned whole by the orientation, None where it stays as it stands; total_mm2: the cost of its parts
+    with their time, filament and charge for cuts, and of its footing; standing: the row taken of the model as it stands, where
+    that was searched; upright: the model as it stands; held: whether the plate holds it."""
+
+    orientation: Orientation | None
+    decomposition: Decomposition
+    total_mm2: float
+    standing: FrontRow | None
+    upright: Orientation
+    held: bool
+
+
+def orient_and_decompose(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[[Mesh], Decomposition]) -> Oriented:
+    """The orientation whose decomposition costs least, with its time, its cuts' charge (search.least_saving) and its footing.
+
+    search: the whole search of a mesh; pricing: what parts take to print by a profile.
+    """
+    copy = coarse_copy(mesh, profile, NO_ZONES)
+    coarse, quick = (mesh, profile) if copy is None else (copy, as_it_is(profile))
+    upright, *others = forecast_orientations(coarse, quick, pricing)
+    others = sorted((other for other in others if other.bare_mm2 < inf), key=lambda other: other.forecast_mm2)
+
+    def searched(forecast: OrientationForecast) -> Oriented:
+        turned = forecast.mesh if copy is None else standing_still(mesh, forecast.orientation.rotation)
+        return _oriented(forecast, search(turned), upright.orientation, profile)
+
+    sure = next((other for other in others if other.forecast_mm2 < NO_DOUBT * upright.forecast_mm2), None)
+    first = None if sure is None else searched(sure)
+    if first is not None and first.total_mm2 < upright.hopeful_mm2:
+        return first
+    standing = _oriented(upright, search(mesh), upright.orientation, profile)
+    if first is None:
+        near = [other for other in others if other.forecast_mm2 < HOPELESS * standing.total_mm2]
+        likely = [_most_promising(near, quick, standing.total_mm2), _whole(others, quick, pricing, standing.total_mm2)]
+        tried = [searched(forecast) for forecast in dict.fromkeys(likely) if forecast is not None]
+    else:
+        tried = [first]
+    best = min((standing, *tried), key=lambda oriented: oriented.total_mm2)
+    return replace(best, standing=standing.decomposition.chosen)
+
+
+def _oriented(forecast: "OrientationForecast", decomposition: Decomposition, upright: Orientation, profile: Profile) -> Oriented:
+    """A model in an orientation and cut, with all that this costs."""
+    worth, row, further = Worth.of(profile), decomposition.chosen, len(decomposition.parts) - 1
+    charge = charge_mm2(decomposition.front, worth, profile.search.least_saving) if further else 0.0
+    total = total_mm2(row, worth) + forecast.footing_mm2 + further * charge
+    orientation = None if forecast.orientation is upright else forecast.orientation
+    return Oriented(orientation, decomposition, total, None, upright, forecast.footing.held(orientation is None))
+
+
+@dataclass(frozen=True, eq=False)
+class OrientationForecast:
+    """What a model costs in some orientation: bare_mm2: its time and filament without any support (hardly any decomposition costs
+    less); whole_mm2: in one piece; forecast_mm2: after a search, roughly; hopeful_mm2: after a search that does well. All contain
+    footing_mm2, the cost of how it stands on the plate and of being turned."""
+
+    orientation: Orientation
+    mesh: Mesh
+    bare_mm2: float
+    whole_mm2: float
+    forecast_mm2: float
+    hopeful_mm2: float
+    footing: Footing
+    footing_mm2: float
+
+
+def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[OrientationForecast]:
+    """A model as it stands, then in the first other orientations; infinite where it cannot be printed so."""
+    worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
+    upright, plate = measure_upright(mesh, profile.process.self_supporting_angle_deg), Plate.under(mesh, profile)
+    footed = [(upright, plate.footing(upright.rotation)), *_distinct(mesh, profile, plate)[:FORECAST]]
+    meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
+    prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
+    forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
+    for (orientation, footing), turned, bare in zip(footed, meshes, prices, strict=True):
+        footing_mm2 = surface_mm2 * (footing_share(footing) + (0.0 if orientation is upright else TURNED))
+        bare_mm2 = footing_mm2 + (inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm))
+        scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
+        shares = ((1.0, 1.0), (LEFT, STAIRS_LEFT), (LEAST_LEFT, LEAST_STAIRS_LEFT))
+        whole_mm2, forecast_mm2, hopeful_mm2 = (
+            bare_mm2 + left * scars_mm2 + stairs_left * stairs_mm2 for left, stairs_left in shares
+        )
+        forecasts.append(
+            OrientationForecast(orientation, turned, bare_mm2, whole_mm2, forecast_mm2, hopeful_mm2, footing, footing_mm2)
+        )
+    return forecasts
+
+
+def footing_share(footing: Footing) -> float:
+    """What a footing costs, as a share of the model's surface."""
+    return NARROW * footing.narrow + UNSTEADY * footing.unsteady
+
+
+def _scar_mm2(worth: Worth) -> float:
+    """What a mm2 that needs support counts, with the time that this takes."""
+    return 1.0 + worth.second_mm2 * SUPPORT_S_MM2
+
+
+def _most_promising(
+    forecasts: Sequence[OrientationForecast], profile: Profile, standing_mm2: float
+) -> OrientationForecast | None:
+    """The one that costs least after a narrow search; None where none comes near the cost of the model as it stands."""
+    quick, chosen = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
+    more_mm2, least_mm2 = _scar_mm2(Worth.of(profile)) - 1.0, inf
+    able = [forecast for forecast in forecasts if forecast.bare_mm2 < PROMISING * standing_mm2]
+    for forecast in able[:SEARCHED]:
+        rows = decompose(forecast.mesh, "", quick).front
+        cost_mm2 = forecast.bare_mm2 + min(row.cost_mm2 + more_mm2 * row.support_area_mm2 for row in rows)
+        if cost_mm2 < min(PROMISING * standing_mm2, least_mm2):
+            chosen, least_mm2 = forecast, cost_mm2
+    return chosen
+
+
+def _whole(
+    forecasts: Sequence[OrientationForecast], profile: Profile, pricing: PricingBy, standing_mm2: float
+) -> OrientationForecast | None:
+    """The one that costs least in one piece, where that is less than the model as it stands."""
+    forecast = min(forecasts, key=lambda forecast: forecast.whole_mm2, default=None)
+    if forecast is None or forecast.whole_mm2 > HOPELESS * standing_mm2:
+        return None
+    problem = Problem(forecast.mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
+    row = price_row(front_row(problem.root), (one_piece(forecast.mesh, profile.machine),), pricing(profile))
+    total = total_mm2(row, Worth.of(profile)) + forecast.footing_mm2
+    return forecast if row.time_s is not None and total < standing_mm2 else None
+
+
+def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
+    """Up to RANKED orientations in which the plate holds the model, sorted by a guess of their cost with their footing; any
+    orientation where the plate holds it in none, nor as it stands.
+
+    The model as it stands is left out, and so are orientations near another one and those that a symmetry makes like another one.
+    A body of revolution that is most of the model has its axis upright or level.
+    """
+    return [orientation for orientation, _ in _distinct(mesh, profile, Plate.under(mesh, profile))]
+
+
+def _distinct(mesh: Mesh, profile: Profile, plate: Plate) -> list[tuple[Orientation, Footing]]:
+    angle_deg, revolution, guess_mm2 = profile.process.self_supporting_angle_deg, find_revolution(mesh), _guess(profile)
+    upright, *others = *facet_orientations(mesh, angle_deg), *straight_orientations(mesh, angle_deg)
+    others = [other for other in others if revolution is None or revolution.is_square_to(other.rotation[2])]
+    worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
+    surface_mm2 = float(mesh.areas_mm2.sum())
+    known = [upright] if plate.footing(upright.rotation).held(of_file=True) else []  # else nothing is too near to it
+    others = sorted(others, key=lambda other: round(guess_mm2(other), 6))[:MOST_FOOTINGS]
+    footed = [(other, plate.footing(other.rotation)) for other in others]
+    footed = [one for one in footed if one[1].held()] or ([] if known else footed)
+    footed.sort(key=lambda one: round(guess_mm2(one[0]) + surface_mm2 * footing_share(one[1]), 6))
+    distinct: list[tuple[Orientation, Footing]] = []
+    for orientation, footing in footed:
+        near = any(float(orientation.rotation[2] @ other.rotation[2]) > NEAR for other in known)
+        if not near and not any(_alike(orientation, other, worst_mm2) for other in known):
+            known.append(orientation)
+            distinct.append((orientation, footing))
+    return distinct[:RANKED]
+
+
+def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:
+    same_area = abs(first.risky_mm2 - second.risky_mm2) + abs(first.stairs_mm2 - second.stairs_mm2) <= EQUAL * worst_mm2
+    return same_area and abs(first.height_mm - second.height_mm) <= EQUAL * second.height_mm
+
+
+def total_mm2(row: FrontRow | None, worth: Worth) -> float:
+    """What a row costs with its time and filament; infinite where they count and the row has none, for it cannot be printed."""
+    if row is None:
+        return 0.0
+    price_mm2 = worth.of_row(row)
+    return inf if price_mm2 is None else row.cost_mm2 + price_mm2
+
+
+def _guess(profile: Profile) -> Callable[[Orientation], float]:
+    """What orientations cost in one piece, roughly and but for what is the same in all of them, mm2."""
+    second_mm2, layer_mm, stair_mm2 = Worth.of(profile).second_mm2, profile.process.layer_height_mm, weight_of_stairs(profile)
+
+    def cost_mm2(orientation: Orientation) -> float:
+        seconds = SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * ceil(orientation.height_mm / layer_mm)
+        return orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2 + second_mm2 * seconds
+
+    return cost_mm2
+
+
+def _price_bare(mesh: Mesh, profile: Profile, pricing: PricingBy) -> Price | None:
+    """What a mesh in one piece takes without any support, which hardly any decomposition goes below; None where it cannot be
+    printed so."""
+    bare = profile.model_copy(update={"process": profile.process.model_copy(update={"support": "none"})})
+    return pricing(bare)((one_piece(mesh, profile.machine),))
+
+
+def _with_search(profile: Profile, **settings: object) -> Profile:
+    return profile.model_copy(update={"search": profile.search.model_copy(update=settings)})

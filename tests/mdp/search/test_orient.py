@@ -1,0 +1,250 @@
+"""Orientation and parts are chosen together, by what both cost with their time."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.cost.footing import Footing
+from mdp.cut import mesh_of
+from mdp.decomposition import Decomposition, FrontRow, Part
+from mdp.directions.orientation import measure_upright, side_in_words, standing_still
+from mdp.mesh import Mesh
+from mdp.plane import Plane
+from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.pose import about
+from mdp.search import orient
+from mdp.search.front import Price, Pricing, Worth
+from mdp.search.orient import Oriented, distinct_orientations, forecast_orientations, orient_and_decompose, total_mm2
+from mdp.search.search import decompose
+from profiles.profile import Profile, load
+from tests.shapes import box, branch, tee
+
+PROFILE = load(settings=["search.directions=20", "search.polish=false"])
+
+
+def by_height(profile: Profile) -> Pricing:
+    """A printer that takes 10 s for every mm of height."""
+
+    def price(parts: Sequence[Part]) -> Price:
+        return Price(sum(10.0 * float(np.ptp(part.in_part_frame().vertices[:, 2])) for part in parts), 1000.0)
+
+    return price
+
+
+def found(mesh: Mesh) -> Oriented:
+    return orient_and_decompose(
+        mesh, PROFILE, by_height, partial(decompose, name="mesh", profile=PROFILE, price=by_height(PROFILE))
+    )
+
+
+@pytest.mark.parametrize(("sides", "others"), [((20, 20, 20), 0), ((20, 20, 40), 1), ((20, 30, 40), 2)])
+def test_orientations_that_a_symmetry_makes_alike_count_once(sides: tuple[int, int, int], others: int) -> None:
+    assert len(distinct_orientations(box(*sides), PROFILE)) == others
+
+
+def test_a_tee_is_laid_on_its_side_where_nothing_needs_support() -> None:
+    oriented = found(tee())
+    assert oriented.orientation is not None
+    assert (len(oriented.decomposition.parts), oriented.decomposition.cost_mm2) == (1, 0.0)
+    surface_mm2 = 2 * 700.0 + 160.0 * 10.0  # of a T of 7 cm2 that is 10 mm thick
+    assert oriented.total_mm2 == pytest.approx(0.1 * 10.0 * 10.0 + 100.0 + 0.055 * surface_mm2)  # 100 s, a metre, turned
+
+
+def test_what_lies_best_stays_as_it_stands() -> None:
+    assert found(box(40, 30, 10)).orientation is None
+
+
+@pytest.mark.parametrize("mesh", [tee(), branch(), box(10, 20, 60)], ids=["tee", "branch", "box"])
+def test_laid_down_it_costs_no_more_than_in_one_piece_as_it_stands(mesh: Mesh) -> None:
+    whole = decompose(mesh, "mesh", PROFILE, price=by_height(PROFILE)).front[0]
+    footing_mm2 = forecast_orientations(mesh, PROFILE, by_height)[0].footing_mm2
+    assert found(mesh).total_mm2 <= total_mm2(whole, Worth.of(PROFILE)) + footing_mm2
+
+
+def test_a_model_stays_where_turning_it_saves_less_than_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    standing = decompose(tee(), "mesh", PROFILE, price=by_height(PROFILE)).front[0]
+    unsteady_mm2 = (
+        0.1 * (1.0 - np.degrees(np.arctan2(5.0, 26.43)) / 30.0) * 3000.0
+    )  # its centre of mass 26.43 mm over a foot of 10
+    saved_mm2 = total_mm2(standing, Worth.of(PROFILE)) + unsteady_mm2 - 110.0  # of 100 s and a metre
+    for share, turned in ((0.9, True), (1.1, False)):
+        monkeypatch.setattr(orient, "TURNED", share * saved_mm2 / 3000.0)
+        assert (found(tee()).orientation is not None) == turned
+
+
+def leaning_plate() -> Mesh:
+    """A plate of 40 x 30 x 4 mm that leans on one edge by 30 degrees, the edge cut level to stand on."""
+    turn = about(np.array([0.0, 1.0, 0.0]), np.radians(30.0))
+    return standing_still(box(40, 30, 4), turn)
+
+
+def test_of_two_ways_to_lie_that_need_no_support_the_one_without_stairs_is_taken() -> None:
+    ways = distinct_orientations(leaning_plate(), PROFILE)
+    assert ways[0].stairs_mm2 == pytest.approx(0.0, abs=1e-6)
+    assert measure_upright(leaning_plate(), 45.0).stairs_mm2 == pytest.approx(
+        2.0 * (40 * 30 * np.cos(np.radians(30.0)) + 4 * 30 * np.sin(np.radians(30.0)))
+    )
+
+
+def searches(mesh: Mesh, price_by: Callable[[Profile], Pricing]) -> tuple[Oriented, int]:
+    """How a mesh is laid down, and how many searches that took."""
+    searched: list[Mesh] = []
+
+    def search(mesh: Mesh) -> Decomposition:
+        searched.append(mesh)
+        return decompose(mesh, "mesh", PROFILE, price=price_by(PROFILE))
+
+    return orient_and_decompose(mesh, PROFILE, price_by, search), len(searched)
+
+
+def test_what_can_be_told_without_a_search_is_not_searched() -> None:
+    oriented, count = searches(tee(arm=80.0), by_height)
+    assert (oriented.orientation is None, oriented.standing, count) == (False, None, 1)
+    oriented, count = searches(box(40, 30, 10), by_height)
+    assert (oriented.orientation, count) == (None, 1)
+
+
+def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
+    def surprised(profile: Profile) -> Pricing:
+        bare = profile.process.support == "none"  # a forecast's
+        return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) > 39 else None
+
+    oriented, count = searches(tee(), surprised)
+    assert (oriented.orientation, count) == (None, 2)
+
+
+def test_a_way_that_ends_dearer_than_good_cuts_would_leave_it_is_compared_with_how_it_stands() -> None:
+    upright = forecast_orientations(tee(), PROFILE, by_height)[0]
+    hoped_mm2 = (upright.forecast_mm2 + upright.hopeful_mm2) / 2.0  # less than the forecast, and no certainty
+    more_s = (hoped_mm2 - found(tee()).total_mm2) / PROFILE.search.second_mm2
+
+    def slow_when_low(profile: Profile) -> Pricing:
+        def price(parts: Sequence[Part]) -> Price:
+            low = profile.process.support != "none" and np.ptp(parts[0].mesh.vertices[:, 2]) < 39
+            found = by_height(profile)(parts)
+            assert found is not None
+            return Price(found.time_s + more_s * low, found.filament_mm)
+
+        return price
+
+    assert searches(tee(), slow_when_low)[1] == 2
+
+
+def on_a_small_plate(profile: Profile) -> Pricing:
+    """The same printer with a plate for bases up to 20 mm wide."""
+
+    def price(parts: Sequence[Part]) -> Price | None:
+        vertices = parts[0].mesh.vertices
+        return by_height(profile)(parts) if np.ptp(vertices[vertices[:, 2] < 0.1, 0]) < 20.0 else None
+
+    return price
+
+
+def test_no_orientation_is_taken_that_the_machine_has_no_room_for() -> None:
+    price = on_a_small_plate(PROFILE)
+    search = partial(decompose, name="mesh", profile=PROFILE, price=price)
+    assert orient_and_decompose(tee(), PROFILE, on_a_small_plate, search).orientation is None
+
+
+def test_a_model_that_cannot_be_printed_as_it_stands_once_it_is_searched_is_found() -> None:
+    def too_high(profile: Profile) -> Pricing:
+        bare = profile.process.support == "none"  # a forecast's
+        return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) < 39 else None
+
+    oriented, _ = searches(tee(), too_high)
+    assert oriented.orientation is not None
+    assert np.isfinite(oriented.total_mm2)
+
+
+def test_the_side_that_a_model_lies_on_has_a_name() -> None:
+    assert side_in_words(measure_upright(tee(), 45.0)) == "as it stands"
+    sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}
+    assert sides <= {"on its front", "on its back", "on its left side", "on its right side", "upside down"}
+
+
+def test_a_cone_on_its_point_is_set_on_its_base_though_nothing_else_tells_the_two_apart() -> None:
+    cone = mesh_of(m3.Manifold.cylinder(40.0, 0.01, 12.0, 64))
+    oriented = found(cone)
+    assert oriented.orientation is not None
+    assert oriented.orientation.rotation[2] == pytest.approx([0, 0, -1], abs=1e-6)
+    assert (oriented.held, oriented.upright.risky_mm2) == (True, 0.0)
+
+
+def test_orientations_are_15_degrees_apart_from_each_other_and_from_that_of_the_file() -> None:
+    barrel = mesh_of(m3.Manifold.cylinder(40.0, 10.0, 10.0, 48))  # its sides are facets 7.5 degrees apart
+    ups = np.array([np.array([0.0, 0.0, 1.0]), *(other.rotation[2] for other in distinct_orientations(barrel, PROFILE))])
+    assert len(ups) > 1
+    assert (ups @ ups.T - np.eye(len(ups))).max() < np.cos(np.radians(15.0))
+
+
+def test_a_narrow_base_an_unsteady_stance_and_a_turn_count_as_shares_of_the_surface() -> None:
+    assert orient.footing_share(Footing(0.2, 30.0, 0.0, 0.0)) == 0.0
+    assert orient.footing_share(Footing(0.1, 30.0, 0.0, 0.0)) == pytest.approx(0.06)
+    assert orient.footing_share(Footing(0.0, 15.0, 0.0, 0.0)) == pytest.approx(0.12 + 0.04)
+    assert orient.footing_share(Footing(0.5, -20.0, 0.0, 0.0)) == pytest.approx(0.08)
+    upright, *others = forecast_orientations(box(40, 40, 10), PROFILE, by_height)
+    surface_mm2 = 2 * 1600.0 + 4 * 400.0
+    assert upright.footing_mm2 == 0.0
+    tilted_deg = np.degrees(np.arctan(5.0 / 20.0))  # on a side of 40 x 10 mm
+    assert others[0].footing_mm2 == pytest.approx((0.055 + 0.08 * (1.0 - tilted_deg / 30.0)) * surface_mm2, rel=1e-3)
+
+
+def test_a_forecast_contains_the_footing() -> None:
+    upright, *others = forecast_orientations(box(40, 40, 40), PROFILE, by_height)
+    assert (upright.footing_mm2, others) == (0.0, [])
+    upright, *others = forecast_orientations(box(40, 24, 40), PROFILE, by_height)
+    flat = others[0]
+    assert flat.bare_mm2 == pytest.approx(0.1 * 240.0 + 100.0 + 0.055 * (2 * 1600.0 + 4 * 960.0))  # 240 s, a metre
+    assert flat.hopeful_mm2 == flat.forecast_mm2 == flat.whole_mm2 == flat.bare_mm2
+
+
+def test_a_model_that_leans_on_a_blunt_end_is_offered_straight_on_it() -> None:
+    """A rod with a ball at its end, leaning by 20 degrees: upright it stands on no facet of its hull."""
+    club = m3.Manifold.cylinder(60.0, 5.0, 5.0, 64) + m3.Manifold.sphere(9.0, 64)
+    leaning = mesh_of(club.rotate((20.0, 0.0, 0.0)))
+    along = about(np.array([1.0, 0.0, 0.0]), np.radians(20.0)) @ np.array([0.0, 0.0, 1.0])
+    straight = max(float(abs(other.rotation[2] @ along)) for other in orient.straight_orientations(leaning, 45.0))
+    assert straight == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_rounded_model_is_offered_straight_along_the_sides_of_its_file() -> None:
+    """An ellipsoid that leans by 20 degrees: the sides of its box are neither facets nor principal axes."""
+    leaning = mesh_of(m3.Manifold.sphere(10.0, 48).scale((1.0, 1.5, 3.0)).rotate((20.0, 30.0, 10.0)))
+    ups = np.array([other.rotation[2] for other in orient.straight_orientations(leaning, 45.0)])
+    for side in ([1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, -1]):
+        assert (ups @ side).max() == pytest.approx(1.0)
+    assert (ups @ [0, 0, 1]).max() < 0.999  # as it stands is no other orientation
+
+
+def test_every_further_part_is_charged_a_share_of_what_one_piece_costs() -> None:
+    flat = box(40, 30, 10)
+    halves = decompose(flat, "box", PROFILE, by_hand=PlanFile("", parts=(PlannedPart.of(Plane(np.array([0.0, 0.0, 1.0]), 5.0)),)))
+    one = FrontRow((), 1000.0, 0.0, 1000.0, time_s=1000.0, filament_mm=1000.0)  # with time and filament 1200 mm2
+    two = FrontRow((), 800.0, 0.0, 800.0, chosen=True, time_s=500.0, filament_mm=1000.0)
+    oriented = orient_and_decompose(flat, PROFILE, by_height, lambda mesh: replace(halves, front=(one, two)))
+    assert oriented.total_mm2 == pytest.approx(800.0 + 0.1 * 500.0 + 100.0 + 0.03 * 1200.0)
+
+
+def test_where_the_plate_holds_a_model_in_no_orientation_the_steadiest_may_be_taken() -> None:
+    spikes = [
+        m3.Manifold.cylinder(30.0, 6.0, 0.1, 16).rotate(turn) for turn in ((0, 180, 0), (0, 60, 0), (0, 60, 120), (0, 60, 240))
+    ]
+    caltrop = mesh_of(m3.Manifold.batch_boolean(spikes, m3.OpType.Add))
+    without_brim = load(settings=["search.directions=20", "search.polish=false", "process.small_base_brim_mm=0"])
+    forecasts = forecast_orientations(caltrop, without_brim, by_height)
+    assert [forecast.footing.held() for forecast in forecasts] == [False] * 4
+
+
+def test_a_turned_body_stands_or_lies_along_its_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+    cup = mesh_of(m3.CrossSection([[(0.0, 0.0), (8.0, 0.0), (20.0, 30.0), (0.0, 30.0)]]).revolve(24))
+
+    def heights() -> set[float]:
+        return {round(abs(float(orientation.rotation[2, 2])), 3) for orientation in distinct_orientations(cup, PROFILE)}
+
+    assert heights() <= {0.0, 1.0}
+    monkeypatch.setattr(orient, "find_revolution", lambda mesh: None)
+    assert not heights() <= {0.0, 1.0}  # on its slanted side
