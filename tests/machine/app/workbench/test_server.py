@@ -56,6 +56,11 @@ def test_to_ask_for_a_model_that_has_gone_from_the_bench_is_no_fault_of_a_page(b
     assert bench.ask("model/another") == (204, b"")
 
 
+def test_a_key_whose_hexadecimal_digits_are_all_decimal_is_one_like_any_other(bench: Running) -> None:
+    assert bench.ask("model/1234567890123456") == (204, b"")
+    assert bench.ask(f"model/{'9' * 5000}")[0] == 404
+
+
 def test_a_broken_model_is_told_as_the_command_line_tells_it(
     bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
