@@ -75,7 +75,8 @@ def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
     if not len(heights):
         return ()
     pieces = "1 piece floats" if len(heights) == 1 else f"{len(heights)} pieces float at least"
-    return (f"{pieces} {heights.min():.3g} mm above the platform on nothing: no cut changes that, only support can hold such",)
+    height = f"{heights.min():.3g} mm above the platform"
+    return (f"{pieces} {height}, as its file has it, on nothing: only support can hold such, whatever is cut",)
 
 
 def _read_surfaces(path: Path) -> list[Surface]:

@@ -60,7 +60,7 @@ PricingBy = Callable[[Profile], Pricing]
 class Oriented:
     """A model turned and cut: turned whole by the orientation, None where it stays as it stands; total_mm2: the cost of its parts
     with their time, filament and charge for cuts, and of its footing; standing: the row taken of the model as it stands, where
-    that was searched; upright: the model as it stands; held: whether the plate holds it."""
+    that was searched; upright: the model as it stands; held, upright_held: whether the plate holds it so, and as it stands."""
 
     orientation: Orientation | None
     decomposition: Decomposition
@@ -68,6 +68,7 @@ class Oriented:
     standing: FrontRow | None
     upright: Orientation
     held: bool
+    upright_held: bool
 
 
 def orient_and_decompose(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[[Mesh], Decomposition]) -> Oriented:
@@ -82,13 +83,13 @@ def orient_and_decompose(mesh: Mesh, profile: Profile, pricing: PricingBy, searc
 
     def searched(forecast: OrientationForecast) -> Oriented:
         turned = forecast.mesh if copy is None else standing_still(mesh, forecast.orientation.rotation)
-        return _oriented(forecast, search(turned), upright.orientation, profile)
+        return _oriented(forecast, search(turned), upright, profile)
 
     sure = next((other for other in others if other.forecast_mm2 < NO_DOUBT * upright.forecast_mm2), None)
     first = None if sure is None else searched(sure)
     if first is not None and first.total_mm2 < upright.hopeful_mm2:
         return first
-    standing = _oriented(upright, search(mesh), upright.orientation, profile)
+    standing = _oriented(upright, search(mesh), upright, profile)
     if first is None:
         near = [other for other in others if other.forecast_mm2 < HOPELESS * standing.total_mm2]
         likely = [_most_promising(near, quick, standing.total_mm2), _whole(others, quick, pricing, standing.total_mm2)]
@@ -99,13 +100,16 @@ def orient_and_decompose(mesh: Mesh, profile: Profile, pricing: PricingBy, searc
     return replace(best, standing=standing.decomposition.chosen)
 
 
-def _oriented(forecast: "OrientationForecast", decomposition: Decomposition, upright: Orientation, profile: Profile) -> Oriented:
+def _oriented(
+    forecast: "OrientationForecast", decomposition: Decomposition, upright: "OrientationForecast", profile: Profile
+) -> Oriented:
     """A model in an orientation and cut, with all that this costs."""
     worth, row, further = Worth.of(profile), decomposition.chosen, len(decomposition.parts) - 1
     charge = charge_mm2(decomposition.front, worth, profile.search.least_saving) if further else 0.0
     total = total_mm2(row, worth) + forecast.footing_mm2 + further * charge
-    orientation = None if forecast.orientation is upright else forecast.orientation
-    return Oriented(orientation, decomposition, total, None, upright, forecast.footing.held(orientation is None))
+    orientation, upright_held = None if forecast is upright else forecast.orientation, upright.footing.held(of_file=True)
+    held = upright_held if orientation is None else forecast.footing.held()
+    return Oriented(orientation, decomposition, total, None, upright.orientation, held, upright_held)
 
 
 @dataclass(frozen=True, eq=False)

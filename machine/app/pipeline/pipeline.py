@@ -16,7 +16,7 @@ from machine.app.pipeline.given_plan import as_turned, check_parts_named, lays_d
 from machine.app.pipeline.memory import return_unused
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
-from machine.app.terminal.advice import orientation_in_words
+from machine.app.terminal.advice import orientation_in_words, standing_in_words
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
@@ -87,7 +87,6 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     laying = lays_down(request, given, profile)
     if to_build and not laying:
         check_standing(mesh, profile)  # a search may take minutes
-    notes: tuple[str, ...] = ()
     with reporting() as report:
         asked = _Search(request, given, to_build and not laying, report)
         if laying:
@@ -95,7 +94,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
             decomposition, notes = oriented.decomposition, orientation_in_words(oriented, "--as-is keeps it as it stands")
             orientation = None if oriented.orientation is None else oriented.orientation.rotation
         else:
-            decomposition = asked.search(mesh)
+            decomposition, notes = asked.search(mesh), standing_in_words(mesh, profile)
     if record_file is not None:
         write_bytes(record_file, asked.record_of(decomposition))
     check_parts_named(profile, len(decomposition.parts))

@@ -2,10 +2,14 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from machine.app.terminal.report import estimates, table
 from machine.quantities import minutes
+from mdp.cost.footing import Plate
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words, side_in_words
+from mdp.mesh import Mesh
 from mdp.search.front import ASKED, BY_PLAN, Worth, choose
 from mdp.search.orient import Oriented
 from profiles.profile import Profile
@@ -36,8 +40,14 @@ def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
     where, better = f"{side} ({turns})" if side else turns, ""
     if laid is not None:
         was = f"{oriented.upright.risky_mm2:.0f} mm2 hang over" if standing is None else _with_scars(standing)
-        better = f": {_with_scars(laid)}, as it stands {was}"
+        better = f": {_with_scars(laid)}, as it stands {was if oriented.upright_held else 'the plate would hardly hold it'}"
     return (f"it is laid down {where}{better}; {otherwise}", *warning)
+
+
+def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
+    """A warning where the plate hardly holds a model as it stands; none where a pedestal does."""
+    on_pedestal = profile.search.pedestal_mm > 0.0
+    return () if on_pedestal or Plate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
 
 
 def _with_scars(row: FrontRow) -> str:

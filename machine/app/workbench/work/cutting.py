@@ -12,7 +12,7 @@ import numpy as np
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import lies_freely
 from machine.app.pipeline.pricing import pricing
-from machine.app.terminal.advice import orientation_in_words
+from machine.app.terminal.advice import orientation_in_words, standing_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.processes import Tell
 from mdp.decomposition import Decomposition, FrontRow
@@ -96,7 +96,7 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
         decomposition = oriented.decomposition
         return Found(decomposition.front, (*decomposition.notes, *orientation_in_words(oriented, AS_IT_STANDS)), turn)
     decomposition = search(mesh)
-    return Found(decomposition.front, decomposition.notes)
+    return Found(decomposition.front, (*decomposition.notes, *standing_in_words(mesh, profile)))
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
