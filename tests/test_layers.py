@@ -30,7 +30,7 @@ CONFINED = {
         "machine/app/pipeline/precompile",
         "machine/calibration/coupon/",
     ),
-    "numba": ("mdp/kernels/kernel", "mdp/kernels/library"),
+    "numba": ("mdp/kernels/kernel",),
     "shapely": ("slicer/travel/islands", "machine/dryrun/placement"),
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),

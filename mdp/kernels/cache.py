@@ -16,7 +16,6 @@ from profiles.folders import cache_folder, lost_at_end
 
 PACKAGES = Path(__file__).resolve().parents[2]
 IMPORTED = re.compile(rb"^from ((?:profiles|mdp|slicer|machine)(?:\.\w+)+) import", re.MULTILINE)
-MAKER = PACKAGES / "mdp" / "kernels" / "library.py"  # every kernel is made by it, none imports it
 HAS_KERNELS = b"from mdp.kernels.kernel import"
 UNUSED_S = 60 * 86400.0  # folders of older versions go after this time: a program that still runs may be using them
 
@@ -59,10 +58,8 @@ def _text(file: Path) -> bytes:
 
 
 def sources(file: Path) -> list[Path]:
-    """The files that make a file's kernels: it, those it imports from, those that kernels among these import from, and how
-    machine code is made of them.
-    """
-    files, unread = {file, MAKER}, [file]
+    """The files that make a file's kernels: it, those it imports from, and those that kernels among these import from."""
+    files, unread = {file}, [file]
     while unread:
         for module in IMPORTED.findall(_text(unread.pop())):
             imported = PACKAGES / (module.decode().replace(".", "/") + ".py")

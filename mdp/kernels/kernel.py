@@ -15,7 +15,6 @@ from numba import config, njit
 from numba.core import event
 
 from mdp.kernels.cache import folder, note_unwritten
-from mdp.kernels.library import use_kernel_libraries, use_plain_options
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -35,9 +34,6 @@ borrower: Compile = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_
 # No flag allows the compiler to change a result, so all processors and numbers of threads give the same numbers.
 vector_part: Compile = njit(error_model="numpy", fastmath={"nnan", "ninf", "nsz"}, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 inlined: Compile = njit(error_model="numpy", inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-
-use_kernel_libraries()
-use_plain_options()
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

@@ -55,7 +55,6 @@ def test_the_sources_of_a_kernel_are_its_file_and_what_its_parts_and_constants_c
         "slicer/travel/path_order.py",
         "mdp/kernels/arrays.py",
         "mdp/kernels/kernel.py",
-        "mdp/kernels/library.py",
         "mdp/mesh.py",
     }
     assert cache.PACKAGES / "slicer" / "geometry" / "cells.py" in cache.sources(travel / "combing.py")
