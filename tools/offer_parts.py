@@ -120,8 +120,8 @@ def offers_of(mesh: Mesh, profile: Profile) -> list[Offer]:
     size_mm, price = float(np.ptp(mesh.vertices, axis=0).max()), pricing(profile)
     oriented = orient_and_decompose(mesh, profile, pricing, partial(decompose, name="", profile=profile, price=price))
     taken = np.eye(3) if oriented.orientation is None else oriented.orientation.rotation
-    glimpses = sorted(forecast_orientations(mesh, profile, pricing), key=lambda glimpse: glimpse.whole_mm2)
-    printable = [glimpse.orientation.rotation for glimpse in glimpses if np.isfinite(glimpse.whole_mm2)]
+    forecasts = sorted(forecast_orientations(mesh, profile, pricing), key=lambda forecast: forecast.whole_mm2)
+    printable = [forecast.orientation.rotation for forecast in forecasts if np.isfinite(forecast.whole_mm2)]
     whole = distinct([], [Offer(turn, ()) for turn in (taken, *printable[:1], np.eye(3), *printable)], size_mm, WHOLE)
     offers = [Offer(taken, tuple(part.base for part in reversed(oriented.decomposition.parts[1:])), True)]
     offers += distinct(offers, whole, size_mm, WHOLE)

@@ -18,7 +18,6 @@ from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import (
     Orientation,
     facet_orientations,
-    measure_upright,
     standing_still,
     straight_orientations,
 )
@@ -131,8 +130,8 @@ class OrientationForecast:
 def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[OrientationForecast]:
     """A model as it stands, then in the first other orientations; infinite where it cannot be printed so."""
     worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
-    upright, plate = measure_upright(mesh, profile.process.self_supporting_angle_deg), Plate.under(mesh, profile)
-    footed = [(upright, plate.footing(upright.rotation)), *_distinct(mesh, profile, plate)[:FORECAST]]
+    footed = _distinct(mesh, profile)[: 1 + FORECAST]
+    upright = footed[0][0]
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
     prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
@@ -195,16 +194,18 @@ def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
     The model as it stands is left out, and so are orientations near another one and those that a symmetry makes like another one.
     A body of revolution that is most of the model has its axis upright or level.
     """
-    return [orientation for orientation, _ in _distinct(mesh, profile, Plate.under(mesh, profile))]
+    return [orientation for orientation, _ in _distinct(mesh, profile)[1:]]
 
 
-def _distinct(mesh: Mesh, profile: Profile, plate: Plate) -> list[tuple[Orientation, Footing]]:
+def _distinct(mesh: Mesh, profile: Profile) -> list[tuple[Orientation, Footing]]:
+    """The model as it stands, then those orientations, each with its footing."""
     angle_deg, revolution, guess_mm2 = profile.process.self_supporting_angle_deg, find_revolution(mesh), _guess(profile)
     upright, *others = *facet_orientations(mesh, angle_deg), *straight_orientations(mesh, angle_deg)
     others = [other for other in others if revolution is None or revolution.is_square_to(other.rotation[2])]
     worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
-    surface_mm2 = float(mesh.areas_mm2.sum())
-    known = [upright] if plate.footing(upright.rotation).held(of_file=True) else []  # else nothing is too near to it
+    plate, surface_mm2 = Plate.under(mesh, profile), float(mesh.areas_mm2.sum())
+    standing = plate.footing(upright.rotation)
+    known = [upright] if standing.held(of_file=True) else []  # else nothing is too near to it
     others = sorted(others, key=lambda other: round(guess_mm2(other), 6))[:MOST_FOOTINGS]
     footed = [(other, plate.footing(other.rotation)) for other in others]
     footed = [one for one in footed if one[1].held()] or ([] if known else footed)
@@ -215,7 +216,7 @@ def _distinct(mesh: Mesh, profile: Profile, plate: Plate) -> list[tuple[Orientat
         if not near and not any(_alike(orientation, other, worst_mm2) for other in known):
             known.append(orientation)
             distinct.append((orientation, footing))
-    return distinct[:RANKED]
+    return [(upright, standing), *distinct[:RANKED]]
 
 
 def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:

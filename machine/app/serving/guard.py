@@ -25,7 +25,7 @@ HEADERS = {
 SAFE = ("GET", "HEAD")
 REFUSED_SOCKET = 1008  # policy violation, RFC 6455
 FOREIGN = "this page is for this computer only\n"
-LONG_NUMBER = re.compile(r"/\d{17}\d*(/|$)")  # nothing here has such a one: keys are 16 hexadecimal digits, at times all decimal
+LONG_NUMBER = re.compile(r"/\d{17}\d*(/|$)")  # in no path here: keys are 16 hexadecimal digits, at times all decimal
 UNKNOWN = "this page is at the address that tiltprint has told, which is another one with each start\n"
 
 Headers = Iterable[tuple[bytes, bytes]]

@@ -69,8 +69,8 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
     price, best = pricing(profile.of_all_parts), None
 
-    def search(oriented: Mesh) -> Decomposition:
-        otherwise = "" if oriented is mesh else "laid down otherwise: "
+    def search(candidate: Mesh) -> Decomposition:
+        otherwise = "" if candidate is mesh else "laid down otherwise: "
 
         def say(phase: str) -> None:
             tell(Searched(f"{otherwise}{phase}", best))
@@ -82,11 +82,11 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
                 tell(Searched(f"{otherwise}looking for the first cut along {profile.search.directions:,} directions", best))
                 return
             left = f"{100 * progress.best_share:.1f} % of the overhangs left"
-            if oriented is mesh:
+            if candidate is mesh:
                 best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
             tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
 
-        return decompose(oriented, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=locked, price=price)
+        return decompose(candidate, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=locked, price=price)
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if way.orient and untouched and lies_freely(profile):
