@@ -62,7 +62,7 @@ class Footing:
 @dataclass(frozen=True, eq=False)
 class Plate:
     """The plate under a model: its mesh and solid, its centre of mass and diameter, the width of the brim that a small base gets,
-    and the density, as if it were printed solid."""
+    the density, as if it were printed solid, and whether the model stands on a pedestal."""
 
     mesh: Mesh
     solid: Solid
@@ -70,15 +70,19 @@ class Plate:
     diameter_mm: float
     brim_mm: float
     density_g_cm3: float
+    pedestal: bool = False
 
     @classmethod
     def under(cls, mesh: Mesh, profile: Profile) -> "Plate":
         """The plate under a mesh, by a profile."""
         brim_mm = profile.process.brim_mm or profile.process.small_base_brim_mm
-        return cls(mesh, solid_of(mesh), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, profile.material.density_g_cm3)
+        density_g_cm3, pedestal = profile.material.density_g_cm3, profile.search.pedestal_mm > 0.0
+        return cls(mesh, solid_of(mesh), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, density_g_cm3, pedestal)
 
     def footing(self, rotation: Floats) -> Footing:
-        """How the model stands when it is turned by a rotation (3, 3)."""
+        """How the model stands when it is turned by a rotation (3, 3); a pedestal carries it however it is turned."""
+        if self.pedestal:
+            return Footing(1.0, 90.0, 0.0, 0.0)
         heights, centre = self.mesh.vertices @ rotation[2], rotation @ self.centre
         low, high = float(heights.min()), float(heights.max())
         base = self._base(rotation, low, high)

@@ -43,10 +43,7 @@ NEAR = cos(radians(15.0))  # orientations that differ by less count as one
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
 # Fitted to whole searches of 429 orientations of 66 models with seams of 0.8 mm (tools/RESULTS.md).
 LEFT, STAIRS_LEFT = 0.6, 0.75  # share of what needs support in one piece that cuts leave, and of the stairs
-LEAST_LEFT, LEAST_STAIRS_LEFT = (
-    0.3,
-    0.45,
-)  # where they do well (34 more models)
+LEAST_LEFT, LEAST_STAIRS_LEFT = 0.3, 0.45  # where they do well (34 more models)
 # Of what the model costs as it stands: a forecast below the first leaves no doubt, one above the second no hope.
 NO_DOUBT, HOPELESS = 0.9, 1.3
 PROMISING = 1.03  # of the same: narrow searches end higher

@@ -185,6 +185,8 @@ def _search_beam(
     problem: Problem, ranker: Ranker, trace: Trace | None, report: Callable[[Progress], None]
 ) -> tuple[Node, Front, int]:
     """The best node of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
+    if problem.model.risky_mm2 <= 0:
+        return problem.start, Front(problem.start), 0
     beam = Beam(problem, ranker, trace)
     stage = 0
     try:
@@ -260,7 +262,7 @@ def _notes(problem: Problem, taken: Taken, wanted: int | None) -> tuple[str, ...
     """What a person should know of the outcome."""
     parts = len(taken.parts)
     if problem.model.risky_mm2 <= 0 and parts == 1:
-        return ("no face needs support: the model is printed straight up as one part",)
+        return ("no face needs support: the model is printed as one part",)
     if problem.late():
         return (f"search.time_limit_s = {problem.settings.time_limit_s:g} ended the search; the best so far is used",)
     if len(taken.front) > 1 or parts > 1 or wanted == 1:

@@ -46,7 +46,7 @@ def test_a_lattice_of_thousands_of_handles_is_cut_into_parts_that_hang_together(
 def test_a_steep_model_on_its_point_needs_no_support_and_says_so(mesh: Mesh) -> None:
     decomposition = _decomposed(mesh, "clearance=false")
     assert len(decomposition.parts) == 1
-    assert decomposition.notes == ("no face needs support: the model is printed straight up as one part",)
+    assert decomposition.notes == ("no face needs support: the model is printed as one part",)
 
 
 def test_a_ball_on_its_point_is_cut_and_every_part_stands_on_the_ones_before() -> None:

@@ -14,7 +14,10 @@ from mdp.search.front import ASKED, BY_PLAN, Worth, choose
 from mdp.search.orient import Oriented
 from profiles.profile import Profile
 
-HARDLY_HELD = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
+HARDLY_HELD = (
+    "its base may be too small to hold it: think of a wide brim (process.brim_mm), another side (process.rotate_deg) or a "
+    "pedestal (search.pedestal_mm)"
+)
 
 
 def advice(decomposition: Decomposition, profile: Profile) -> str:
@@ -45,9 +48,8 @@ def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
 
 
 def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
-    """A warning where the plate hardly holds a model as it stands; none where a pedestal does."""
-    on_pedestal = profile.search.pedestal_mm > 0.0
-    return () if on_pedestal or Plate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
+    """A warning where the plate hardly holds a model as it stands."""
+    return () if Plate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
 
 
 def _with_scars(row: FrontRow) -> str:

@@ -67,9 +67,8 @@ def test_laid_down_it_costs_no_more_than_in_one_piece_as_it_stands(mesh: Mesh) -
 
 def test_a_model_stays_where_turning_it_saves_less_than_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     standing = decompose(tee(), "mesh", PROFILE, price=by_height(PROFILE)).front[0]
-    unsteady_mm2 = (
-        0.1 * (1.0 - np.degrees(np.arctan2(5.0, 26.43)) / 30.0) * 3000.0
-    )  # its centre of mass 26.43 mm over a foot of 10
+    lean_deg = np.degrees(np.arctan2(5.0, 26.43))  # its centre of mass stands 26.43 mm over a foot of 10 mm
+    unsteady_mm2 = 0.08 * (1.0 - lean_deg / 30.0) * 3000.0
     saved_mm2 = total_mm2(standing, Worth.of(PROFILE)) + unsteady_mm2 - 110.0  # of 100 s and a metre
     for share, turned in ((0.9, True), (1.1, False)):
         monkeypatch.setattr(orient, "TURNED", share * saved_mm2 / 3000.0)
@@ -181,6 +180,14 @@ def test_orientations_are_15_degrees_apart_from_each_other_and_from_that_of_the_
     assert (ups @ ups.T - np.eye(len(ups))).max() < np.cos(np.radians(15.0))
 
 
+def test_a_model_on_a_pedestal_is_not_turned_for_its_base() -> None:
+    profile = load(settings=["search.directions=20", "search.polish=false", "search.pedestal_mm=5"])
+    cone = mesh_of(m3.Manifold.cylinder(40.0, 0.01, 12.0, 64))
+    upright, *others = forecast_orientations(cone, profile, by_height)
+    assert (upright.footing.held(), upright.footing_mm2) == (True, 0.0)
+    assert all(other.footing_mm2 == pytest.approx(0.055 * cone.areas_mm2.sum()) for other in others)
+
+
 def test_a_narrow_base_an_unsteady_stance_and_a_turn_count_as_shares_of_the_surface() -> None:
     assert orient.footing_share(Footing(0.2, 30.0, 0.0, 0.0)) == 0.0
     assert orient.footing_share(Footing(0.1, 30.0, 0.0, 0.0)) == pytest.approx(0.06)
@@ -229,7 +236,7 @@ def test_every_further_part_is_charged_a_share_of_what_one_piece_costs() -> None
     assert oriented.total_mm2 == pytest.approx(800.0 + 0.1 * 500.0 + 100.0 + 0.03 * 1200.0)
 
 
-def test_where_the_plate_holds_a_model_in_no_orientation_the_steadiest_may_be_taken() -> None:
+def test_where_the_plate_holds_a_model_in_no_orientation_all_are_forecast() -> None:
     spikes = [
         m3.Manifold.cylinder(30.0, 6.0, 0.1, 16).rotate(turn) for turn in ((0, 180, 0), (0, 60, 0), (0, 60, 120), (0, 60, 240))
     ]

@@ -108,7 +108,7 @@ def test_each_cut_costs_its_price_beside_its_seam_and_one_that_saves_less_is_not
 def test_a_box_is_one_part_and_says_why() -> None:
     decomposition = _decompose(shapes.box())
     assert len(decomposition.parts) == 1
-    assert decomposition.notes == ("no face needs support: the model is printed straight up as one part",)
+    assert decomposition.notes == ("no face needs support: the model is printed as one part",)
 
 
 def test_one_part_that_is_asked_for_needs_no_search() -> None:
@@ -316,3 +316,7 @@ def test_a_model_costs_the_same_within_2_percent_however_it_is_turned_about_z(so
     profile, turned = load(settings=("search.directions=300",)), standing_still(solid, about(UP, np.radians(turn_deg)))
     cost_mm2 = decompose(standing_still(solid, np.eye(3)), "", profile, parts=parts).cost_mm2
     assert decompose(turned, "", profile, parts=parts).cost_mm2 == pytest.approx(cost_mm2, rel=0.02)
+
+
+def test_where_nothing_needs_support_no_candidate_is_evaluated() -> None:
+    assert [decompose(shapes.box(10.0, 10.0, 10.0), "box", load()).candidates_evaluated for _ in range(5)] == [0] * 5

@@ -17,16 +17,8 @@ from tests.mdp.files import painted_ply
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
 FAST += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6", "--set", "process.infill_density=0.05"]
 # So small an arm, whose stairs and seam count nearly as much as support, is cut all the same.
-FAST += [
-    "--set",
-    "search.seam_mm=0.8",
-    "--set",
-    "search.stair_weight=0.01",
-    "--set",
-    "search.least_saving=0",
-    "--set",
-    "search.cut_mm2=20",
-]
+FAST += ["--set", "search.seam_mm=0.8", "--set", "search.stair_weight=0.01", "--set", "search.least_saving=0"]
+FAST += ["--set", "search.cut_mm2=20"]
 PARTS = ["part-01.stl", "part-02.stl", "decomposition.3mf"]
 
 

@@ -52,7 +52,10 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
 
 def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
     oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, measure_upright(tee(), 45.0), False, False)
-    warning = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
+    warning = (
+        "its base may be too small to hold it: think of a wide brim (process.brim_mm), another side (process.rotate_deg) or a "
+        "pedestal (search.pedestal_mm)"
+    )
     assert orientation_in_words(oriented, "--as-is keeps it so") == (warning,)
     turned = replace(oriented, orientation=best_orientation(tee(), 45.0))
     assert orientation_in_words(turned, "--as-is keeps it so")[1:] == (warning,)
