@@ -20,7 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 from machine.app.workbench.printing.last_printer import FILE
 from profiles.folders import state_folder
 
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0  # the first search on a machine compiles its kernels
 COARSE = ("layer_height_mm=0.4", "first_layer_height_mm=0.4", "line_width_mm=0.8")
 QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2", *(f"--set=process.{setting}" for setting in COARSE))
 # Else so coarse a T, whose arms show high stairs and are small beside their seams, would be printed in one piece.

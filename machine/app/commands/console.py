@@ -6,7 +6,8 @@ import os
 import sys
 import threading
 from collections import deque
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -124,14 +125,11 @@ class _Console:
 
     def _typed(self) -> None:
         """What a person types; a thread of its own keeps listening meanwhile."""
-        from prompt_toolkit.patch_stdout import patch_stdout
-
         prompt = _prompt_session()
         worker = threading.Thread(target=self._serve, args=(prompt.app,), name="console", daemon=True)
         worker.start()
         try:
-            with patch_stdout(raw=True):
-                self._read_on(prompt)
+            self._read_on(prompt)
         finally:
             self._part_from(worker)
             if self._waiting:
@@ -161,8 +159,8 @@ class _Console:
 
     def _read_line(self, prompt: PromptSession[str]) -> str:
         """What is typed at the prompt. Raises EOFError, and KeyboardInterrupt when the prompt has put everything in order."""
-        with calling(lambda: self._interrupt(prompt.app)):
-            line = prompt.prompt(PROMPT, pre_run=lambda: self._end_prompt(prompt.app)).strip()
+        with calling(lambda: self._interrupt(prompt.app)), self._shown.above(prompt.app):
+            line = prompt.prompt(PROMPT, pre_run=lambda: self._begin_prompt(prompt.app)).strip()
         if self._interrupted:
             raise KeyboardInterrupt
         return line
@@ -179,6 +177,10 @@ class _Console:
         if loop is not None:
             with suppress(RuntimeError):  # the prompt has just ended, and its loop with it
                 loop.call_soon_threadsafe(self._end_prompt, app)
+
+    def _begin_prompt(self, app: Application[str]) -> None:
+        self._shown.write_above()
+        self._end_prompt(app)
 
     def _end_prompt(self, app: Application[str]) -> None:
         """Leave the prompt for an interrupt or an error of the other thread, also one that came before it could hear of it."""
@@ -251,6 +253,9 @@ class Shown:
         self.quiet = True
         self._half = b""
         self._busy = 0  # in a row
+        self._lock = threading.Lock()
+        self._lines: list[str] = []  # that wait to be written above the prompt
+        self._app: Application[str] | None = None  # the prompt, while there is one
         self._colours = sys.stdout.isatty() and "NO_COLOR" not in os.environ
 
     def hear(self, data: bytes) -> None:
@@ -278,6 +283,39 @@ class Shown:
         self.write(f"\x1b[{colour}m{text}\x1b[0m" if colour and self._colours else text)
 
     def write(self, text: str) -> None:
-        """One line; while a person types prompt_toolkit puts it above the line that is being typed."""
-        sys.stdout.write(f"{text}\n")
+        """One line; while a person types it is put above the line that is being typed. Any thread may call this."""
+        with self._lock:
+            self._lines.append(text)
+            if self._app is None:
+                self._print_lines()
+            elif (loop := self._app.loop) is not None:  # without one the prompt is about to begin and writes them first
+                with suppress(RuntimeError):  # it has just ended: above() writes them
+                    loop.call_soon_threadsafe(self.write_above)
+
+    @contextmanager
+    def above(self, app: Application[str]) -> Iterator[None]:
+        """Write lines above this prompt, from its own thread, so that they never come between two moves of its cursor."""
+        with self._lock:
+            self._app = app
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._app = None
+                self._print_lines()
+
+    def write_above(self) -> None:
+        """Write what waits; the prompt's thread calls this."""
+        from prompt_toolkit.application import run_in_terminal
+
+        def print_lines() -> None:
+            with self._lock:
+                self._print_lines()
+
+        if self._lines:
+            run_in_terminal(print_lines)
+
+    def _print_lines(self) -> None:
+        sys.stdout.write("".join(f"{line}\n" for line in self._lines))
         sys.stdout.flush()
+        self._lines.clear()

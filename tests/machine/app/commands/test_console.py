@@ -11,7 +11,7 @@ from time import sleep
 
 import pytest
 from prompt_toolkit import PromptSession
-from prompt_toolkit.application import run_in_terminal
+from prompt_toolkit.application import create_app_session, run_in_terminal
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from prompt_toolkit.renderer import Renderer
@@ -174,6 +174,18 @@ def test_a_person_types_gets_help_and_leaves_with_ctrl_d() -> None:
     assert "\x1b[2mok" in person.raw
 
 
+def test_a_line_that_comes_just_as_the_prompt_begins_is_written_by_the_prompt(capsys: Capsys) -> None:
+    shown = Shown(reports=False)
+    with create_pipe_input() as keys, create_app_session(keys, DummyOutput()):
+        prompt = PromptSession[str]()
+        keys.send_text("M114\n")
+        with shown.above(prompt.app):
+            shown.write("ok")  # written now, it would follow the prompt on its line, and no new prompt would come
+            assert capsys.readouterr().out == ""
+            assert prompt.prompt(pre_run=shown.write_above) == "M114"
+            assert capsys.readouterr().out == "ok\n"
+
+
 def test_a_person_is_asked_about_heaters_that_are_on() -> None:
     with Person("console", "--port", "sim") as person:
         person.see(PROMPT)
@@ -236,7 +248,7 @@ def test_an_interrupt_while_a_line_is_put_above_the_prompt_ends_the_prompt(monke
         line.start()
         alarm.start()
         with interrupting(), pytest.raises(KeyboardInterrupt):
-            _Console(None, None, False)._read_line(prompt)
+            _Console(None, Shown(reports=False), False)._read_line(prompt)
         alarm.cancel()
     assert Renderer.erase is erase
     assert not late
