@@ -44,6 +44,10 @@ class Lines(Sequence[str]):
             ends.append(np.array([len(content)]))
         return cls(_exact(content), np.concatenate(ends))
 
+    def __add__(self, other: "Lines") -> "Lines":
+        starts = np.concatenate([self.start[:-1], self.start[-1] + other.start])
+        return Lines(np.concatenate([self.content, other.content]), starts)
+
     def __len__(self) -> int:
         return len(self.start) - 1
 
@@ -55,7 +59,11 @@ class Lines(Sequence[str]):
 
     def __getitem__(self, at: int | slice) -> "str | Lines":
         if isinstance(at, slice):
-            return Lines.of([self[k] for k in range(*at.indices(len(self)))])
+            first, last, step = at.indices(len(self))
+            if step != 1:
+                return Lines.of([self[k] for k in range(first, last, step)])
+            start = self.start[first : max(first, last) + 1]
+            return Lines(self.content[start[0] : start[-1]], start - start[0])
         k = range(len(self))[at]
         return _text(self.content[self.start[k] : self.start[k + 1] - 1])
 

@@ -29,15 +29,16 @@ def as_bytes(text: str) -> Bytes:
     return np.frombuffer(text.encode("ascii"), dtype=np.uint8)
 
 
-def path_lines(points: Whole, pushed: Whole, words: PathWords, known: Whole) -> list[str]:
-    """A line for each of (n, 3) points in thousandths of a mm, with the words of the coordinates that change and of filament.
+def path_text(points: Whole, pushed: Whole, words: PathWords, known: Whole) -> str:
+    """A line, with its end, for each of (n, 3) points in thousandths of a mm, with the words of the coordinates that change and
+    of filament.
 
     pushed: (n,) filament up to each, 1e-5 mm. known: X Y Z, filament where the tip is, which become those of the last line. A
     point where the tip is already gives no line, its filament goes to the next one.
     """
     text = np.empty(LONGEST * len(points) + len(words.ending), dtype=np.uint8)
     size = _write(points, pushed, words, known, text)
-    return text[:size].tobytes().decode("ascii").splitlines()
+    return text[:size].tobytes().decode("ascii")
 
 
 @kernel

@@ -6,7 +6,7 @@ from math import ceil
 import numpy as np
 
 from machine.firmware import Dialect
-from machine.gcode.path_text import PathWords, as_bytes, path_lines
+from machine.gcode.path_text import PathWords, as_bytes, path_text
 from machine.kinematics.coordinates import followed_places
 from mdp.mesh import Floats
 from mdp.pose import Pose
@@ -78,8 +78,9 @@ class Pen:
         return text
 
 
-def write_path(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> list[str]:
-    """One line a point, as the file calls them; a point that rounds to where the tip is gives its filament to the next line."""
+def write_path(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> str:
+    """The text of a path, one line a point, as the file calls them; a point that rounds to where the tip is gives its filament to
+    the next line."""
     rounded = np.rint(points_mm * 1000.0)
     steps_mm, slower = share_filament(points_mm, rounded, filament_mm)
     filament = pen.filament_mm + np.cumsum(steps_mm)
@@ -87,11 +88,11 @@ def write_path(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: P
     ending = pen.speed(speed_mm_s / slower)
     words = PathWords(as_bytes("G1"), ord(pen.filament_letter), pen.dialect.filament_relative, as_bytes(ending))
     known = np.array([pen.x, pen.y, pen.z, pen.pushed])
-    lines = path_lines(rounded[1:].astype(np.int64), np.rint(filament * 1e5).astype(np.int64), words, known)
+    text = path_text(rounded[1:].astype(np.int64), np.rint(filament * 1e5).astype(np.int64), words, known)
     pen.x, pen.y, pen.z, pen.pushed = known.tolist()
-    if ending and not lines:
+    if ending and not text:
         pen.feed = 0
-    return lines
+    return text
 
 
 def share_filament(points_mm: Floats, rounded: Floats, filament_mm: Floats) -> tuple[Floats, float]:

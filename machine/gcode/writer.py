@@ -1,6 +1,6 @@
 """Gcode: a machine program as text in the firmware's dialect, line by line; the same program gives the same bytes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 from math import ceil
@@ -11,6 +11,7 @@ from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
 from machine.gcode.blocks import check_blocks
+from machine.gcode.lines import Lines
 from machine.gcode.part_totals import totals_comment
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
 from machine.gcode.placeholders import fill_block, placeholders
@@ -28,10 +29,10 @@ ROUNDING_MM = 0.0015  # an arc's centre is written in thousandths
 BLOCKS = ("start", "before_part", "after_part", "end")
 
 
-def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
-    """The lines of a G-code file, without line ends, in the dialect of profile.machine.
+def write_gcode(program: MachineProgram, profile: Profile) -> Lines:
+    """The lines of a G-code file in the dialect of profile.machine.
 
-    Raises ProfileError, before the first line, for a block of the profile that cannot be filled in or that the firmware refuses.
+    Raises ProfileError for a block of the profile that cannot be filled in or that the firmware refuses.
     """
     check_blocks(profile)
     machine = profile.machine
@@ -42,7 +43,7 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
     pen.values = placeholders(program.name, profile, _parts(program), float(elapsed[-1]), filament_mm)
     for name in BLOCKS:
         _block(name, pen)
-    return _lines(program, profile, elapsed, filament_mm, pen)
+    return Lines.of_text(_text(program, profile, elapsed, filament_mm, pen))
 
 
 def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
@@ -65,46 +66,47 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
     return elapsed, float(straight.end[:, 5].max(initial=0.0))
 
 
-def _lines(program: MachineProgram, profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen) -> Iterator[str]:
+def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen) -> Iterator[str]:
+    """The text in pieces, each of whole lines: strokes, which are most of it, as a kernel writes them."""
     total, parts = float(elapsed[-1]), _parts(program)
     coming = iter(parts)
     next_part = next(coming, None)
     last_strokes = _last_strokes(program)
-    yield from settings.head(program.name, profile)
-    yield from _start(profile, parts, pen)
+    yield from _ended(settings.head(program.name, profile))
+    yield from _ended(_start(profile, parts, pen))
     for index, move in enumerate(program.moves):
         if isinstance(move, Stroke):
-            yield from _stroke(move, profile, pen)
+            yield from _ended(_before_stroke(move, profile, pen))
+            yield _stroke(move, profile, pen)
             if index in last_strokes:
-                yield from _dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"])
+                yield from _ended(_dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"]))
         elif isinstance(move, Travel):
-            yield from _travel(move, pen)
+            yield from _ended(_travel(move, pen))
         elif isinstance(move, Wipe):
-            yield ";WIPE_START"
-            yield from write_path(pen.file_coordinates(move.points_mm), -move.filament_mm, move.speed_mm_s, pen)
-            yield ";WIPE_END"
+            text = write_path(pen.file_coordinates(move.points_mm), -move.filament_mm, move.speed_mm_s, pen)
+            yield f";WIPE_START\n{text};WIPE_END\n"
         elif isinstance(move, Retract):
             pen.filament_mm -= move.filament_mm
-            yield f"G1{pen.filament()}{pen.speed(move.speed_mm_s)}"
+            yield f"G1{pen.filament()}{pen.speed(move.speed_mm_s)}\n"
         elif isinstance(move, Reorient):
             ahead = list(_heat_ahead(program, index, profile, pen))
-            yield from ahead
-            yield from _reorient(move, next_part, pen)
+            yield from _ended((*ahead, *_reorient(move, next_part, pen)))
             if ahead:
-                yield pen.dialect.nozzle_wait.format(number(pen.nozzle_c))
+                yield f"{pen.dialect.nozzle_wait.format(number(pen.nozzle_c))}\n"
         elif isinstance(move, Pause):
-            yield from _pause(move, pen)
+            yield from _ended(_pause(move, pen))
         elif isinstance(move, BeginPart):
             next_part = next(coming, None)
-            yield from _begin_part(move, len(parts), pen)
-            yield from _contents(program, index)
+            yield from _ended((*_begin_part(move, len(parts), pen), *_contents(program, index)))
         else:
-            yield from _begin_layer(move, profile, pen)
-            yield from _progress(float(elapsed[index]), total, pen)
-    yield from _end(pen)
-    yield from _progress(total, total, pen)
-    yield from _dialect_line(pen.dialect.last, pen)
-    yield from settings.foot(profile, filament_mm, total)
+            yield from _ended((*_begin_layer(move, profile, pen), *_progress(float(elapsed[index]), total, pen)))
+    yield from _ended((*_end(pen), *_progress(total, total, pen), *_dialect_line(pen.dialect.last, pen)))
+    yield from _ended(settings.foot(profile, filament_mm, total))
+
+
+def _ended(lines: Iterable[str]) -> Iterator[str]:
+    """Lines with their ends."""
+    return (f"{line}\n" for line in lines)
 
 
 def _parts(program: MachineProgram) -> list[BeginPart]:
@@ -260,8 +262,8 @@ def _progress(seconds: float, total: float, pen: Pen) -> Iterator[str]:
         yield pen.dialect.progress.format(percent, ceil((total - seconds) / 60.0 - 1e-9))
 
 
-def _stroke(move: Stroke, profile: Profile, pen: Pen) -> Iterator[str]:
-    """What changes before the stroke, then its lines."""
+def _before_stroke(move: Stroke, profile: Profile, pen: Pen) -> Iterator[str]:
+    """The lines of what changes before a stroke."""
     yield from _set_fan(pen.layer_fan if move.fan is None else move.fan, pen)
     acceleration = move.acceleration_mm_s2
     if acceleration is not None and round(acceleration) != pen.acceleration and pen.dialect.acceleration:
@@ -273,11 +275,14 @@ def _stroke(move: Stroke, profile: Profile, pen: Pen) -> Iterator[str]:
     if move.width_mm != pen.width_mm:
         pen.width_mm = move.width_mm
         yield f";WIDTH:{number(move.width_mm)}"
+
+
+def _stroke(move: Stroke, profile: Profile, pen: Pen) -> str:
+    """The text of a stroke."""
     machine, points = profile.machine, pen.file_coordinates(move.points_mm)
     if machine.arcs and len(points) > FEWEST_CHORDS and np.ptp(points[:, 2]) < 1e-9:
-        yield from _with_arcs(replace(move, points_mm=points), machine.arc_tolerance_mm, pen)
-    else:
-        yield from write_path(points, move.filament_mm, move.speed_mm_s, pen)
+        return "".join(_with_arcs(replace(move, points_mm=points), machine.arc_tolerance_mm, pen))
+    return write_path(points, move.filament_mm, move.speed_mm_s, pen)
 
 
 def _with_arcs(move: Stroke, tolerance_mm: float, pen: Pen) -> Iterator[str]:
@@ -287,12 +292,12 @@ def _with_arcs(move: Stroke, tolerance_mm: float, pen: Pen) -> Iterator[str]:
     done = 0
     for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
         if first > done:
-            yield from write_path(move.points_mm[done : first + 1], move.filament_mm[done:first], move.speed_mm_s, pen)
+            yield write_path(move.points_mm[done : first + 1], move.filament_mm[done:first], move.speed_mm_s, pen)
         word = "G2" if clockwise > 0 else "G3"
-        yield f"{word}{_arc(move, (first, last), (x - flat[first, 0], y - flat[first, 1]), pen)}"
+        yield f"{word}{_arc(move, (first, last), (x - flat[first, 0], y - flat[first, 1]), pen)}\n"
         done = last
     if done < len(flat) - 1:
-        yield from write_path(move.points_mm[done:], move.filament_mm[done:], move.speed_mm_s, pen)
+        yield write_path(move.points_mm[done:], move.filament_mm[done:], move.speed_mm_s, pen)
 
 
 def _arc(move: Stroke, run: tuple[int, int], centre: tuple[float, float], pen: Pen) -> str:

@@ -4,9 +4,7 @@ The form there is PrusaSlicer's, which Mainsail, Fluidd, RepRapFirmware and Prus
 """
 
 from base64 import b64encode
-from collections.abc import Sequence
 from io import BytesIO
-from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -34,13 +32,13 @@ def write_png(path: Path, image: NDArray[np.uint8]) -> None:
     write_bytes(path, png_bytes(image))
 
 
-def with_thumbnails(lines: Sequence[str], decomposition: Decomposition, profile: Profile) -> Lines:
+def with_thumbnails(lines: Lines, decomposition: Decomposition, profile: Profile) -> Lines:
     """The G-code with the pictures that machine.thumbnails_px asks for after its first comments."""
     head = next((k for k, line in enumerate(lines) if not line.startswith("; ")), len(lines))
     comments: list[str] = []
     for width, height in profile.machine.thumbnails_px:
         comments += thumbnail(png_bytes(parts_together(decomposition, profile, (width, height))), width, height)
-    return Lines.of(chain(lines[:head], comments, islice(lines, head, None)))
+    return lines[:head] + Lines.of(comments) + lines[head:]
 
 
 def thumbnail(png: bytes, width: int, height: int) -> list[str]:

@@ -21,7 +21,6 @@ from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
 from machine.gcode.blocks import check_blocks
-from machine.gcode.lines import Lines
 from machine.gcode.writer import write_gcode
 from machine.planning.arrange import standing_at
 from machine.planning.fit import check_parts, check_standing
@@ -182,7 +181,7 @@ def build(
         program = plan(decomposition, sliced, profile, stops)
         for note in (*_too_thin(sliced, profile), *_without_pins(sliced, profile), *_left_out(program, profile)):
             say(f"{decomposition.name}: {note}")
-        lines: Sequence[str] = Lines.of(write_gcode(program, profile))
+        lines = write_gcode(program, profile)
         if pictures and profile.machine.thumbnails_px:
             compilers.wait_for(compilers.PICTURES, tell)
             lines = with_thumbnails(lines, decomposition, profile)

@@ -112,8 +112,7 @@ def _slice() -> None:
     decomposition = _two_parts(profile)
     parts = decomposition.parts
     sliced = [slice_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
-    for _ in write_gcode(plan(decomposition, sliced, profile), profile):
-        pass
+    write_gcode(plan(decomposition, sliced, profile), profile)
 
 
 def _dry_run() -> None:

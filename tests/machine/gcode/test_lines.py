@@ -1,6 +1,8 @@
 """Lines hold a text as its bytes and are the strings that went in."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from machine.gcode.lines import Lines
 
@@ -18,6 +20,13 @@ def test_places_count_as_those_of_a_list() -> None:
     assert (held[-1], list(held[1:4]), list(held[::-1])) == ("G1 X1", ODD[1:4], ODD[::-1])
     with pytest.raises(IndexError):
         held[6]
+
+
+@given(st.lists(st.sampled_from(ODD)), st.slices(8))
+def test_slices_and_sums_are_those_of_lists(lines: list[str], some: slice) -> None:
+    held = Lines.of(lines)
+    assert held[some] == lines[some]
+    assert held[some] + held == lines[some] + lines
 
 
 @pytest.mark.parametrize("pieces", [[], ["a\nb"], ["a", "\nb\n"], ["\n", "\n"]])
