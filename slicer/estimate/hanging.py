@@ -50,7 +50,7 @@ def thick_support(part: Part, heights: Heights, profile: Profile, plate: Polygon
     if process.support == "none" or hanging_mm2 <= process.support_least_mm2:
         return ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
     top_mm = float(mesh.vertices[mesh.faces[risky], 2].max())
-    thick = _thick_layers(float(heights.tip_mm[0]), min(top_mm + LEAST_MM, float(heights.tip_mm[-1])))
+    thick = _thick_layers(float(heights.tip_mm[0]), top_mm)
     outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in cross_sections(mesh, thick.cut_mm)]
     single = process.model_copy(update={"support_interface_layers": 1, "support_bottom_interface_layers": 1})
     sections = Sections(
@@ -82,8 +82,8 @@ def _hanging(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
 
 
 def _thick_layers(first_mm: float, top_mm: float) -> Heights:
-    """Few equal layers over the first one."""
+    """Few equal layers over the first one, the last of which holds what hangs at the top."""
     count = int(np.clip((top_mm - first_mm) / LEAST_MM, 1, LAYERS)) if top_mm > first_mm else 0
-    tips = first_mm + (top_mm - first_mm) * np.arange(count + 1) / max(count, 1)
+    tips = first_mm + (top_mm - first_mm) * np.arange(count + 2 if count else 1) / max(count, 1)
     thick = np.diff(tips, prepend=0.0)
     return Heights(tips, thick, tips - 0.5 * thick)

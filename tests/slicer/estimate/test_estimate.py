@@ -82,6 +82,14 @@ def test_support_is_told_apart_and_there_only_where_something_hangs() -> None:
     assert supported.filament_mm * FILAMENT_MM2 == pytest.approx(sliced.volume_mm3, rel=0.04)
 
 
+def test_the_support_right_under_a_high_flat_arm_is_estimated() -> None:
+    """Its thick layers are 2 mm high here: one of them has to lie above the arm's underside."""
+    post, arm = m3.Manifold.cube((12.0, 12.0, 110.0)), m3.Manifold.cube((60.0, 12.0, 10.0)).translate((0.0, 0.0, 100.0))
+    gallows = standing(post + arm)
+    printed_mm3 = volume_mm3(slice_part(whole(gallows), profile()), Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+    assert of(gallows).support_mm3 == pytest.approx(printed_mm3, rel=0.4)
+
+
 def test_a_small_layer_lasts_as_long_as_it_has_to_cool() -> None:
     lasting = of(box(8, 8, 10), *SOLID, "process.least_layer_time_s=30", "process.least_speed_mm_s=0.1")
     assert lasting.time_s == pytest.approx(50 * 30.0, rel=0.05)
