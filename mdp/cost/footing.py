@@ -26,17 +26,18 @@ BRIM_SEGMENTS = 32  # of a full turn around a corner
 BLUNT = 0.01
 # Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does.
 SMALL_BASE, LEANING_BASE = 0.015, 0.03
-# A base that is this share of the shadow is as good as any larger one, and so is a stance that may be tilted by this angle.
-BROAD_BASE, STEADY_DEG = 0.2, 30.0
+BROAD_BASE = 0.2  # a base that is this share of the shadow is as good as any larger one
+STEADY_MPA = 0.25 * ADHESION_MPA  # tension under a base, with its brim, that makes a stance as unsteady as any greater one
 
 
 @dataclass(frozen=True)
 class Footing:
-    """How a model stands on the plate. base_share: the area of its base as a share of its shadow's; lean_deg: the least angle by
-    which it can be tilted before it tips over, below 0 where it tips over by itself; tension_mpa: the greatest tension under it,
-    brimmed_mpa: the same with the brim that a small base gets."""
+    """How a model stands on the plate. base_share: the area of its base as a share of its shadow's, touching_share: the area that
+    touches the plate; lean_deg: the least angle by which it can be tilted before it tips over, below 0 where it tips over by
+    itself; tension_mpa: the greatest tension under it, brimmed_mpa: the same with the brim that a small base gets."""
 
     base_share: float
+    touching_share: float
     lean_deg: float
     tension_mpa: float
     brimmed_mpa: float
@@ -46,7 +47,13 @@ class Footing:
         if self.lean_deg >= LEAN_DEG and self.tension_mpa <= ADHESION_MPA:
             return True
         least_share = SMALL_BASE if self.lean_deg >= (0.0 if of_file else LEAN_DEG) else LEANING_BASE
-        return self.base_share >= least_share and self.lean_deg >= -LEAN_DEG and self.brimmed_mpa <= ADHESION_MPA
+        least_lean_deg = -LEAN_DEG if of_file else 0.0
+        return self.base_share >= least_share and self.lean_deg >= least_lean_deg and self.brimmed_mpa <= ADHESION_MPA
+
+    @property
+    def flat(self) -> bool:
+        """Whether it stands on a face, not on a point, an edge or a rounded end."""
+        return self.touching_share >= SMALL_BASE
 
     @property
     def narrow(self) -> float:
@@ -55,8 +62,8 @@ class Footing:
 
     @property
     def unsteady(self) -> float:
-        """How much lean_deg lacks of a steady stance's: 0 to 1."""
-        return min(1.0, max(0.0, 1.0 - self.lean_deg / STEADY_DEG))
+        """How near the tension under the base with its brim comes to STEADY_MPA: 0 to 1."""
+        return min(1.0, max(0.0, self.brimmed_mpa / STEADY_MPA))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,23 +89,24 @@ class Plate:
     def footing(self, rotation: Floats) -> Footing:
         """How the model stands when it is turned by a rotation (3, 3); a pedestal carries it however it is turned."""
         if self.pedestal:
-            return Footing(1.0, 90.0, 0.0, 0.0)
+            return Footing(1.0, 1.0, 90.0, 0.0, 0.0)
         heights, centre = self.mesh.vertices @ rotation[2], rotation @ self.centre
         low, high = float(heights.min()), float(heights.max())
-        base = self._base(rotation, low, high)
+        touching, blunt = self._sections(rotation, low, high)
+        base = max(touching, blunt, key=CrossSection.area)
         brim = base.offset(self.brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS) if self.brim_mm > 0.0 else base
         weight_n = 1e-3 * self.density_g_cm3 * self.solid.volume() * NEWTON_PER_G
         tensions = [_tension_mpa(section_edges(area), high - low, weight_n, centre[:2]) for area in (base, brim)]
         corners = section_edges(base)[:, :2] - centre[:2]
         lean_deg = tipping_angle_deg(corners, float(centre[2]) - low) if len(corners) else -90.0
-        return Footing(base.area() / self._shadow_mm2(rotation), lean_deg, *tensions)
+        shadow_mm2 = self._shadow_mm2(rotation)
+        return Footing(base.area() / shadow_mm2, touching.area() / shadow_mm2, lean_deg, *tensions)
 
-    def _base(self, rotation: Floats, low: float, high: float) -> CrossSection:
-        """What the model stands on: the larger of the sections where it touches the plate and a little above."""
+    def _sections(self, rotation: Floats, low: float, high: float) -> list[CrossSection]:
+        """The sections where the model touches the plate and a little above."""
         turned = self.solid.transform(np.column_stack([rotation, np.zeros(3)]))
         heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm)
-        sections = (turned.slice(low + min(height_mm, 0.5 * (high - low))) for height_mm in heights_mm)
-        return max(sections, key=CrossSection.area)
+        return [turned.slice(low + min(height_mm, 0.5 * (high - low))) for height_mm in heights_mm]
 
     def _shadow_mm2(self, rotation: Floats) -> float:
         """The area of the model's shadow, overlapping surfaces each counted."""

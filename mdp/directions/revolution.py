@@ -47,8 +47,11 @@ class Revolution:
 
     def is_square_to(self, direction: Floats) -> bool:
         """Whether the axis is upright or level along a printing direction."""
-        cosine = abs(float(self.axis @ direction))
-        return cosine >= cos(radians(LEVEL_DEG)) or cosine <= sin(radians(LEVEL_DEG))
+        return self.is_upright_along(direction) or abs(float(self.axis @ direction)) <= sin(radians(LEVEL_DEG))
+
+    def is_upright_along(self, direction: Floats) -> bool:
+        """Whether the axis is upright along a printing direction."""
+        return abs(float(self.axis @ direction)) >= cos(radians(LEVEL_DEG))
 
 
 @cached_with_mesh
