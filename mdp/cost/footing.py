@@ -26,6 +26,7 @@ BRIM_SEGMENTS = 32  # of a full turn around a corner
 BLUNT = 0.01
 # Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does.
 SMALL_BASE, LEANING_BASE = 0.015, 0.03
+FACE = 0.05  # share of the shadow that touches the plate where a model stands on a face; three tips make up less
 BROAD_BASE = 0.2  # a base that is this share of the shadow is as good as any larger one
 STEADY_MPA = 0.25 * ADHESION_MPA  # tension under a base, with its brim, that makes a stance as unsteady as any greater one
 
@@ -51,9 +52,14 @@ class Footing:
         return self.base_share >= least_share and self.lean_deg >= least_lean_deg and self.brimmed_mpa <= ADHESION_MPA
 
     @property
-    def flat(self) -> bool:
-        """Whether it stands on a face, not on a point, an edge or a rounded end."""
-        return self.touching_share >= SMALL_BASE
+    def on_face(self) -> bool:
+        """Whether it stands on a large face."""
+        return self.touching_share >= FACE
+
+    @property
+    def on_tip(self) -> bool:
+        """Whether it stands on a point, an edge or a rounded end."""
+        return self.touching_share < SMALL_BASE
 
     @property
     def narrow(self) -> float:

@@ -207,8 +207,8 @@ def _distinct(mesh: Mesh, profile: Profile) -> list[tuple[Orientation, Footing]]
     known = [upright] if standing.held(of_file=True) else []  # else nothing is too near to it
     others = _along_axis(mesh, others, bool(known))
     footed = [(other, plate.footing(other.rotation)) for other in others]
-    flat = bool(known) and standing.flat
-    footed = [one for one in footed if one[1].held() and (one[1].flat or not flat)] or ([] if known else footed)
+    on_face = bool(known) and standing.on_face
+    footed = [one for one in footed if one[1].held() and not (on_face and one[1].on_tip)] or ([] if known else footed)
     footed.sort(key=lambda one: round(guess_mm2(one[0]) + surface_mm2 * footing_share(one[1]), 6))
     distinct: list[tuple[Orientation, Footing]] = []
     for orientation, footing in footed:
