@@ -5,6 +5,7 @@ from base64 import b64decode
 from itertools import pairwise
 
 from machine.app.pictures.png import thumbnail, with_thumbnails
+from machine.gcode.lines import Lines
 from machine.reader.parse import parse_gcode
 from profiles.profile import load
 from tests.machine.hand import printed, text
@@ -13,7 +14,7 @@ from tests.machine.hand import printed, text
 def test_the_pictures_asked_for_stand_after_the_first_comments_and_are_png_of_that_size() -> None:
     profile, decomposition, _, _ = printed("generic_ac")
     asked = load(settings=["machine.thumbnails_px=[[32, 24], [160, 120]]"])
-    lines = with_thumbnails(text("generic_ac"), decomposition, asked)
+    lines = with_thumbnails(Lines.of(text("generic_ac")), decomposition, asked)
     begins = [k for k, line in enumerate(lines) if line.startswith("; thumbnail begin")]
     ends = [k for k, line in enumerate(lines) if line == "; thumbnail end"]
     pngs = [b64decode("".join(line[2:] for line in lines[a + 1 : b])) for a, b in zip(begins, ends, strict=True)]
@@ -32,4 +33,4 @@ def test_the_length_told_is_that_of_the_base64_and_no_line_is_longer_than_80() -
 
 def test_without_a_wish_there_is_no_picture() -> None:
     profile, decomposition, _, _ = printed("generic_ac")
-    assert with_thumbnails(text("generic_ac"), decomposition, profile) == tuple(text("generic_ac"))
+    assert with_thumbnails(Lines.of(text("generic_ac")), decomposition, profile) == tuple(text("generic_ac"))
