@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from machine.firmware import dialects
-from machine.gcode.writer import write_gcode
+from machine.gcode.writer import elapsed_s, write_gcode
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel
 from machine.reader.parse import parse_gcode
 from mdp.pose import Pose
@@ -45,13 +45,13 @@ def main() -> None:
     profile = load(settings=[f"machine.dialect={given.dialect}", f"machine.coordinates={given.coordinates}", *blocks])
     planned = program()
     marks = [time.process_time()]
-    begun = write_gcode(planned, profile)
+    elapsed_s(planned, profile)
     marks.append(time.process_time())
-    lines = tuple(begun)
+    lines = write_gcode(planned, profile)
     marks.append(time.process_time())
     parsed = parse_gcode(lines, profile.machine)
     marks.append(time.process_time())
-    clock, write, parse = np.diff(marks)
+    clock, write, parse = np.diff(marks)  # writing includes the clock
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{given.dialect} {given.coordinates}: {len(lines)} lines, {len(parsed.line)} moves")
     print(f"clock {clock:.1f} s, write {write:.1f} s, parse {parse:.1f} s, peak {peak:.0f} MB")

@@ -34,9 +34,9 @@ class Lines(Sequence[str]):
     @classmethod
     def of_text(cls, pieces: Iterable[str]) -> "Lines":
         """A text that comes in pieces, whose lines end with a line feed."""
-        content, ends = bytearray(), [np.zeros(1, dtype=np.int64)]
-        for piece in pieces:
-            some = _bytes(piece)
+        content, ends, left = bytearray(), [np.zeros(1, dtype=np.int64)], iter(pieces)
+        while several := list(islice(left, AT_ONCE)):
+            some = _bytes("".join(several))
             ends.append(np.flatnonzero(np.frombuffer(some, dtype=np.uint8) == NEWLINE) + len(content) + 1)
             content += some
         if content and content[-1] != NEWLINE:
@@ -45,6 +45,8 @@ class Lines(Sequence[str]):
         return cls(_exact(content), np.concatenate(ends))
 
     def __add__(self, other: "Lines") -> "Lines":
+        if not isinstance(other, Lines):
+            return NotImplemented
         starts = np.concatenate([self.start[:-1], self.start[-1] + other.start])
         return Lines(np.concatenate([self.content, other.content]), starts)
 

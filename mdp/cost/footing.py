@@ -26,7 +26,7 @@ BRIM_SEGMENTS = 32  # of a full turn around a corner
 BLUNT = 0.01
 # Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does.
 SMALL_BASE, LEANING_BASE = 0.015, 0.03
-FACE = 0.05  # share of the shadow that touches the plate where a model stands on a face; three tips make up less
+FACE = 0.05  # share of the shadow that touches the plate where a model stands on a face; three tips touch with less
 BROAD_BASE = 0.2  # a base that is this share of the shadow is as good as any larger one
 STEADY_MPA = 0.25 * ADHESION_MPA  # tension under a base, with its brim, that makes a stance as unsteady as any greater one
 
@@ -44,7 +44,8 @@ class Footing:
     brimmed_mpa: float
 
     def held(self, of_file: bool = False) -> bool:
-        """Whether the plate holds the model. of_file: as in its file it is believed to stand unless it tips over by itself."""
+        """Whether the plate holds the model. of_file: as its file has it; then it may tip over by itself, by up to LEAN_DEG, and
+        its brim still holds it, while a turned model must have its centre of mass above its base."""
         if self.lean_deg >= LEAN_DEG and self.tension_mpa <= ADHESION_MPA:
             return True
         least_share = SMALL_BASE if self.lean_deg >= (0.0 if of_file else LEAN_DEG) else LEANING_BASE
@@ -52,8 +53,13 @@ class Footing:
         return self.base_share >= least_share and self.lean_deg >= least_lean_deg and self.brimmed_mpa <= ADHESION_MPA
 
     @property
+    def on_nothing(self) -> bool:
+        """Whether its base is so small that not even a brim holds it."""
+        return self.base_share < SMALL_BASE
+
+    @property
     def on_face(self) -> bool:
-        """Whether it stands on a large face."""
+        """Whether at least FACE of its shadow touches the plate."""
         return self.touching_share >= FACE
 
     @property
@@ -68,7 +74,7 @@ class Footing:
 
     @property
     def unsteady(self) -> float:
-        """How near the tension under the base with its brim comes to STEADY_MPA: 0 to 1."""
+        """How near the tension under the base comes to STEADY_MPA, with the brim that a small base gets: 0 to 1."""
         return min(1.0, max(0.0, self.brimmed_mpa / STEADY_MPA))
 
 
@@ -108,11 +114,12 @@ class Plate:
         shadow_mm2 = self._shadow_mm2(rotation)
         return Footing(base.area() / shadow_mm2, touching.area() / shadow_mm2, lean_deg, *tensions)
 
-    def _sections(self, rotation: Floats, low: float, high: float) -> list[CrossSection]:
-        """The sections where the model touches the plate and a little above."""
+    def _sections(self, rotation: Floats, low: float, high: float) -> tuple[CrossSection, CrossSection]:
+        """The sections where the model touches the plate, and a little above."""
         turned = self.solid.transform(np.column_stack([rotation, np.zeros(3)]))
-        heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm)
-        return [turned.slice(low + min(height_mm, 0.5 * (high - low))) for height_mm in heights_mm]
+        touching_mm, blunt_mm = 0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm
+        half_mm = 0.5 * (high - low)
+        return turned.slice(low + min(touching_mm, half_mm)), turned.slice(low + min(blunt_mm, half_mm))
 
     def _shadow_mm2(self, rotation: Floats) -> float:
         """The area of the model's shadow, overlapping surfaces each counted."""

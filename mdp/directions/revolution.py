@@ -24,7 +24,7 @@ ROUNDS = 12  # of least squares
 SECTORS, MOST_SECTORS, LEAST_SECTOR = 12, 10, 0.01  # around the axis, those that faces look into, with a share of the area
 BESIDE_HANDLES = 0.95  # of the area: the ends of handles and arms face away from the axis, too
 SAME = cos(radians(10.0))  # of the angle between axes that are one
-LEVEL_DEG = 5.0  # of an axis: that of half a shell is found within some 2 degrees
+LEVEL_DEG = 5.0  # tolerance of an axis: the fit to half a shell is some 2 degrees off
 
 
 @dataclass(frozen=True, eq=False)

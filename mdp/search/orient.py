@@ -13,7 +13,7 @@ from functools import partial
 from math import ceil, cos, inf, radians
 
 from mdp.cost.cost import weight_of_stairs
-from mdp.cost.footing import SMALL_BASE, Footing, Plate
+from mdp.cost.footing import Footing, Plate
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import (
     Orientation,
@@ -129,7 +129,7 @@ def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> l
     worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
     footed = _distinct(mesh, profile)[: 1 + FORECAST]
     upright, standing = footed[0]
-    turned_share = TURNED if standing.base_share >= SMALL_BASE else 0.0  # nobody means a model to stand on a tip
+    turned_share = 0.0 if standing.on_nothing else TURNED  # nobody means a model to stand so
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
     prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())

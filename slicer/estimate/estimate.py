@@ -1,4 +1,4 @@
-"""Estimate: print time and filament of parts without laying a bead, within some 10 % and in tenths of a second.
+"""Estimate: print time and filament of parts without laying a bead, within some 12 % and in tenths of a second.
 
 Some layers of a part stand for all of them (slicer/estimate): their walls, skins and infill are known as shapes, their lines by
 counting how often a pattern crosses a boundary, their time by the speeds of the process and the machine's acceleration. It is
@@ -24,11 +24,11 @@ from slicer.speed import axes_mm_s2, first_layer_speeds, travel_mm_s2
 from slicer.support.pedestal import DENSITY, ROOF_LAYERS
 from slicer.walls.brim import brim
 
-# Fitted to dry runs with the standard profiles: of 12 models in one piece and in four parts, the hops of 28 prints of 20 models.
+# Fitted to dry runs with the standard profiles: 12 models in one piece and in four parts; the hops, 28 prints of 20 models.
 HOP_MM = 3.7  # mean travel to a stroke, retractions included
 BROKEN = 0.07  # share of a pattern's lines that are not joined to the one before
 SPARSE_STARTS = 2.0  # more hops to each piece of sparse infill, whose crossing lines are printed in two goes
-SUPPORT_HOPS = 1.3  # times as long to a stroke of support: branches stand apart, and the tip retracts between them
+SUPPORT_HOPS = 1.3  # times as long to a stroke of support, brim or pedestal: branches stand apart, and the tip retracts between
 STEADY = 0.6  # of the travels' time counts when a layer is slowed down, which leaves out their acceleration
 TURN_S = 2.0  # of the table before a part
 PATTERNS = (Kind.SKIN, Kind.INFILL, Kind.SUPPORT_INTERFACE)

@@ -18,7 +18,7 @@ from slicer.overhangs import find_overhangs
 from slicer.sections import Sections
 from slicer.support.support import own_supports
 
-LAYERS = 50  # thick layers at most: on thin limbs 40 lost up to 0.3 of the support that 60 find
+LAYERS = 50  # thick layers at most, and one above what hangs: on thin limbs 40 lost up to 0.3 of the support that 60 find
 COARSE_MM = 0.05  # sections are simplified by this
 LEAST_MM = 0.7  # of a thick layer
 
@@ -50,7 +50,7 @@ def thick_support(part: Part, heights: Heights, profile: Profile, plate: Polygon
     if process.support == "none" or hanging_mm2 <= process.support_least_mm2:
         return ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
     top_mm = float(mesh.vertices[mesh.faces[risky], 2].max())
-    thick = _thick_layers(float(heights.tip_mm[0]), top_mm)
+    thick = _thick_layers(float(heights.tip_mm[0]), top_mm, 0.5 * float(heights.height_mm.min()))
     outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in cross_sections(mesh, thick.cut_mm)]
     single = process.model_copy(update={"support_interface_layers": 1, "support_bottom_interface_layers": 1})
     sections = Sections(
@@ -81,9 +81,12 @@ def _hanging(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
     return risky
 
 
-def _thick_layers(first_mm: float, top_mm: float) -> Heights:
-    """Few equal layers over the first one, the last of which holds what hangs at the top."""
+def _thick_layers(first_mm: float, top_mm: float, over_mm: float) -> Heights:
+    """Few equal layers over the first one up to a height, and one that is cut so much above it, where what hangs there begins."""
     count = int(np.clip((top_mm - first_mm) / LEAST_MM, 1, LAYERS)) if top_mm > first_mm else 0
     tips = first_mm + (top_mm - first_mm) * np.arange(count + 2 if count else 1) / max(count, 1)
     thick = np.diff(tips, prepend=0.0)
-    return Heights(tips, thick, tips - 0.5 * thick)
+    cuts = tips - 0.5 * thick
+    if count:
+        cuts[-1] = min(cuts[-1], top_mm + over_mm)
+    return Heights(tips, thick, cuts)

@@ -268,6 +268,7 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         browser.open(sliced.address)
         browser.click("#tab-printing")
         browser.wait("document.documentElement.dataset.line === 'open'")
+        browser.wait("document.documentElement.dataset.printing === 'over'")  # which closes what is opened before
         type_port(browser, printer.path)
         browser.click("#rest-field summary")
         browser.wait(f"document.querySelector(`#journals input[value={json.dumps(ended['journal'])}]`)")

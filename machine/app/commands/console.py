@@ -288,6 +288,8 @@ class Shown:
             self._lines.append(text)
             if self._app is None:
                 self._print_lines()
+            elif len(self._lines) > 1:
+                return  # what waits is written together
             elif (loop := self._app.loop) is not None:  # without one the prompt is about to begin and writes them first
                 with suppress(RuntimeError):  # it has just ended: above() writes them
                     loop.call_soon_threadsafe(self.write_above)
@@ -295,9 +297,9 @@ class Shown:
     @contextmanager
     def above(self, app: Application[str]) -> Iterator[None]:
         """Write lines above this prompt, from its own thread, so that they never come between two moves of its cursor."""
-        with self._lock:
-            self._app = app
         try:
+            with self._lock:
+                self._app = app
             yield
         finally:
             with self._lock:

@@ -29,7 +29,7 @@ def test_slices_and_sums_are_those_of_lists(lines: list[str], some: slice) -> No
     assert held[some] + held == lines[some] + lines
 
 
-@pytest.mark.parametrize("pieces", [[], ["a\nb"], ["a", "\nb\n"], ["\n", "\n"]])
+@pytest.mark.parametrize("pieces", [[], ["a\nb"], ["", "a\n", ""], ["a", "\nb\n"], ["\n", "\n"]])
 def test_a_text_in_pieces_has_the_lines_of_the_whole(pieces: list[str]) -> None:
     assert Lines.of_text(pieces) == "".join(pieces).splitlines()
 

@@ -101,8 +101,14 @@ def test_a_thin_sheet_stands_on_all_of_its_face(thick_mm: float) -> None:
 
 
 def test_what_leans_out_over_its_base_is_held_as_far_as_glue_and_brim_reach() -> None:
-    assert standing(balanced(5.0, 3.0)).held()  # the weight over the edge of the rod
+    assert standing(balanced(5.0, 3.0)).held()
     assert not standing(balanced(5.0, 14.0)).held()
+
+
+def test_only_as_its_file_has_it_a_model_may_lean_out_over_its_base() -> None:
+    footing = standing(balanced(5.0, 8.0))
+    assert -2.0 < footing.lean_deg < -1.0
+    assert (footing.held(of_file=True), footing.held()) == (True, False)
 
 
 def test_a_rounded_end_is_as_wide_as_a_hundredth_of_the_model_above_the_plate() -> None:

@@ -82,9 +82,10 @@ def test_support_is_told_apart_and_there_only_where_something_hangs() -> None:
     assert supported.filament_mm * FILAMENT_MM2 == pytest.approx(sliced.volume_mm3, rel=0.04)
 
 
-def test_the_support_right_under_a_high_flat_arm_is_estimated() -> None:
-    """Its thick layers are 2 mm high here: one of them has to lie above the arm's underside."""
-    post, arm = m3.Manifold.cube((12.0, 12.0, 110.0)), m3.Manifold.cube((60.0, 12.0, 10.0)).translate((0.0, 0.0, 100.0))
+@pytest.mark.parametrize("thick_mm", [10.0, 0.8])
+def test_the_support_right_under_a_high_flat_arm_is_estimated(thick_mm: float) -> None:
+    """The estimate's layers are 2 mm high here: one of them has to be cut just above the arm's underside."""
+    post, arm = m3.Manifold.cube((12.0, 12.0, 110.0)), m3.Manifold.cube((60.0, 12.0, thick_mm)).translate((0.0, 0.0, 100.0))
     gallows = standing(post + arm)
     printed_mm3 = volume_mm3(slice_part(whole(gallows), profile()), Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
     assert of(gallows).support_mm3 == pytest.approx(printed_mm3, rel=0.4)
