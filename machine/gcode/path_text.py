@@ -30,8 +30,7 @@ def as_bytes(text: str) -> Bytes:
 
 
 def path_text(points: Whole, pushed: Whole, words: PathWords, known: Whole) -> str:
-    """A line, with its end, for each of (n, 3) points in thousandths of a mm, with the words of the coordinates that change and
-    of filament.
+    """A line, with its end, for each of (n, 3) points in thousandths of a mm: the coordinates that change, then filament.
 
     pushed: (n,) filament up to each, 1e-5 mm. known: X Y Z, filament where the tip is, which become those of the last line. A
     point where the tip is already gives no line, its filament goes to the next one.

@@ -53,9 +53,9 @@ class Footing:
         return self.base_share >= least_share and self.lean_deg >= least_lean_deg and self.brimmed_mpa <= ADHESION_MPA
 
     @property
-    def on_nothing(self) -> bool:
-        """Whether its base is so small that not even a brim holds it."""
-        return self.base_share < SMALL_BASE
+    def has_base(self) -> bool:
+        """Whether its base is large enough for a brim to hold it."""
+        return self.base_share >= SMALL_BASE
 
     @property
     def on_face(self) -> bool:

@@ -129,12 +129,12 @@ def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> l
     worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
     footed = _distinct(mesh, profile)[: 1 + FORECAST]
     upright, standing = footed[0]
-    turned_share = 0.0 if standing.on_nothing else TURNED  # nobody means a model to stand so
+    turned_share = TURNED if standing.has_base else 0.0  # nobody means a model to stand on a tip
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
     prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
     for (orientation, footing), turned, bare in zip(footed, meshes, prices, strict=True):
-        footing_mm2 = surface_mm2 * (footing_share(footing) + (turned_share if orientation is not upright else 0.0))
+        footing_mm2 = surface_mm2 * (footing_share(footing) + (0.0 if orientation is upright else turned_share))
         bare_mm2 = footing_mm2 + (inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm))
         scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
         shares = ((1.0, 1.0), (LEFT, STAIRS_LEFT), (LEAST_LEFT, LEAST_STAIRS_LEFT))
@@ -204,11 +204,11 @@ def _distinct(mesh: Mesh, profile: Profile) -> list[tuple[Orientation, Footing]]
     worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
     plate, surface_mm2 = Plate.under(mesh, profile), float(mesh.areas_mm2.sum())
     standing = plate.footing(upright.rotation)
-    known = [upright] if standing.held(of_file=True) else []  # else nothing is too near to it
-    others = _along_axis(mesh, others, bool(known))
-    footed = [(other, plate.footing(other.rotation)) for other in others]
-    on_face = bool(known) and standing.on_face
-    footed = [one for one in footed if one[1].held() and not (on_face and one[1].on_tip)] or ([] if known else footed)
+    held = standing.held(of_file=True)
+    known = [upright] if held else []  # else nothing is too near to it
+    footed = [(other, plate.footing(other.rotation)) for other in _along_axis(mesh, others, held)]
+    on_face = held and standing.on_face
+    footed = [one for one in footed if one[1].held() and not (on_face and one[1].on_tip)] or ([] if held else footed)
     footed.sort(key=lambda one: round(guess_mm2(one[0]) + surface_mm2 * footing_share(one[1]), 6))
     distinct: list[tuple[Orientation, Footing]] = []
     for orientation, footing in footed:
