@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 AT_ONCE = 4096  # lines
+TEXT_AT_ONCE = 2**16  # characters
 NEWLINE = 10
 
 
@@ -34,9 +35,9 @@ class Lines(Sequence[str]):
     @classmethod
     def of_text(cls, pieces: Iterable[str]) -> "Lines":
         """A text that comes in pieces, whose lines end with a line feed."""
-        content, ends, left = bytearray(), [np.zeros(1, dtype=np.int64)], iter(pieces)
-        while several := list(islice(left, AT_ONCE)):
-            some = _bytes("".join(several))
+        content, ends = bytearray(), [np.zeros(1, dtype=np.int64)]
+        for text in _joined(pieces):
+            some = _bytes(text)
             ends.append(np.flatnonzero(np.frombuffer(some, dtype=np.uint8) == NEWLINE) + len(content) + 1)
             content += some
         if content and content[-1] != NEWLINE:
@@ -79,6 +80,18 @@ class Lines(Sequence[str]):
         return isinstance(other, Sequence) and len(self) == len(other) and all(a == b for a, b in zip(self, other, strict=True))
 
     __hash__ = None  # type: ignore[assignment]
+
+
+def _joined(pieces: Iterable[str]) -> Iterator[str]:
+    """The text in pieces of at least TEXT_AT_ONCE characters, but for the last."""
+    some, size = list[str](), 0
+    for piece in pieces:
+        some.append(piece)
+        size += len(piece)
+        if size >= TEXT_AT_ONCE:
+            yield "".join(some)
+            some, size = [], 0
+    yield "".join(some)
 
 
 def _exact(content: bytearray) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Gcode: a machine program as text in the firmware's dialect, line by line; the same program gives the same bytes."""
+"""Gcode: a machine program as text in the firmware's dialect; the same program gives the same bytes."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace

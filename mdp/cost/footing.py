@@ -6,6 +6,7 @@ of the contact, less what the weight presses on it.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from manifold3d import CrossSection, JoinType
@@ -35,7 +36,7 @@ STEADY_MPA = 0.25 * ADHESION_MPA  # tension under a base, with its brim, that ma
 class Footing:
     """How a model stands on the plate. base_share: the area of its base as a share of its shadow's, touching_share: the area that
     touches the plate; lean_deg: the least angle by which it can be tilted before it tips over, below 0 where it tips over by
-    itself; tension_mpa: the greatest tension under it, brimmed_mpa: the same with the brim that a small base gets."""
+    itself; tension_mpa: the greatest tension under it, brimmed_mpa: the same with a brim, whether or not it would get one."""
 
     base_share: float
     touching_share: float
@@ -48,14 +49,15 @@ class Footing:
         its brim still holds it, while a turned model must have its centre of mass above its base."""
         if self.lean_deg >= LEAN_DEG and self.tension_mpa <= ADHESION_MPA:
             return True
-        least_share = SMALL_BASE if self.lean_deg >= (0.0 if of_file else LEAN_DEG) else LEANING_BASE
-        least_lean_deg = -LEAN_DEG if of_file else 0.0
-        return self.base_share >= least_share and self.lean_deg >= least_lean_deg and self.brimmed_mpa <= ADHESION_MPA
+        if self.torn_off or self.lean_deg < (-LEAN_DEG if of_file else 0.0):
+            return False
+        rests = self.lean_deg >= (0.0 if of_file else LEAN_DEG)
+        return self.base_share >= (SMALL_BASE if rests else LEANING_BASE)
 
     @property
-    def has_base(self) -> bool:
-        """Whether its base is large enough for a brim to hold it."""
-        return self.base_share >= SMALL_BASE
+    def torn_off(self) -> bool:
+        """Whether the nozzle's push tears it off the plate in spite of its brim."""
+        return self.brimmed_mpa > ADHESION_MPA
 
     @property
     def on_face(self) -> bool:
@@ -74,14 +76,14 @@ class Footing:
 
     @property
     def unsteady(self) -> float:
-        """How near the tension under the base comes to STEADY_MPA, with the brim that a small base gets: 0 to 1."""
+        """How near the tension under the base, with a brim, comes to STEADY_MPA: 0 to 1."""
         return min(1.0, max(0.0, self.brimmed_mpa / STEADY_MPA))
 
 
 @dataclass(frozen=True, eq=False)
 class Plate:
     """The plate under a model: its mesh and solid, its centre of mass and diameter, the width of the brim that a small base gets,
-    the density, as if it were printed solid, and whether the model stands on a pedestal."""
+    and the density, as if it were printed solid."""
 
     mesh: Mesh
     solid: Solid
@@ -89,26 +91,27 @@ class Plate:
     diameter_mm: float
     brim_mm: float
     density_g_cm3: float
-    pedestal: bool = False
 
     @classmethod
     def under(cls, mesh: Mesh, profile: Profile) -> "Plate":
-        """The plate under a mesh, by a profile."""
-        brim_mm = profile.process.brim_mm or profile.process.small_base_brim_mm
-        density_g_cm3, pedestal = profile.material.density_g_cm3, profile.search.pedestal_mm > 0.0
-        return cls(mesh, solid_of(mesh), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, density_g_cm3, pedestal)
+        """The plate under a mesh, by a profile. A pedestal holds no more than a plate; a brim goes round the pedestal."""
+        process, on_pedestal = profile.process, profile.search.pedestal_mm > 0.0
+        brim_mm = 0.0 if on_pedestal else process.brim_mm or process.small_base_brim_mm
+        return cls(mesh, solid_of(mesh), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, profile.material.density_g_cm3)
+
+    @cached_property
+    def weight_n(self) -> float:
+        """The weight of the model."""
+        return 1e-3 * self.density_g_cm3 * float(self.solid.volume()) * NEWTON_PER_G
 
     def footing(self, rotation: Floats) -> Footing:
-        """How the model stands when it is turned by a rotation (3, 3); a pedestal carries it however it is turned."""
-        if self.pedestal:
-            return Footing(1.0, 1.0, 90.0, 0.0, 0.0)
+        """How the model stands when it is turned by a rotation (3, 3)."""
         heights, centre = self.mesh.vertices @ rotation[2], rotation @ self.centre
         low, high = float(heights.min()), float(heights.max())
         touching, blunt = self._sections(rotation, low, high)
         base = max(touching, blunt, key=CrossSection.area)
         brim = base.offset(self.brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS) if self.brim_mm > 0.0 else base
-        weight_n = 1e-3 * self.density_g_cm3 * self.solid.volume() * NEWTON_PER_G
-        tensions = [_tension_mpa(section_edges(area), high - low, weight_n, centre[:2]) for area in (base, brim)]
+        tensions = [_tension_mpa(section_edges(area), high - low, self.weight_n, centre[:2]) for area in (base, brim)]
         corners = section_edges(base)[:, :2] - centre[:2]
         lean_deg = tipping_angle_deg(corners, float(centre[2]) - low) if len(corners) else -90.0
         shadow_mm2 = self._shadow_mm2(rotation)

@@ -188,7 +188,7 @@ def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0) ->
     elif totals[taken] <= min(totals.values()):
         reason = "the least cost with its time"
     else:
-        reason = f"more parts would save less than {least_saving:.0%} each"
+        reason = f"more parts would save less than {100.0 * least_saving:g} % each"
     return Choice(taken, reason, _given_up(rows[scars], rows[taken]) if taken != scars else ())
 
 
@@ -208,6 +208,6 @@ def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
     price = f"with {parts - taken.parts} more {'cut' if parts == taken.parts + 1 else 'cuts'}"
     if longer_s > 0.0:
         price = f"but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"but take {longer_s:.0f} s longer"
-    elif more_mm > 0.0:
+    elif more_mm >= 50.0:
         price = f"but take {more_mm / 1000.0:.1f} m more filament"
     return (f"{parts} parts would save {saved_mm2:.0f} mm2 of scars {price}: --parts {parts}",)

@@ -36,8 +36,9 @@ from profiles.profile import Profile
 RANKED = 20  # orientations that are ranked
 FORECAST = 3  # orientations whose time is estimated, beside the model as it stands
 # Shares of a model's surface that count as blemished for a narrow base, for an unsteady stance, and for being turned from how the
-# file has it: set by choices between orientations and by verdicts on them (tools/fit_choices.py, tools/RESULTS.md).
+# file has it: set where what is taken of each sheet of the book of choices is marked best most often (tools/RESULTS.md).
 NARROW, UNSTEADY, TURNED = 0.12, 0.06, 0.055
+TORN_OFF = 0.5  # the same where the plate does not hold the model at all: more than any turn costs
 NEAR = cos(radians(15.0))  # orientations that differ by less count as one
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
 SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs support, and for each layer
@@ -127,14 +128,13 @@ class OrientationForecast:
 def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[OrientationForecast]:
     """A model as it stands, then in the first other orientations; infinite where it cannot be printed so."""
     worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
-    footed = _distinct(mesh, profile)[: 1 + FORECAST]
-    upright, standing = footed[0]
-    turned_share = TURNED if standing.has_base else 0.0  # nobody means a model to stand on a tip
+    footed = _with_footing(mesh, profile)[: 1 + FORECAST]
+    upright = footed[0][0]
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
     prices = side_by_side([partial(_price_bare, turned, profile, pricing) for turned in meshes])
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
     for (orientation, footing), turned, bare in zip(footed, meshes, prices, strict=True):
-        footing_mm2 = surface_mm2 * (footing_share(footing) + (0.0 if orientation is upright else turned_share))
+        footing_mm2 = surface_mm2 * (footing_share(footing) + (0.0 if orientation is upright else TURNED))
         bare_mm2 = footing_mm2 + (inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm))
         scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
         shares = ((1.0, 1.0), (LEFT, STAIRS_LEFT), (LEAST_LEFT, LEAST_STAIRS_LEFT))
@@ -149,7 +149,7 @@ def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> l
 
 def footing_share(footing: Footing) -> float:
     """What a footing costs, as a share of the model's surface."""
-    return NARROW * footing.narrow + UNSTEADY * footing.unsteady
+    return NARROW * footing.narrow + UNSTEADY * footing.unsteady + TORN_OFF * footing.torn_off
 
 
 def _scar_mm2(worth: Worth) -> float:
@@ -185,19 +185,19 @@ def _whole(
     return forecast if row.time_s is not None and total < standing_mm2 else None
 
 
-def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
+def distinct_orientations(mesh: Mesh, profile: Profile, *, for_person: bool = False) -> list[Orientation]:
     """Up to RANKED orientations in which the plate holds the model, sorted by a guess of their cost with their footing; any
     orientation where the plate holds it in none, nor as it stands.
 
     The model as it stands is left out, and so are orientations near another one and those that a symmetry makes like another one.
-    A model that the plate holds as it stands, on a face, is not turned onto a point, an edge or a rounded end (of such
-    alternatives in the book of choices nine in ten are marked wrong). A body of revolution that is most of the model has its axis
-    upright or level, and upright where it is in the file.
+    A body of revolution that is most of the model has its axis upright or level. Only for a person to choose from are those that
+    turn a model from a face onto a point, an edge or a rounded end (in the book of choices nine in ten are marked wrong), or a
+    body of revolution from upright onto its side.
     """
-    return [orientation for orientation, _ in _distinct(mesh, profile)[1:]]
+    return [orientation for orientation, _ in _with_footing(mesh, profile, for_person)[1:]]
 
 
-def _distinct(mesh: Mesh, profile: Profile) -> list[tuple[Orientation, Footing]]:
+def _with_footing(mesh: Mesh, profile: Profile, for_person: bool = False) -> list[tuple[Orientation, Footing]]:
     """The model as it stands, then those orientations, each with its footing."""
     angle_deg, guess_mm2 = profile.process.self_supporting_angle_deg, _guess(profile)
     upright, *others = *facet_orientations(mesh, angle_deg), *straight_orientations(mesh, angle_deg)
@@ -205,9 +205,10 @@ def _distinct(mesh: Mesh, profile: Profile) -> list[tuple[Orientation, Footing]]
     plate, surface_mm2 = Plate.under(mesh, profile), float(mesh.areas_mm2.sum())
     standing = plate.footing(upright.rotation)
     held = standing.held(of_file=True)
+    keep = held and not for_person
     known = [upright] if held else []  # else nothing is too near to it
-    footed = [(other, plate.footing(other.rotation)) for other in _along_axis(mesh, others, held)]
-    on_face = held and standing.on_face
+    footed = [(other, plate.footing(other.rotation)) for other in _along_axis(mesh, others, keep)]
+    on_face = keep and standing.on_face
     footed = [one for one in footed if one[1].held() and not (on_face and one[1].on_tip)] or ([] if held else footed)
     footed.sort(key=lambda one: round(guess_mm2(one[0]) + surface_mm2 * footing_share(one[1]), 6))
     distinct: list[tuple[Orientation, Footing]] = []
@@ -219,13 +220,13 @@ def _distinct(mesh: Mesh, profile: Profile) -> list[tuple[Orientation, Footing]]
     return [(upright, standing), *distinct[:RANKED]]
 
 
-def _along_axis(mesh: Mesh, others: list[Orientation], held: bool) -> list[Orientation]:
-    """Those of some orientations in which a body of revolution has its axis upright or level; upright where it is in the file and
-    the plate holds the model so."""
+def _along_axis(mesh: Mesh, others: list[Orientation], keep: bool) -> list[Orientation]:
+    """Those of some orientations in which a body of revolution has its axis upright or level. keep: only upright, if it is so in
+    the file."""
     revolution = find_revolution(mesh)
     if revolution is None:
         return others
-    fits = revolution.is_upright_along if held and revolution.is_upright_along(UP) else revolution.is_square_to
+    fits = revolution.is_upright_along if keep and revolution.is_upright_along(UP) else revolution.is_square_to
     return [other for other in others if fits(other.rotation[2])]
 
 

@@ -28,7 +28,7 @@ from slicer.walls.brim import brim
 HOP_MM = 3.7  # mean travel to a stroke, retractions included
 BROKEN = 0.07  # share of a pattern's lines that are not joined to the one before
 SPARSE_STARTS = 2.0  # more hops to each piece of sparse infill, whose crossing lines are printed in two goes
-SUPPORT_HOPS = 1.3  # times as long to a stroke of support, brim or pedestal: branches stand apart, and the tip retracts between
+SUPPORT_HOPS = 1.3  # hops to a stroke of support, brim or pedestal: branches stand apart, so most of these travels retract
 STEADY = 0.6  # of the travels' time counts when a layer is slowed down, which leaves out their acceleration
 TURN_S = 2.0  # of the table before a part
 PATTERNS = (Kind.SKIN, Kind.INFILL, Kind.SUPPORT_INTERFACE)

@@ -246,7 +246,7 @@ def _prompt_session() -> PromptSession[str]:
 
 
 class Shown:
-    """Prints what the printer says, line by line; on a terminal in colours, and around the line that is being typed."""
+    """Prints what the printer says, line by line; on a terminal in colours, and above the line that is being typed."""
 
     def __init__(self, reports: bool) -> None:
         self.reports = reports

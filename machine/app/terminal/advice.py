@@ -14,10 +14,7 @@ from mdp.search.front import ASKED, BY_PLAN, Worth, choose
 from mdp.search.orient import Oriented
 from profiles.profile import Profile
 
-HARDLY_HELD = (
-    "its base may be too small to hold it: think of a wide brim (process.brim_mm), another side (process.rotate_deg) or a "
-    "pedestal (search.pedestal_mm)"
-)
+HARDLY_HELD = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
 
 
 def advice(decomposition: Decomposition, profile: Profile) -> str:

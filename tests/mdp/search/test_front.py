@@ -61,7 +61,7 @@ def test_every_further_part_saves_at_least_that_share_of_the_cost_of_one_piece(l
 
 
 def test_the_reason_names_the_demand_that_more_parts_do_not_meet() -> None:
-    assert choose(THREE, Worth(0.5), least_saving=0.19).reason == "more parts would save less than 19% each"
+    assert choose(THREE, Worth(0.5), least_saving=0.19).reason == "more parts would save less than 19 % each"
 
 
 def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:

@@ -61,7 +61,7 @@ def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, .
             orientation.risky_mm2,
             orientation.height_mm,
         )
-        for orientation in distinct_orientations(model.mesh(), profile)
+        for orientation in distinct_orientations(model.mesh(), profile, for_person=True)
     )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from threading import Timer
 from time import sleep
+from typing import Any
 
 import pytest
 from prompt_toolkit import PromptSession
@@ -175,15 +176,20 @@ def test_a_person_types_gets_help_and_leaves_with_ctrl_d() -> None:
 
 
 def test_a_line_that_comes_just_as_the_prompt_begins_is_written_by_the_prompt(capsys: Capsys) -> None:
-    shown = Shown(reports=False)
-    with create_pipe_input() as keys, create_app_session(keys, DummyOutput()):
-        prompt = PromptSession[str]()
-        keys.send_text("M114\n")
-        with shown.above(prompt.app):
+    shown, early = Shown(reports=False), []
+
+    class Late(PromptSession[str]):
+        def prompt(self, *arguments: Any, **options: Any) -> str:
             shown.write("ok")  # written now, it would follow the prompt on its line, and no new prompt would come
-            assert capsys.readouterr().out == ""
-            assert prompt.prompt(pre_run=shown.write_above) == "M114"
-            assert capsys.readouterr().out == "ok\n"
+            early.append(capsys.readouterr().out)
+            line = super().prompt(*arguments, **options)
+            early.append(capsys.readouterr().out)
+            return line
+
+    with create_pipe_input() as keys, create_app_session(keys, DummyOutput()):
+        keys.send_text("M114\n")
+        assert _Console(None, shown, False)._read_line(Late()) == "M114"
+    assert early == ["", "ok\n"]
 
 
 def test_a_person_is_asked_about_heaters_that_are_on() -> None:

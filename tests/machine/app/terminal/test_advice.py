@@ -52,10 +52,7 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
 
 def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
     oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, measure_upright(tee(), 45.0), False, False)
-    warning = (
-        "its base may be too small to hold it: think of a wide brim (process.brim_mm), another side (process.rotate_deg) or a "
-        "pedestal (search.pedestal_mm)"
-    )
+    warning = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
     assert orientation_in_words(oriented, "--as-is keeps it so") == (warning,)
     turned = replace(oriented, orientation=best_orientation(tee(), 45.0))
     assert orientation_in_words(turned, "--as-is keeps it so")[1:] == (warning,)
@@ -72,7 +69,7 @@ def test_a_model_that_is_not_turned_is_tested_on_the_plate() -> None:
     cone = m3.Manifold.cylinder(40.0, 0.01, 12.0, 64)
     assert len(standing_in_words(mesh_of(cone), load())) == 1
     assert standing_in_words(mesh_of(cone.rotate((180.0, 0.0, 0.0)).translate((0.0, 0.0, 40.0))), load()) == ()
-    assert standing_in_words(mesh_of(cone), load(settings=["search.pedestal_mm=5"])) == ()
+    assert standing_in_words(mesh_of(cone), load(settings=["search.pedestal_mm=5"]))  # which holds no more than a plate
 
 
 def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:
