@@ -5,19 +5,16 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.process import WIDTHS, Process
-from slicer.geometry.segments import Segment, squared_distance
+from slicer.geometry.polyline import length_mm, simplify
 from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: what two half circles leave of their square, as in PrusaSlicer's Flow
 INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin bead so wide stays under the flat of the tip
 EVEN_MM = 0.03  # widths that differ by less are one
-PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSlicer's resolution of G-code
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,52 +74,10 @@ class Bead:
         return length_mm(self.points)
 
 
-def length_mm(points: Floats) -> float:
-    """Length of a polyline."""
-    return float(_length(points))
-
-
-@kernel
-def _length(points: Floats) -> float:
-    total = 0.0
-    for i in range(1, len(points)):
-        total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
-    return total
-
-
 def simplify_bead(bead: Bead) -> Bead:
     """The bead with its points simplified."""
     points = simplify(bead.points)
     return bead if points is bead.points else replace(bead, points=points)
-
-
-def simplify(points: Floats) -> Floats:
-    """A polyline (n, 2) without points that lie within PATH_RESOLUTION_MM of the line between those that stay; its ends stay."""
-    if len(points) < 3:
-        return points
-    corners = _corners(points, PATH_RESOLUTION_MM)
-    return points if corners.all() else points[corners]
-
-
-@kernel
-def _corners(points: Floats, tolerance_mm: float) -> NDArray[np.bool_]:
-    """(n,) points that a simplified polyline has (Douglas and Peucker 1973); the chord of a loop is its first point."""
-    corner = np.zeros(len(points), np.bool_)
-    corner[0], corner[len(points) - 1] = True, True
-    stack = [(0, len(points) - 1)]
-    while len(stack):
-        a, b = stack.pop()
-        chord = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
-        farthest, at = tolerance_mm * tolerance_mm, -1
-        for k in range(a + 1, b):
-            away = squared_distance(chord, points[k, 0], points[k, 1])
-            if away > farthest:
-                farthest, at = away, k
-        if at >= 0:
-            corner[at] = True
-            stack.append((a, at))
-            stack.append((at, b))
-    return corner
 
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:

@@ -1,8 +1,6 @@
 """Cooling: how fast a layer's beads are laid so that it has time to set, and how hard the fan blows on it and on what hangs."""
 
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
-from math import hypot
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -10,44 +8,42 @@ from mdp.mesh import Floats
 from profiles.material import Material
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import Bead, length_mm
-from slicer.paths import Kind, bead_area_mm2
+from slicer.geometry.polyline import length_mm
+from slicer.paths import KINDS, Kind, bead_area_mm2
 from slicer.speed import stroke_speeds
-from slicer.travel.order import Placed
+from slicer.strokes import RINGS, Strokes
 
-RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
 
 
 def speeds_mm_s(
-    placed: Sequence[Placed], profile: Profile, height_mm: float, fixed_mm_s: Mapping[Kind, float] | None, flow: float
+    strokes: Strokes, profile: Profile, height_mm: float, fixed_mm_s: Mapping[Kind, float] | None, flow: float
 ) -> Floats:
-    """(n,) speeds of a layer's beads; fixed_mm_s replaces the process's speeds by kind, flow multiplies every bead's flow.
+    """(k,) speeds of a layer's strokes; fixed_mm_s replaces the process's speeds by kind, flow multiplies every stroke's flow.
 
     Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
     below least_speed_mm_s.
     """
-    process, table = profile.process, stroke_speeds(profile.process)
-    asked = np.array([_of_bead(p.bead, table, process) if fixed_mm_s is None else fixed_mm_s[p.bead.kind] for p in placed])
-    areas = np.array([bead_area_mm2(p.bead.width_mm, height_mm) * p.bead.flow * flow for p in placed])
+    process = profile.process
+    usual = _by_kind(stroke_speeds(process))[strokes.kind] if fixed_mm_s is None else _by_kind(fixed_mm_s)[strokes.kind]
+    asked = usual if fixed_mm_s is not None else _of_strokes(strokes, usual, process)
+    areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
     speeds = np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas)
-    lengths = np.array([p.bead.length_mm for p in placed])
-    return _slow_down(speeds, lengths, process.least_layer_time_s - travel_time_s(placed, profile), process.least_speed_mm_s)
+    time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
+    return _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
 
 
-def _of_bead(bead: Bead, table: dict[Kind, float], process: Process) -> float:
+def _by_kind(speeds: Mapping[Kind, float]) -> Floats:
+    return np.array([speeds[kind] for kind in KINDS])
+
+
+def _of_strokes(strokes: Strokes, usual: Floats, process: Process) -> Floats:
     """The kind's speed, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
-    if bead.over_infill:
-        return process.infill_bridge_speed_mm_s
-    if bead.overhang:
-        return min(table[bead.kind], _overhang_mm_s(process)[bead.overhang - 1])
-    way = bead.points if bead.course is None else bead.course.points
-    if bead.kind in RINGS and length_mm(way) <= process.small_wall_mm:
-        ends = way[-1] - way[0]
-        if float(np.hypot(ends[0], ends[1])) <= bead.width_mm:  # a seam gap leaves a wall a little open
-            return min(table[bead.kind], process.small_wall_speed_mm_s)
-    return table[bead.kind]
+    hanging = np.array([np.inf, *_overhang_mm_s(process)])[strokes.overhang]
+    small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
+    lowered = np.minimum(usual, np.where(strokes.overhang > 0, hanging, small))
+    return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
 
 
 def _overhang_mm_s(process: Process) -> tuple[float, ...]:
@@ -59,26 +55,28 @@ def _overhang_mm_s(process: Process) -> tuple[float, ...]:
     )
 
 
-def travel_time_s(placed: Sequence[Placed], profile: Profile) -> float:
+def travel_time_s(strokes: Strokes, profile: Profile) -> float:
     """What a layer's travels and retractions take at least."""
     material = profile.material
-    length = sum(_travel_mm(a, b) for a, b in pairwise(placed))
-    pulls = sum(p.retract for p in placed) * 2.0 * material.retract_mm / material.retract_speed_mm_s
-    return length / profile.process.travel_speed_mm_s + pulls
+    pulls = int(strokes.retract.sum()) * 2.0 * material.retract_mm / material.retract_speed_mm_s
+    return _travels_mm(strokes) / profile.process.travel_speed_mm_s + pulls
 
 
-def _travel_mm(before: Placed, after: Placed) -> float:
-    """Length of the way between two beads."""
-    if len(after.approach):
-        return length_mm(np.concatenate([before.points[-1:], after.approach, after.points[:1]]))
-    (x0, y0), (x1, y1) = before.points[-1].tolist(), after.points[0].tolist()
-    return hypot(x1 - x0, y1 - y0)
+def _travels_mm(strokes: Strokes) -> float:
+    """Length of all ways between strokes."""
+    steps = strokes.first_points[1:] - strokes.last_points[:-1]
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    passes = strokes.approach_starts
+    for k in np.flatnonzero(np.diff(passes)).tolist():
+        if k:
+            way = [strokes.last_points[k - 1 : k], strokes.approach[passes[k] : passes[k + 1]], strokes.first_points[k : k + 1]]
+            lengths[k - 1] = length_mm(np.concatenate(way))
+    return float(lengths.sum())
 
 
-def layer_time_s(placed: Sequence[Placed], speeds: Floats, profile: Profile) -> float:
+def layer_time_s(strokes: Strokes, speeds: Floats, profile: Profile) -> float:
     """What a layer takes at least, accelerations left out."""
-    lengths = np.array([p.bead.length_mm for p in placed])
-    return float((lengths / speeds).sum()) + travel_time_s(placed, profile)
+    return float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)
 
 
 def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:
@@ -115,10 +113,10 @@ def rising_fan(material: Material, layer: int) -> float:
     return min((layer + 1 - material.fan_off_layers) / max(material.fan_full_layer - material.fan_off_layers, 1), 1.0)
 
 
-def hanging_fan(material: Material, bead: Bead, factor: float, layer_fan: float) -> float | None:
-    """Part fan of a bead where it differs from the layer's: of bridges, overhanging walls, half way there of those that lean."""
-    if bead.kind not in HANGING and not bead.overhang:
-        return None
-    fans = (material.fan_infill_bridge if bead.over_infill else None, material.fan_bridge, material.fan)
-    hanging = factor * next(fan for fan in fans if fan is not None)
-    return hanging if bead.kind in HANGING else round(0.5 * (layer_fan + hanging) / STEP) * STEP
+def own_fans(strokes: Strokes, material: Material, factor: float, layer_fan: float) -> Floats:
+    """(k,) part fan of bridges and overhanging walls, half way there of walls that lean; NaN: the layer's fan."""
+    hanging = factor * (material.fan if material.fan_bridge is None else material.fan_bridge)
+    over_infill = hanging if material.fan_infill_bridge is None else factor * material.fan_infill_bridge
+    own = np.where(strokes.over_infill, over_infill, hanging)
+    leaning = np.where(strokes.overhang > 0, np.round(0.5 * (layer_fan + own) / STEP) * STEP, np.nan)
+    return np.where(strokes.is_of(*HANGING), own, leaning)

@@ -1,13 +1,17 @@
-"""Paths: what the slicer hands over; one object per path, one array row per point, all in the part frame."""
+"""Paths: what the slicer hands over: a table per layer, one row per stroke, all in the part frame."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import pi
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
+from slicer.geometry.polyline import lengths_mm
 
 ON_PLATE_MM = 0.35  # so high above the plate a bead still sags onto it
 
@@ -30,14 +34,19 @@ class Kind(StrEnum):
     PURGE = "Custom"
 
 
-def bead_area_mm2(width_mm: float, height_mm: float) -> float:
+KINDS = tuple(Kind)
+NUMBER = {kind: number for number, kind in enumerate(KINDS)}
+Width = TypeVar("Width", float, Floats)
+
+
+def bead_area_mm2(width_mm: Width, height_mm: float) -> Width:
     """Cross-section of a bead: a rectangle with half-round sides, (w - h) h + pi h^2 / 4 (PrusaSlicer's model)."""
     return (width_mm - height_mm) * height_mm + pi * height_mm**2 / 4.0
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """One continuous bead.
+    """One continuous bead, a row of a Layer.
 
     points: (n, 2) mm, n >= 2; a closed path repeats its first point at the end. flow: factor on the bead's volume.
     approach: (k, 2) mm, points that the travel to the first point passes, k >= 0. retract: pull the filament back
@@ -57,16 +66,6 @@ class Path:
     wiped: bool = True
 
     @property
-    def z_mm(self) -> Floats:
-        """(n,) heights of the points over the layer's z, none above it."""
-        begin, end = self.below_mm
-        if begin == end:
-            return np.full(len(self.points), -begin)
-        done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
-        heights: Floats = -begin + (begin - end) * done / done[-1]
-        return heights
-
-    @property
     def length_mm(self) -> float:
         """Length of the bead."""
         return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
@@ -74,20 +73,103 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """Paths printed with the tip at z_mm above the base plane, in order; every bead is height_mm high.
+    """Strokes printed with the tip at z_mm above the base plane, in order, one row each; every bead is height_mm high.
 
-    nozzle_add_c: how much hotter than the material asks this layer is printed, deg C.
+    fan: of the strokes that have none of their own; nozzle_add_c: how much hotter than the material asks the layer is printed,
+    deg C. points: (n, 2) mm; starts: (k + 1,) where the points of each stroke begin. Columns, (k,) each but for below_mm (k, 2):
+    kind: index in KINDS; own_fan: NaN for the layer's; the others as in Path. approach: (m, 2), approach_starts: (k + 1,).
     """
 
     z_mm: float
     height_mm: float
-    paths: tuple[Path, ...]
     fan: float
-    nozzle_add_c: float = 0.0
+    nozzle_add_c: float
+    points: Floats
+    starts: Indices
+    kind: NDArray[np.int8]
+    width_mm: Floats
+    speed_mm_s: Floats
+    flow: Floats
+    own_fan: Floats
+    retract: Mask
+    wiped: Mask
+    below_mm: Floats
+    approach: Floats
+    approach_starts: Indices
 
-    def volume_mm3(self, path: Path) -> float:
-        """Plastic that a path of this layer extrudes."""
-        return path.length_mm * bead_area_mm2(path.width_mm, self.height_mm) * path.flow
+    @classmethod
+    def of(cls, z_mm: float, height_mm: float, paths: Sequence[Path], fan: float, nozzle_add_c: float = 0.0) -> "Layer":
+        """The table of some paths."""
+        return cls(
+            z_mm=z_mm,
+            height_mm=height_mm,
+            fan=fan,
+            nozzle_add_c=nozzle_add_c,
+            points=np.concatenate([np.zeros((0, 2)), *(path.points for path in paths)]),
+            starts=np.cumsum([0, *(len(path.points) for path in paths)]),
+            kind=np.array([NUMBER[path.kind] for path in paths], dtype=np.int8),
+            width_mm=np.array([path.width_mm for path in paths]),
+            speed_mm_s=np.array([path.speed_mm_s for path in paths]),
+            flow=np.array([path.flow for path in paths]),
+            own_fan=np.array([np.nan if path.fan is None else path.fan for path in paths]),
+            retract=np.array([path.retract for path in paths], dtype=np.bool_),
+            wiped=np.array([path.wiped for path in paths], dtype=np.bool_),
+            below_mm=np.array([path.below_mm for path in paths]).reshape(-1, 2),
+            approach=np.concatenate([np.zeros((0, 2)), *(path.approach.reshape(-1, 2) for path in paths)]),
+            approach_starts=np.cumsum([0, *(len(path.approach) for path in paths)]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The rows one by one."""
+        return tuple(self.path(k) for k in range(len(self)))
+
+    def path(self, k: int) -> Path:
+        """Row k."""
+        own = float(self.own_fan[k])
+        begin_mm, end_mm = self.below_mm[k].tolist()
+        return Path(
+            kind=KINDS[self.kind[k]],
+            points=self.points[self.starts[k] : self.starts[k + 1]],
+            width_mm=float(self.width_mm[k]),
+            speed_mm_s=float(self.speed_mm_s[k]),
+            flow=float(self.flow[k]),
+            approach=self.approach[self.approach_starts[k] : self.approach_starts[k + 1]],
+            retract=bool(self.retract[k]),
+            fan=None if np.isnan(own) else own,
+            below_mm=(begin_mm, end_mm),
+            wiped=bool(self.wiped[k]),
+        )
+
+    @property
+    def points_z_mm(self) -> Floats:
+        """(n,) heights of the points above the base plane; a stroke climbs evenly from one below_mm to the other."""
+        heights = np.full(len(self.points), self.z_mm)
+        for k in np.flatnonzero(self.below_mm.any(axis=1)).tolist():
+            a, b = self.starts[k], self.starts[k + 1]
+            done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points[a:b], axis=0).T))])
+            begin, end = self.below_mm[k]
+            heights[a:b] += -begin + (begin - end) * done / done[-1]
+        return heights
+
+    @property
+    def volumes_mm3(self) -> Floats:
+        """(k,) plastic that each stroke extrudes."""
+        return lengths_mm(self.points, self.starts) * bead_area_mm2(self.width_mm, self.height_mm) * self.flow
+
+    def is_of(self, *kinds: Kind) -> Mask:
+        """(k,) which strokes are of some kinds."""
+        return is_of(self.kind, kinds)
+
+
+def is_of(kind: NDArray[np.int8], kinds: Sequence[Kind]) -> Mask:
+    """(k,) which of the strokes with these numbers of kinds are of some kinds."""
+    marks = np.zeros(len(KINDS), np.bool_)
+    marks[[NUMBER[one] for one in kinds]] = True
+    return marks[kind]
 
 
 @dataclass(frozen=True)
@@ -125,4 +207,4 @@ class SlicedPart:
     @property
     def volume_mm3(self) -> float:
         """All plastic of the part, skirt and support included."""
-        return sum(layer.volume_mm3(path) for layer in self.layers for path in layer.paths)
+        return float(sum(layer.volumes_mm3.sum() for layer in self.layers))

@@ -15,8 +15,8 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import Bead, simplify
-from slicer.cooling import fan_share, hanging_fan, layer_time_s, rising_fan, speeds_mm_s
+from slicer.bead import Bead
+from slicer.cooling import fan_share, layer_time_s, own_fans, rising_fan, speeds_mm_s
 from slicer.finish.vase import bottom_layers, vase_layers
 from slicer.geometry.polygons import Polygons
 from slicer.interface.interface import begin_inside, interface_edges, skin_beside
@@ -25,7 +25,7 @@ from slicer.interface.pins import plan_pins, pour
 from slicer.interface.plastic import interface_mm3
 from slicer.layer_beads import lay_beads
 from slicer.overhangs import Overhang, find_overhangs
-from slicer.paths import ON_PLATE_MM, Kind, Layer, Path, SlicedPart, Unsupported
+from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, Unsupported
 from slicer.sectioning import section_part
 from slicer.sections import Sections
 from slicer.shells import Shells, build_shells
@@ -33,7 +33,7 @@ from slicer.speed import first_layer_speeds
 from slicer.support.reason import explain
 from slicer.support.support import Supports, own_supports
 from slicer.travel.order import order_beads
-from slicer.travel.wiping import keep_wipes_off
+from slicer.travel.wiping import may_wipe_over
 from slicer.walls.overhang import split_overhangs
 from slicer.walls.seam import NO_SEAMS, Surroundings, place_seams, rear_of, seam_limits
 from slicer.walls.seam_plan import plan_seams
@@ -92,8 +92,8 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         beads, seams = place_seams([*own, *auxiliary], process, around)
         skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
         layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers else None, skin)
-        if layer.paths:
-            tip = layer.paths[-1].points[-1]
+        if len(layer):
+            tip = layer.points[-1]
             layers.append(layer)
         if on_layer is not None:
             on_layer(i + 1, count)
@@ -128,10 +128,10 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     outline, height_mm = sections.outlines[index], float(sections.heights.height_mm[index])
     if index == 0 and not on_platform:
         beads = [*pour(sections.pins, profile, height_mm), *begin_inside(beads)]
-    placed = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
-    placed = split_overhangs(placed, outline, sections.below(index), own)
+    strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
+    strokes = split_overhangs(strokes, outline, sections.below(index), own)
     if index == 0 and not on_platform and process.interlock == "grooves":
-        placed = fill_grooves(placed, sections.part, process, height_mm)
+        strokes = fill_grooves(strokes, sections.part, process, height_mm)
     fixed: Mapping[Kind, float] | None = None
     flow, fan, add_c = material.flow, 1.0, 0.0
     if not on_platform and index < process.interface_layers:
@@ -140,26 +140,35 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     if index == 0:
         fixed = first_layer_speeds(process, on_platform)
         flow *= process.first_layer_flow if on_platform else process.interface_flow
-    placed = in_pieces(placed, height_mm)
-    speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
+    strokes = in_pieces(strokes, height_mm)
+    speeds = speeds_mm_s(strokes, profile, height_mm, fixed, flow)
     if on_platform:
         fan = rising_fan(material, index)
-    layer_fan = fan * fan_share(material, process, layer_time_s(placed, speeds, profile))
-    fans = [hanging_fan(material, p.bead, fan, layer_fan) for p in placed]
-    paths = tuple(
-        Path(p.bead.kind, simplify(p.points), p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, own_fan)
-        for p, own_fan, speed in zip(placed, fans, speeds, strict=True)
+    layer_fan = fan * fan_share(material, process, layer_time_s(strokes, speeds, profile))
+    strokes = strokes.simplified()
+    return Layer(
+        z_mm=float(sections.heights.tip_mm[index]),
+        height_mm=height_mm,
+        fan=layer_fan,
+        nozzle_add_c=add_c,
+        points=np.ascontiguousarray(strokes.points[:, :2]),
+        starts=strokes.starts,
+        kind=strokes.kind,
+        width_mm=strokes.width_mm,
+        speed_mm_s=speeds,
+        flow=strokes.flow * flow,
+        own_fan=own_fans(strokes, material, fan, layer_fan),
+        retract=strokes.retract,
+        wiped=may_wipe_over(strokes, skin, material.wipe_mm),
+        below_mm=np.zeros((len(strokes), 2)),
+        approach=strokes.approach,
+        approach_starts=strokes.approach_starts,
     )
-    paths = keep_wipes_off(paths, skin, material.wipe_mm)
-    return Layer(float(sections.heights.tip_mm[index]), height_mm, paths, layer_fan, add_c)
 
 
 def _check_not_empty(sections: Sections, layers: Sequence[Layer]) -> None:
     part, process = sections.part, sections.process
-    own = (
-        path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
-    )
-    if next(own, None) is None:
+    if all(layer.is_of(Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE).all() for layer in layers):
         low, high = sections.mesh.bounds_mm
         x, y, z = high - low
         if process.walls == 0 and process.infill_density == 0:
@@ -175,7 +184,7 @@ def _check_not_empty(sections: Sections, layers: Sequence[Layer]) -> None:
 
 
 def _check_on_plate(part: Part, layers: Sequence[Layer], process: Process) -> None:
-    first = next(layer for layer in layers if any(path.kind is not Kind.SKIRT for path in layer.paths))
+    first = next(layer for layer in layers if not layer.is_of(Kind.SKIRT).all())
     if first.z_mm - first.height_mm > ON_PLATE_MM:
         support = "" if process.support == "auto" else ", or process.support = auto"
         raise SliceError(

@@ -32,7 +32,7 @@ def program() -> MachineProgram:
         angle = np.cumsum(chance.uniform(0, 0.05, PER_STROKE + 1))
         points = np.column_stack([40 * np.cos(angle), 40 * np.sin(angle), np.full(PER_STROKE + 1, 0.2 * (layer + 1))])
         moves.append(Stroke(Kind.INNER_WALL, points, np.full(PER_STROKE, 0.05), 40.0, 0.45))
-    return MachineProgram("bench", tuple(moves))
+    return MachineProgram.of("bench", tuple(moves))
 
 
 def main() -> None:

@@ -63,13 +63,8 @@ def row(decomposition: Decomposition, profile: Profile) -> str:
     quick = estimate(parts, profile)
     core_s = process_time() - began
     filament_mm = float(program.run.program.filament_mm.max())
-    support_mm3 = sum(
-        layer.volume_mm3(path)
-        for part in program.sliced
-        for layer in part.layers
-        for path in layer.paths
-        if path.kind in (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
-    )
+    layers = [layer for part in program.sliced for layer in part.layers]
+    support_mm3 = sum(layer.volumes_mm3[layer.is_of(Kind.SUPPORT, Kind.SUPPORT_INTERFACE)].sum() for layer in layers)
     cells += [f"{program.run.time_s / 60:.1f}", f"{quick.time_s / program.run.time_s:.2f}"]
     cells += [f"{filament_mm / 1000:.2f}", f"{quick.filament_mm / filament_mm:.2f}"]
     cells += [f"{support_mm3:.0f}", f"{quick.support_mm3 / support_mm3:.2f}" if support_mm3 else "-", f"{core_s:.2f}"]

@@ -63,7 +63,7 @@ def row(file: Path, every: int, profile: Profile) -> str:
     taken_s, width = process_time() - began, profile.process.line_width_mm
     at = layer_heights(mesh, profile, True)
     by_height = {round(layer.z_mm, 6): layer for layer in sliced.layers}
-    volume = sum(layer.volume_mm3(path) for layer in sliced.layers for path in layer.paths)
+    volume = sliced.volume_mm3
     spots, over, looked = [(0.0, 0)], [(0.0, 0)], 0
     for k in range(0, len(at.cut_mm), every):
         layer = by_height.get(round(float(at.tip_mm[k]), 6))

@@ -1,14 +1,11 @@
 """Part totals: a comment that tells what a part's beads come to, so that a program that was changed later gives itself away."""
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from machine.planning.moves import Stroke
 from mdp.mesh import Floats
-from slicer.paths import Kind
 
 KEY = "CONTENTS"
 NUMBER = r"(-?[0-9]{1,6}\.[0-9]{3})"
@@ -29,16 +26,13 @@ class PartTotals:
     layers: int
 
 
-def totals_comment(strokes: Iterable[Stroke], layers: int) -> str:
-    """The comment of a part with these strokes in so many layers; a purge is no part's. Empty where it has no strokes."""
-    own = [stroke for stroke in strokes if stroke.kind is not Kind.PURGE]
-    if not own:
+def totals_comment(points_mm: Floats, filament_mm: float, layers: int) -> str:
+    """The comment of a part with strokes through (n, 3) points in so many layers; empty where it has no strokes."""
+    if not len(points_mm):
         return ""
-    points = np.vstack([stroke.points_mm for stroke in own])
-    sides = " ".join(
-        f"{letter}{low:.3f} {high:.3f}" for letter, low, high in zip("XYZ", points.min(axis=0), points.max(axis=0), strict=True)
-    )
-    return f";{KEY}:{sides} E{sum(float(stroke.filament_mm.sum()) for stroke in own):.3f} layers {layers}"
+    low, high = points_mm.min(axis=0).tolist(), points_mm.max(axis=0).tolist()
+    sides = " ".join(f"{letter}{least:.3f} {most:.3f}" for letter, least, most in zip("XYZ", low, high, strict=True))
+    return f";{KEY}:{sides} E{filament_mm:.3f} layers {layers}"
 
 
 def read_totals(text: str, line: int, part: int) -> PartTotals | None:

@@ -1,71 +1,176 @@
-"""Path text: the lines of a path's moves, set in digits by a kernel: of a program's lines nearly all are these."""
+"""Path text: the lines of many moves, set in digits by a kernel: of a program's lines nearly all are these."""
 
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.kernel import borrower, kernel
+from mdp.mesh import Floats, Indices
 
 Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int64]
 
-LONGEST = 96  # characters of a line: four words of 20 digits at most, the command beside them
-SPACE, MINUS, POINT, ZERO, LINE_END = 32, 45, 46, 48, 10
+LONGEST = 112  # characters of a line: five words of 20 digits at most, the command beside them
+SPACE, MINUS, POINT, ZERO, LINE_END, FEED = 32, 45, 46, 48, 10, 70
 COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point
+PUSHING, TRAVELLING, STANDING = range(3)  # what a path does: strokes and wipes, travels, retractions
+X, Y, Z, PUSHED, F = range(5)  # what the firmware knows
+SAME = 1.001  # less than the firmware and the dry run care for
+STEPS = 20  # a short stroke that must go slower does so by twentieths, or the speeds of its like would flicker
+
+
+class Paths(NamedTuple):
+    """Moves to write. points_mm: (n, 3) as the file calls them; filament_mm: (n,) pushed on the way to each; starts: (m + 1,)
+    where the points of each path begin; does: (m,) PUSHING, TRAVELLING or STANDING; speed: (m,) units/s."""
+
+    points_mm: Floats
+    filament_mm: Floats
+    starts: Indices
+    does: NDArray[np.int8]
+    speed: Floats
+
+
+class Texts(NamedTuple):
+    """Lines between paths: content; starts: (m + 2,) where the text before each path begins, and that after the last one."""
+
+    content: Bytes
+    starts: Indices
 
 
 class PathWords(NamedTuple):
-    """What all lines of a path share: the command, the letter of filament, whether its word is a step, the first line's F."""
+    """The commands of strokes and travels, the letter of filament, and whether its word is a step."""
 
     stroke: Bytes
+    travel: Bytes
     letter: int
     relative: bool
-    ending: Bytes
 
 
 def as_bytes(text: str) -> Bytes:
     """Text for the kernel."""
-    return np.frombuffer(text.encode("ascii"), dtype=np.uint8)
+    return np.frombuffer(text.encode("utf-8"), dtype=np.uint8)
 
 
-def path_text(points: Whole, pushed: Whole, words: PathWords, known: Whole) -> str:
-    """A line, with its end, for each of (n, 3) points in thousandths of a mm: the coordinates that change, then filament.
+def path_text(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_mm: Floats) -> str:
+    """The lines of paths, with their ends: the coordinates that change, then filament, then the F that changes.
 
-    pushed: (n,) filament up to each, 1e-5 mm. known: X Y Z, filament where the tip is, which become those of the last line. A
-    point where the tip is already gives no line, its filament goes to the next one.
+    known: (5,) X Y Z in thousandths of a mm, filament in 1e-5 mm and F in units/min that the firmware knows; filament_mm: (1,)
+    pushed so far, not rounded. Both become those after the last line. A point where the tip is already gives no line, its
+    filament goes to the next one.
     """
-    text = np.empty(LONGEST * len(points) + len(words.ending), dtype=np.uint8)
-    size = _write(points, pushed, words, known, text)
-    return text[:size].tobytes().decode("ascii")
+    text = np.empty(LONGEST * len(paths.points_mm) + len(texts.content), dtype=np.uint8)
+    size = _write(paths, texts, words, known, filament_mm, text)
+    return text[:size].tobytes().decode("utf-8")
 
 
 @kernel
-def _write(points: Whole, pushed: Whole, words: PathWords, known: Whole, text: Bytes) -> int:
+def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_mm: Floats, text: Bytes) -> int:
     """Fills in the text and returns its length."""
-    at, first = 0, True
-    for k in range(len(points)):
-        if points[k, 0] == known[0] and points[k, 1] == known[1] and points[k, 2] == known[2]:
+    at = 0
+    for path in range(len(paths.starts) - 1):
+        at = _copy(texts.content, texts.starts[path], texts.starts[path + 1], text, at)
+        first, end = paths.starts[path], paths.starts[path + 1]
+        if paths.does[path] == STANDING:
+            filament_mm[0] += paths.filament_mm[first]
+            at = _copy(words.stroke, 0, len(words.stroke), text, at)
+            at = _filament(words, filament_mm[0], known, text, at)
+            at = _feed(paths.speed[path], known, text, at)
+            text[at] = LINE_END
+            at += 1
             continue
-        at = _copy(words.stroke, text, at)
-        for axis in range(3):
-            if points[k, axis] != known[axis]:
-                known[axis] = points[k, axis]
-                at = _word(88 + axis, known[axis], COORDINATE_DIGITS, text, at)
-        at = _word(words.letter, pushed[k] - known[3] if words.relative else pushed[k], FILAMENT_DIGITS, text, at)
-        known[3] = pushed[k]
-        if first:
-            at, first = _copy(words.ending, text, at), False
-        text[at] = LINE_END
-        at += 1
-    return at
+        pushing = paths.does[path] == PUSHING
+        more, slower = _stretch(paths.points_mm, paths.filament_mm, first, end) if pushing else (0.0, 1.0)
+        written, base, pushed = False, filament_mm[0], 0.0
+        for k in range(first + 1, end):
+            if pushing:
+                pushed += _step_mm(paths.points_mm, paths.filament_mm, k, more)
+                filament_mm[0] = base + pushed
+            if _stands(paths.points_mm, k, known):
+                continue
+            command = words.stroke if pushing else words.travel
+            at = _copy(command, 0, len(command), text, at)
+            for axis in range(3):
+                value = _thousandths(paths.points_mm[k, axis])
+                if value != known[axis]:
+                    known[axis] = value
+                    at = _word(88 + axis, value, COORDINATE_DIGITS, text, at)
+            if pushing:
+                at = _filament(words, filament_mm[0], known, text, at)
+            if not written:
+                at, written = _feed(paths.speed[path] / slower, known, text, at), True
+            text[at] = LINE_END
+            at += 1
+    return _copy(texts.content, texts.starts[len(paths.starts) - 1], texts.starts[len(paths.starts)], text, at)
 
 
 @borrower
-def _copy(what: Bytes, text: Bytes, at: int) -> int:
-    for k in range(len(what)):
-        text[at + k] = what[k]
-    return at + len(what)
+def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tuple[float, float]:
+    """What the filament of each step, in proportion to its length as written, is multiplied by so that the sum stays, and how
+    much slower the path must go for that; 0: the sum is nothing.
+
+    Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed.
+    """
+    whole = shared = 0.0
+    for k in range(first + 1, end):
+        whole += filament_mm[k]
+        shared += _step_mm(points_mm, filament_mm, k, 1.0)
+    if shared == 0.0:
+        return 0.0, 1.0
+    more = whole / shared
+    return more, ceil(more * STEPS) / STEPS if more > SAME else 1.0
+
+
+@borrower
+def _step_mm(points_mm: Floats, filament_mm: Floats, k: int, more: float) -> float:
+    """Filament of the step to point k as it is written; more: what is shared is multiplied by, 0: not shared."""
+    if more == 0.0:
+        return float(filament_mm[k])
+    exact = written = 0.0
+    for axis in range(3):
+        exact += (points_mm[k, axis] - points_mm[k - 1, axis]) ** 2
+        written += ((np.rint(points_mm[k, axis] * 1000.0) - np.rint(points_mm[k - 1, axis] * 1000.0)) / 1000.0) ** 2
+    return float(filament_mm[k] * np.sqrt(written) / max(np.sqrt(exact), 1e-12) * more)
+
+
+@borrower
+def _thousandths(value_mm: float) -> int:
+    return int(np.rint(value_mm * 1000.0))
+
+
+@borrower
+def _stands(points_mm: Floats, k: int, known: Whole) -> bool:
+    """Whether the tip is at point k already, as it is written."""
+    x, y, z = _thousandths(points_mm[k, 0]), _thousandths(points_mm[k, 1]), _thousandths(points_mm[k, 2])
+    return bool(x == known[X] and y == known[Y] and z == known[Z])
+
+
+@borrower
+def _filament(words: PathWords, filament_mm: float, known: Whole, text: Bytes, at: int) -> int:
+    """The word of filament up to what has been pushed: a step, or the sum where the firmware knows no steps."""
+    pushed = int(np.rint(filament_mm * 1e5))
+    value = pushed - known[PUSHED] if words.relative else pushed
+    known[PUSHED] = pushed
+    return _word(words.letter, value, FILAMENT_DIGITS, text, at)
+
+
+@borrower
+def _feed(units_s: float, known: Whole, text: Bytes, at: int) -> int:
+    """The F word where it changes."""
+    feed = max(int(np.rint(60.0 * units_s)), 1)
+    if feed == known[F]:
+        return at
+    known[F] = feed
+    return _word(FEED, feed, 0, text, at)
+
+
+@borrower
+def _copy(what: Bytes, first: int, end: int, text: Bytes, at: int) -> int:
+    for k in range(first, end):
+        text[at] = what[k]
+        at += 1
+    return at
 
 
 @borrower
@@ -82,12 +187,13 @@ def _word(letter: int, value: int, digits: int, text: Bytes, at: int) -> int:
     while rest > 0:
         rest //= 10
         count += 1
-    end = at + count + 1
+    end = at + count + (1 if digits > 0 else 0)
+    after = end
     for k in range(count):
-        if k == digits:
+        if k == digits and digits > 0:
             end -= 1
             text[end] = POINT
         end -= 1
         text[end] = ZERO + value % 10
         value //= 10
-    return at + count + 1
+    return after

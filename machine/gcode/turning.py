@@ -5,7 +5,7 @@ from math import ceil, hypot
 
 import numpy as np
 
-from machine.gcode.pen import Pen, angle, number, thousandths
+from machine.gcode.pen import Pen, angle, number
 from machine.kinematics.coordinates import axis_positions, followed_places
 from mdp.mesh import Floats
 from mdp.pose import Pose
@@ -23,11 +23,12 @@ def turn(to: Pose, speed_deg_s: float, pen: Pen) -> Iterator[str]:
     elif pen.machine.coordinates == "workpiece" and (tilt_deg or turn_deg):
         yield from _followed(to, hypot(tilt_deg, turn_deg) / speed_deg_s, pen)
     else:
-        pen.feed = 0
+        pen.forget_speed()
         along = hypot(tilt_deg, turn_deg)
         share = max(abs(tilt_deg), abs(turn_deg)) / along if pen.dialect.largest_delta and along > 0 else 1.0
         yield f"{pen.dialect.travel}{_words(to, pen)}{pen.speed(speed_deg_s * share)}"
-    pen.pose, pen.feed = to, 0
+    pen.pose = to
+    pen.forget_speed()
 
 
 def _words(pose: Pose, pen: Pen) -> str:
@@ -65,9 +66,9 @@ def _followed(to: Pose, seconds: float, pen: Pen) -> Iterator[str]:
         share = k / count
         tilt_deg = begin.tilt_deg + share * (to.tilt_deg - begin.tilt_deg)
         pose = Pose(tilt_deg, begin.turn_deg + share * (to.turn_deg - begin.turn_deg)) if k < count else to
-        before = np.array([pen.x, pen.y, pen.z]) / 1000.0
-        words = pen.coordinates(*thousandths(followed_places(machine, pose, head))[0])
-        moved = float(np.linalg.norm(np.array([pen.x, pen.y, pen.z]) / 1000.0 - before))
+        before = pen.place_mm
+        words = pen.coordinates(followed_places(machine, pose, head)[0])
+        moved = float(np.linalg.norm(pen.place_mm - before))
         if pen.dialect.inverse_time:
             feed = f" F{number(60.0 * count / seconds)}"
         else:
@@ -80,5 +81,5 @@ def _followed(to: Pose, seconds: float, pen: Pen) -> Iterator[str]:
 
 def _head_mm(pen: Pen) -> Floats:
     """(1, 3) axis positions at which the head stands; the file's places are rounded, the head's own are not needed finer."""
-    row = np.array([[pen.x / 1000, pen.y / 1000, pen.z / 1000, pen.pose.tilt_deg, pen.pose.turn_deg]])
+    row = np.array([[*pen.place_mm, pen.pose.tilt_deg, pen.pose.turn_deg]])
     return axis_positions(pen.machine, row)

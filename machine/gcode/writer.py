@@ -1,11 +1,10 @@
 """Gcode: a machine program as text in the firmware's dialect; the same program gives the same bytes."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from itertools import islice
-from math import ceil
+from collections.abc import Iterable, Iterator, Sequence
+from math import ceil, isinf, isnan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from machine.firmware import dialect_of
 from machine.gcode import settings
@@ -13,16 +12,18 @@ from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
 from machine.gcode.blocks import check_blocks
 from machine.gcode.lines import Lines
 from machine.gcode.part_totals import totals_comment
-from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
+from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, Texts, Z, as_bytes
+from machine.gcode.pen import UNKNOWN, Pen, angle, number
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
 from machine.gcode.words import PAUSE_REMARK
-from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Pause, Reorient, Retract, Stroke, Travel, Wipe, rows
+from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, rows
 from machine.planning.timing import move_times
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from mdp.pose import level
+from profiles.machine import Machine
 from profiles.profile import Profile
-from slicer.paths import Kind
+from slicer.paths import KINDS, NUMBER, Kind
 from slicer.speed import travel_mm_s2
 
 ROUNDING_MM = 0.0015  # an arc's centre is written in thousandths
@@ -55,51 +56,42 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
     straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
     stop = np.zeros(len(straight.speed), dtype=np.bool_)
     times = move_times(straight.end - straight.start, straight.speed, stop, machine, straight.acceleration)
-    seconds = np.bincount(straight.move, weights=times, minlength=len(program.moves))
+    seconds = np.bincount(straight.move, weights=times, minlength=len(program))
     heat_c = profile.material.first_layer_nozzle_c
-    for index, move in enumerate(program.moves):
-        if isinstance(move, Reorient):
-            seconds[index] += machine.heating_s(_coming_c(program, index, profile) - heat_c, float(seconds[index]))
-        elif isinstance(move, BeginLayer):
-            heat_c = _nozzle_c(move, profile)
+    for k, (row, mark) in enumerate(zip(program.mark_rows.tolist(), program.marks, strict=True)):
+        if isinstance(mark, Reorient):
+            seconds[row] += machine.heating_s(_coming_c(program.marks[k:], profile) - heat_c, float(seconds[row]))
+        elif isinstance(mark, BeginLayer):
+            heat_c = _nozzle_c(mark, profile)
     elapsed: Floats = np.concatenate([[0.0], np.cumsum(seconds)])
     return elapsed, float(straight.end[:, 5].max(initial=0.0))
 
 
 def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen) -> Iterator[str]:
-    """The text in pieces, each of whole lines: strokes, which are most of it, as a kernel writes them."""
+    """The text in pieces, each of whole lines: the moves between two marks, which are most of it, as a kernel writes them."""
     total, parts = float(elapsed[-1]), _parts(program)
     coming = iter(parts)
     next_part = next(coming, None)
     last_strokes = _last_strokes(program)
     yield from _ended(settings.head(program.name, profile))
     yield from _ended(_start(profile, parts, pen))
-    for index, move in enumerate(program.moves):
-        if isinstance(move, Stroke):
-            yield from _ended(_before_stroke(move, profile, pen))
-            yield _stroke(move, profile, pen)
-            if index in last_strokes:
-                yield from _ended(_dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"]))
-        elif isinstance(move, Travel):
-            yield from _ended(_travel(move, pen))
-        elif isinstance(move, Wipe):
-            text = write_path(pen.file_coordinates(move.points_mm), -move.filament_mm, move.speed_mm_s, pen)
-            yield f";WIPE_START\n{text};WIPE_END\n"
-        elif isinstance(move, Retract):
-            pen.filament_mm -= move.filament_mm
-            yield f"G1{pen.filament()}{pen.speed(move.speed_mm_s)}\n"
-        elif isinstance(move, Reorient):
-            ahead = list(_heat_ahead(program, index, profile, pen))
-            yield from _ended((*ahead, *_reorient(move, next_part, pen)))
+    done = 0
+    for k, (row, mark) in enumerate(zip(program.mark_rows.tolist(), program.marks, strict=True)):
+        yield from _moves(program, done, row, last_strokes, profile, pen)
+        done = row + 1
+        if isinstance(mark, Reorient):
+            ahead = list(_heat_ahead(program.marks[k:], profile, pen))
+            yield from _ended((*ahead, *_reorient(mark, next_part, pen)))
             if ahead:
                 yield f"{pen.dialect.nozzle_wait.format(number(pen.nozzle_c))}\n"
-        elif isinstance(move, Pause):
-            yield from _ended(_pause(move, pen))
-        elif isinstance(move, BeginPart):
+        elif isinstance(mark, Pause):
+            yield from _ended(_pause(mark, pen))
+        elif isinstance(mark, BeginPart):
             next_part = next(coming, None)
-            yield from _ended((*_begin_part(move, len(parts), pen), *_contents(program, index)))
+            yield from _ended((*_begin_part(mark, len(parts), pen), *_contents(program, row)))
         else:
-            yield from _ended((*_begin_layer(move, profile, pen), *_progress(float(elapsed[index]), total, pen)))
+            yield from _ended((*_begin_layer(mark, profile, pen), *_progress(float(elapsed[row]), total, pen)))
+    yield from _moves(program, done, len(program), last_strokes, profile, pen)
     yield from _ended((*_end(pen), *_progress(total, total, pen), *_dialect_line(pen.dialect.last, pen)))
     yield from _ended(settings.foot(profile, filament_mm, total))
 
@@ -110,18 +102,25 @@ def _ended(lines: Iterable[str]) -> Iterator[str]:
 
 
 def _parts(program: MachineProgram) -> list[BeginPart]:
-    return [move for move in program.moves if isinstance(move, BeginPart)]
+    return [mark for mark in program.marks if isinstance(mark, BeginPart)]
+
+
+def _part_rows(program: MachineProgram) -> list[int]:
+    """Where parts begin, and the end of the last one."""
+    marks = zip(program.mark_rows.tolist(), program.marks, strict=True)
+    return [*(row for row, mark in marks if isinstance(mark, BeginPart)), len(program)]
+
+
+def _part_strokes(program: MachineProgram) -> Indices:
+    """Rows of the strokes that belong to parts: all but the purge line."""
+    return np.flatnonzero(program.is_stroke & (program.what != NUMBER[Kind.PURGE]))
 
 
 def _last_strokes(program: MachineProgram) -> set[int]:
-    """Places of the last stroke of each part."""
-    strokes, latest = set(), -1
-    for index, move in enumerate(program.moves):
-        if isinstance(move, Stroke) and move.kind is not Kind.PURGE:
-            latest = index
-        elif isinstance(move, BeginPart) and latest >= 0:
-            strokes.add(latest)
-    return strokes | {latest}
+    """Rows of the last stroke of each part."""
+    strokes = _part_strokes(program)
+    before = np.searchsorted(strokes, _part_rows(program))
+    return set(strokes[before[before > 0] - 1].tolist())
 
 
 def _block(name: str, pen: Pen, **values: object) -> list[str]:
@@ -175,24 +174,18 @@ def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
     for area in move.unsupported:
         yield f";UNSUPPORTED:{area.mm2:.2f}@{area.layer} {area.reason}"
     pen.values |= {"part": move.index, "tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "part_layers": move.layers}
-    pen.kind, pen.width_mm = None, 0.0
+    pen.kind, pen.width_mm = -1, 0.0
     pen.part += 1
 
 
-def _contents(program: MachineProgram, index: int) -> Iterator[str]:
-    """What the strokes of the part that begins with the move at `index` come to."""
-    strokes: list[Stroke] = []
-    layers: set[int] = set()
-    layer = 0
-    for move in program.moves[index + 1 :]:
-        if isinstance(move, BeginPart):
-            break
-        if isinstance(move, BeginLayer):
-            layer = move.index
-        elif isinstance(move, Stroke):
-            strokes.append(move)
-            layers.add(layer)
-    comment = totals_comment(strokes, len(layers))
+def _contents(program: MachineProgram, row: int) -> Iterator[str]:
+    """What the strokes of the part that begins at a row come to."""
+    strokes = _part_strokes(program)
+    after = next(end for end in _part_rows(program) if end > row)
+    own = strokes[(strokes > row) & (strokes < after)]
+    points = np.repeat(np.isin(np.arange(len(program)), own), np.diff(program.starts))
+    layers = np.unique(np.searchsorted(program.mark_rows, own))
+    comment = totals_comment(program.points_mm[points], float(program.filament_mm[points].sum()), len(layers))
     if comment:
         yield comment
 
@@ -204,7 +197,7 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     yield ";LAYER_CHANGE"
     yield f";Z:{number(move.z_mm)}"
     yield f";HEIGHT:{number(move.height_mm)}"
-    pen.kind = None
+    pen.kind = -1
     pen.layers += 1
     if pen.dialect.layer:
         yield pen.dialect.layer.format(pen.layers)
@@ -213,16 +206,17 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     yield from _set_fan(move.fan, pen)
 
 
-def _heat_ahead(program: MachineProgram, index: int, profile: Profile, pen: Pen) -> Iterator[str]:
-    """Before the turn at `index`, the heat of the layer after it where that is to be hotter: some of it comes in the meantime."""
-    wanted = _coming_c(program, index, profile)
+def _heat_ahead(marks: Sequence[Mark], profile: Profile, pen: Pen) -> Iterator[str]:
+    """Before the turn that is the first of the marks, the heat of the layer after it where that is to be hotter: some of it comes
+    in the meantime."""
+    wanted = _coming_c(marks, profile)
     if wanted > pen.nozzle_c:
         yield from _set_nozzle(wanted, pen)
 
 
-def _coming_c(program: MachineProgram, index: int, profile: Profile) -> float:
-    """How hot the next layer after a move is printed; 0 where none is."""
-    coming = next((move for move in islice(program.moves, index, None) if isinstance(move, BeginLayer)), None)
+def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:
+    """How hot the first layer among marks is printed; 0 where there is none."""
+    coming = next((mark for mark in marks if isinstance(mark, BeginLayer)), None)
     return 0.0 if coming is None else _nozzle_c(coming, profile)
 
 
@@ -262,73 +256,110 @@ def _progress(seconds: float, total: float, pen: Pen) -> Iterator[str]:
         yield pen.dialect.progress.format(percent, ceil((total - seconds) / 60.0 - 1e-9))
 
 
-def _before_stroke(move: Stroke, profile: Profile, pen: Pen) -> Iterator[str]:
-    """The lines of what changes before a stroke."""
-    yield from _set_fan(pen.layer_fan if move.fan is None else move.fan, pen)
-    acceleration = move.acceleration_mm_s2
-    if acceleration is not None and round(acceleration) != pen.acceleration and pen.dialect.acceleration:
-        pen.acceleration = round(acceleration)
+def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int], profile: Profile, pen: Pen) -> Iterator[str]:
+    """The text of the moves in rows first to end, among which there is no mark."""
+    if first < end and pen.known[Z] == UNKNOWN and program.what[first] == TRAVEL:
+        yield _first_travel(program, first, pen)
+        first += 1
+    if first == end:
+        return
+    begin = program.starts[first]
+    points = pen.file_coordinates(program.points_mm[begin : program.starts[end]])
+    filament_mm = program.filament_mm[begin : program.starts[end]]
+    starts, what = program.starts[first : end + 1] - begin, program.what[first:end]
+    does = np.select([what < TRAVEL, what == TRAVEL, what == WIPE], [PUSHING, TRAVELLING, PUSHING], STANDING).astype(np.int8)
+    speed, curved = program.speed[first:end], _curved(points, starts, what, profile.machine)
+    texts, done = list[str](), 0
+
+    def write(until: int) -> str:
+        ends = np.cumsum([0, *(len(as_bytes(text)) for text in texts)])
+        paths = Paths(points, filament_mm, starts[done : until + 1], does[done:until], speed[done:until])
+        return pen.paths(paths, Texts(as_bytes("".join(texts)), ends))
+
+    after = ""
+    columns = (what, program.fan[first:end], program.acceleration_mm_s2[first:end], program.width_mm[first:end])
+    for k, (number_, fan, acceleration, width_mm) in enumerate(zip(*(column.tolist() for column in columns), strict=True)):
+        before = after
+        after = ""
+        if number_ < TRAVEL:
+            before += "".join(_ended(_before_stroke(number_, fan, acceleration, width_mm, profile, pen)))
+            if first + k in last_strokes:
+                after = "".join(_ended(_dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"])))
+        elif number_ == WIPE:
+            before, after = before + ";WIPE_START\n", ";WIPE_END\n"
+        texts.append(before)
+        if k in curved:
+            yield write(k)
+            a, b = starts[k], starts[k + 1]
+            yield from _with_arcs(points[a:b], filament_mm[a + 1 : b], float(speed[k]), profile.machine.arc_tolerance_mm, pen)
+            texts, done = [], k + 1
+    texts.append(after)
+    yield write(end - first)
+
+
+def _before_stroke(
+    kind: int, fan: float, acceleration_mm_s2: float, width_mm: float, profile: Profile, pen: Pen
+) -> Iterator[str]:
+    """The lines of what changes before a stroke; fan: NaN for the layer's; acceleration: inf where the axes decide."""
+    yield from _set_fan(pen.layer_fan if isnan(fan) else fan, pen)
+    if not isinf(acceleration_mm_s2) and round(acceleration_mm_s2) != pen.acceleration and pen.dialect.acceleration:
+        pen.acceleration = round(acceleration_mm_s2)
         yield pen.dialect.acceleration.format(pen.acceleration, round(travel_mm_s2(profile) or pen.acceleration))
-    if move.kind is not pen.kind:
-        pen.kind = move.kind
-        yield f";TYPE:{move.kind.value}"
-    if move.width_mm != pen.width_mm:
-        pen.width_mm = move.width_mm
-        yield f";WIDTH:{number(move.width_mm)}"
+    if kind != pen.kind:
+        pen.kind = kind
+        yield f";TYPE:{KINDS[kind].value}"
+    if width_mm != pen.width_mm:
+        pen.width_mm = width_mm
+        yield f";WIDTH:{number(width_mm)}"
 
 
-def _stroke(move: Stroke, profile: Profile, pen: Pen) -> str:
-    """The text of a stroke."""
-    machine, points = profile.machine, pen.file_coordinates(move.points_mm)
-    if machine.arcs and len(points) > FEWEST_CHORDS and np.ptp(points[:, 2]) < 1e-9:
-        return "".join(_with_arcs(replace(move, points_mm=points), machine.arc_tolerance_mm, pen))
-    return write_path(points, move.filament_mm, move.speed_mm_s, pen)
+def _first_travel(program: MachineProgram, row: int, pen: Pen) -> str:
+    """Of the first travel after the start block only Z, so that the tip rises before it crosses."""
+    point = pen.file_coordinates(program.points_mm[program.starts[row] : program.starts[row] + 1])
+    pen.known[Z] = round(float(point[0, 2]) * 1000.0)
+    return f"{pen.dialect.travel} Z{pen.known[Z] / 1000:.3f}{pen.speed(float(program.speed[row]))}\n"
 
 
-def _with_arcs(move: Stroke, tolerance_mm: float, pen: Pen) -> Iterator[str]:
-    """A stroke in one plane with arcs where they keep to it."""
-    flat = np.rint(move.points_mm[:, :2] * 1000.0) / 1000.0
-    runs, arcs = fit_arcs(flat, move.filament_mm, tolerance_mm - ROUNDING_MM)
+def _curved(points_mm: Floats, starts: Indices, what: NDArray[np.int8], machine: Machine) -> set[int]:
+    """Which of the moves are strokes in one plane with enough points for arcs."""
+    if not machine.arcs:
+        return set()
+    many = np.flatnonzero((what < TRAVEL) & (np.diff(starts) > FEWEST_CHORDS)).tolist()
+    return {k for k in many if np.ptp(points_mm[starts[k] : starts[k + 1], 2]) < 1e-9}
+
+
+def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, tolerance_mm: float, pen: Pen) -> Iterator[str]:
+    """A stroke (n, 3) in one plane with arcs where they keep to it; filament_mm: (n - 1,)."""
+    flat = np.rint(points_mm[:, :2] * 1000.0) / 1000.0
+    runs, arcs = fit_arcs(flat, filament_mm, tolerance_mm - ROUNDING_MM)
     done = 0
     for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
         if first > done:
-            yield write_path(move.points_mm[done : first + 1], move.filament_mm[done:first], move.speed_mm_s, pen)
-        word = "G2" if clockwise > 0 else "G3"
-        yield f"{word}{_arc(move, (first, last), (x - flat[first, 0], y - flat[first, 1]), pen)}\n"
+            yield _straight(points_mm[done : first + 1], filament_mm[done:first], speed_mm_s, pen)
+        pushed = pen.filament(float(filament_mm[first:last].sum()))
+        pen.known[:Z] = np.rint(points_mm[last, :2] * 1000.0).astype(np.int64)
+        end, centre = pen.place_mm, (x - flat[first, 0], y - flat[first, 1])
+        words = f" X{end[0]:.3f} Y{end[1]:.3f} I{centre[0]:.3f} J{centre[1]:.3f}{pushed}{pen.speed(speed_mm_s)}"
+        yield f"{'G2' if clockwise > 0 else 'G3'}{words}\n"
         done = last
     if done < len(flat) - 1:
-        yield write_path(move.points_mm[done:], move.filament_mm[done:], move.speed_mm_s, pen)
+        yield _straight(points_mm[done:], filament_mm[done:], speed_mm_s, pen)
 
 
-def _arc(move: Stroke, run: tuple[int, int], centre: tuple[float, float], pen: Pen) -> str:
-    """The words of an arc. run: its first and last point; centre: seen from its beginning."""
-    first, last = run
-    pen.filament_mm += float(move.filament_mm[first:last].sum())
-    ((pen.x, pen.y),) = thousandths(move.points_mm[last : last + 1, :2])
-    words = f" X{pen.x / 1000:.3f} Y{pen.y / 1000:.3f} I{centre[0]:.3f} J{centre[1]:.3f}"
-    return f"{words}{pen.filament()}{pen.speed(move.speed_mm_s)}"
-
-
-def _travel(move: Travel, pen: Pen) -> Iterator[str]:
-    """One line a point; of the first travel after the start block only Z, so that the tip rises before it crosses."""
-    points = thousandths(pen.file_coordinates(move.points_mm))
-    if pen.z == UNKNOWN:
-        pen.z = points[0][2]
-        yield f"{pen.dialect.travel} Z{pen.z / 1000:.3f}{pen.speed(move.speed_mm_s)}"
-        return
-    for x, y, z in points[1:]:
-        words = pen.coordinates(x, y, z)
-        if words:
-            yield f"{pen.dialect.travel}{words}{pen.speed(move.speed_mm_s)}"
+def _straight(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> str:
+    """A single path of straight moves."""
+    starts, does = np.array([0, len(points_mm)]), np.array([PUSHING], dtype=np.int8)
+    paths = Paths(np.ascontiguousarray(points_mm), np.append(0.0, filament_mm), starts, does, np.array([speed_mm_s]))
+    return pen.paths(paths, Texts(as_bytes(""), np.zeros(3, dtype=np.int64)))
 
 
 def _reorient(move: Reorient, next_part: BeginPart | None, pen: Pen) -> Iterator[str]:
     """The blocks around a turn of the table, and the turn."""
     yield ";TYPE:Custom"
-    pen.kind = None
+    pen.kind = -1
     if pen.turned and next_part is not None:
         yield from _block("after_part", pen)
-    values: dict[str, object] = {"tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "z_mm": pen.z / 1000}
+    values: dict[str, object] = {"tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "z_mm": float(pen.place_mm[2])}
     if next_part is not None:
         values |= {"part": next_part.index, "part_layers": next_part.layers}
     yield from _block("before_part", pen, **values)

@@ -26,12 +26,14 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
     for part, piece in printed:
         turn, shift = frame_change(part, limb)
         for layer in piece.layers:
-            for path in layer.paths:
-                points = np.column_stack([path.points, layer.z_mm + path.z_mm]) @ turn.T + shift
-                if points[:, 2].max() > path.width_mm:
-                    points = _resampled(points)
-                    tops.append(points[points[:, 2] > path.width_mm])
-                    widest_mm = max(widest_mm, path.width_mm)
+            placed = np.column_stack([layer.points, layer.points_z_mm]) @ turn.T + shift
+            for a, b, width_mm in zip(
+                layer.starts[:-1].tolist(), layer.starts[1:].tolist(), layer.width_mm.tolist(), strict=True
+            ):
+                if placed[a:b, 2].max() > width_mm:
+                    points = _resampled(placed[a:b])
+                    tops.append(points[points[:, 2] > width_mm])
+                    widest_mm = max(widest_mm, width_mm)
     slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of way and of bead, half a cell's diagonal
     return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Rows
+from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from profiles.errors import MoveError
 from profiles.frozen import Limits
 from profiles.machine import Machine
@@ -42,8 +43,9 @@ def check(program: MachineProgram, rows: Rows, machine: Machine) -> None:
 
 def location(program: MachineProgram, index: int) -> str:
     """Where a move stands in the print: "part 2, layer 14", or how it gets there."""
-    part = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginPart)), None)
-    layer = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginLayer)), None)
+    before = program.marks[: int(np.searchsorted(program.mark_rows, index, side="right"))]
+    part = next((mark for mark in reversed(before) if isinstance(mark, BeginPart)), None)
+    layer = next((mark for mark in reversed(before) if isinstance(mark, BeginLayer)), None)
     if part is None:
         return "before the first part"
     if layer is None or layer.part != part.index:
@@ -51,26 +53,33 @@ def location(program: MachineProgram, index: int) -> str:
     return f"part {part.index}, layer {layer.index}"
 
 
+def travel_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, machine: Machine) -> Floats:
+    """(k,) speeds lowered to what X, Y and Z allow along paths one after the other; points_mm: (n, 3); starts: (k + 1,)."""
+    most = np.array([machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s])
+    lowered: Floats = np.minimum(speeds_mm_s, np.where(speeds_mm_s <= most.min(), np.inf, _fastest(points_mm, starts, most)))
+    return lowered
+
+
 def travel_speed(points_mm: Floats, speed_mm_s: float, machine: Machine) -> float:
     """The speed along (n, 3) machine points lowered to what X, Y and Z allow."""
-    x, y, z = machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s
-    return speed_mm_s if speed_mm_s <= min(x, y, z) else float(min(speed_mm_s, _fastest(points_mm, np.array([x, y, z]))))
+    return float(travel_speeds(points_mm, np.array([0, len(points_mm)]), np.array([speed_mm_s]), machine)[0])
 
 
 @kernel
-def _fastest(points_mm: Floats, most_mm_s: Floats) -> float:
-    """The greatest speed along (n, 3) points at which no axis is faster than its most."""
-    fastest = np.inf
-    for k in range(len(points_mm) - 1):
-        squared = 0.0
-        for axis in range(3):
-            squared += (points_mm[k + 1, axis] - points_mm[k, axis]) ** 2
-        length = np.sqrt(squared)
-        for axis in range(3):
-            step = abs(points_mm[k + 1, axis] - points_mm[k, axis])
-            if length > 1e-9 and step > 0.0:
-                fastest = min(fastest, most_mm_s[axis] / (step / length))
-    return fastest
+def _fastest(points_mm: Floats, starts: Indices, most_mm_s: Floats) -> Floats:
+    """(k,) the greatest speed along each path at which no axis is faster than its most."""
+    out: Floats = floats(len(starts) - 1, np.inf)
+    for path in range(len(out)):
+        for k in range(starts[path], starts[path + 1] - 1):
+            squared = 0.0
+            for axis in range(3):
+                squared += (points_mm[k + 1, axis] - points_mm[k, axis]) ** 2
+            length = np.sqrt(squared)
+            for axis in range(3):
+                step = abs(points_mm[k + 1, axis] - points_mm[k, axis])
+                if length > 1e-9 and step > 0.0:
+                    out[path] = min(out[path], most_mm_s[axis] / (step / length))
+    return out
 
 
 def turn_speed(tilt_deg: float, turn_deg: float, machine: Machine) -> float:

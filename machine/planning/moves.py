@@ -1,5 +1,6 @@
 """Moves: the machine program between the slicer and the G-code text, in machine coordinates, and its straight moves as arrays."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf
 
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
 from mdp.pose import Pose
-from slicer.paths import Kind, Unsupported
+from slicer.paths import KINDS, NUMBER, Kind, Unsupported
 
 
 @dataclass(frozen=True)
@@ -97,73 +99,156 @@ class Pause:
     change: bool
 
 
-Move = BeginPart | BeginLayer | Pause | Stroke | Travel | Wipe | Retract | Reorient
+Mark = BeginPart | BeginLayer | Pause | Reorient
+Move = Mark | Stroke | Travel | Wipe | Retract
+TRAVEL, WIPE, RETRACT, REORIENT, MARK = range(len(KINDS), len(KINDS) + 5)  # behind the numbers of strokes, those of KINDS
 
 
 @dataclass(frozen=True, eq=False)
 class MachineProgram:
-    """All moves of a print in order, and the model's name for the file's head."""
+    """All moves of a print in order, one row each, and the model's name for the file's head.
+
+    points_mm: (n, 3) machine coordinates; starts: (m + 1,) where the points of each move begin; filament_mm: (n,) pushed on the
+    way to each point, 0 at the first one of a path. A retraction and a turn of the table have one point, where the tip stands;
+    other marks have none. Columns, (m,) each: what: index in KINDS of a stroke, else one of TRAVEL ... MARK; speed: mm/s, deg/s
+    of turns; width_mm, fan: NaN where a move has none; acceleration_mm_s2: inf where the axes decide. marks: the values of the
+    rows that are turns and marks, in order.
+    """
 
     name: str
-    moves: tuple[Move, ...]
+    points_mm: Floats
+    starts: Indices
+    filament_mm: Floats
+    what: NDArray[np.int8]
+    speed: Floats
+    width_mm: Floats
+    fan: Floats
+    acceleration_mm_s2: Floats
+    marks: tuple[Mark, ...]
+
+    @classmethod
+    def of(cls, name: str, moves: Iterable[Move]) -> "MachineProgram":
+        """The table of moves."""
+        points: list[Floats] = [np.zeros((0, 3))]
+        filament: list[Floats] = [np.zeros(0)]
+        counts: list[int] = []
+        rows: list[tuple[int, float, float | None, float | None, float | None]] = []
+        marks: list[Mark] = []
+        tip, still = np.zeros((1, 3)), np.zeros(1)
+        for move in moves:
+            pushed: tuple[Floats, ...]
+            if isinstance(move, Stroke):
+                way, pushed = move.points_mm, (still, move.filament_mm)
+                rows.append((NUMBER[move.kind], move.speed_mm_s, move.width_mm, move.fan, move.acceleration_mm_s2))
+            elif isinstance(move, Travel):
+                way, pushed = move.points_mm, (np.zeros(len(move.points_mm)),)
+                rows.append((TRAVEL, move.speed_mm_s, None, None, move.acceleration_mm_s2))
+            elif isinstance(move, Wipe):
+                way, pushed = move.points_mm, (still, -move.filament_mm)
+                rows.append((WIPE, move.speed_mm_s, None, None, None))
+            elif isinstance(move, Retract):
+                way, pushed = tip, (np.array([-move.filament_mm]),)
+                rows.append((RETRACT, move.speed_mm_s, None, None, None))
+            elif isinstance(move, Reorient):
+                way, pushed = tip, (still,)
+                rows.append((REORIENT, move.speed_deg_s, None, None, None))
+                marks.append(move)
+            else:
+                way, pushed = tip[:0], ()
+                rows.append((MARK, 0.0, None, None, None))
+                marks.append(move)
+            points.append(way)
+            filament.extend(pushed)
+            counts.append(len(way))
+            tip = way[-1:] if len(way) else tip
+        what, speed, width_mm, fan, acceleration = zip(*rows, strict=True) if rows else ((),) * 5
+        return cls(
+            name=name,
+            points_mm=np.concatenate(points),
+            starts=np.cumsum([0, *counts]),
+            filament_mm=np.concatenate(filament),
+            what=np.array(what, dtype=np.int8),
+            speed=np.array(speed, dtype=np.float64),
+            width_mm=np.array(width_mm, dtype=np.float64),
+            fan=np.array(fan, dtype=np.float64),
+            acceleration_mm_s2=np.array([inf if value is None else value for value in acceleration]),
+            marks=tuple(marks),
+        )
+
+    def __len__(self) -> int:
+        return len(self.what)
+
+    @property
+    def is_stroke(self) -> Mask:
+        """(m,) which moves are strokes."""
+        return self.what < len(KINDS)
+
+    @property
+    def mark_rows(self) -> Indices:
+        """Where the marks stand among the moves."""
+        return np.flatnonzero(self.what >= REORIENT)
+
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """The rows one by one."""
+        return tuple(self._each())
+
+    def _each(self) -> Iterator[Move]:
+        marks = iter(self.marks)
+        for k, what in enumerate(self.what.tolist()):
+            points, speed = self.points_mm[self.starts[k] : self.starts[k + 1]], float(self.speed[k])
+            filament_mm = self.filament_mm[self.starts[k] + 1 : self.starts[k + 1]]
+            acceleration = None if np.isinf(self.acceleration_mm_s2[k]) else float(self.acceleration_mm_s2[k])
+            if what < len(KINDS):
+                fan = None if np.isnan(self.fan[k]) else float(self.fan[k])
+                yield Stroke(KINDS[what], points, filament_mm, speed, float(self.width_mm[k]), fan, acceleration)
+            elif what == TRAVEL:
+                yield Travel(points, speed, acceleration)
+            elif what == WIPE:
+                yield Wipe(points, -filament_mm, speed)
+            elif what == RETRACT:
+                yield Retract(-float(self.filament_mm[self.starts[k]]), speed)
+            else:
+                yield next(marks)
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
     """start, end: (n, 6) X Y Z tilt turn E of each straight move (mm, deg, mm); speed: (n,) mm/s, deg/s for pure turns.
 
-    move: (n,) place in program.moves of the Move a row belongs to. acceleration: (n,) mm/s2, inf where the axes decide.
+    move: (n,) the row of the program that it belongs to. acceleration: (n,) mm/s2, inf where the axes decide.
     """
 
     start: Floats
     end: Floats
     speed: Floats
-    move: NDArray[np.int64]
+    move: Indices
     acceleration: Floats
 
 
 def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
     """All straight moves of a program that begins with the table at (tilt_deg, turn_deg)."""
-    ways: list[Floats] = []
-    pushed: list[Floats] = []
-    speeds: list[float] = []
-    indices: list[int] = []
-    accelerations: list[float] = []
-    tables = [(tilt_deg, turn_deg)]  # before each move, and after the last one
-    tip = np.zeros(3)
-    for index, move in enumerate(program.moves):
-        table, acceleration = tables[-1], None
-        if isinstance(move, Stroke):
-            way, filament, acceleration = move.points_mm, move.filament_mm, move.acceleration_mm_s2
-        elif isinstance(move, Travel):
-            way, filament, acceleration = move.points_mm, np.zeros(len(move.points_mm) - 1), move.acceleration_mm_s2
-        elif isinstance(move, Wipe):
-            way, filament = move.points_mm, -move.filament_mm
-        elif isinstance(move, Retract):
-            way, filament = np.array([tip, tip]), np.array([-move.filament_mm])
-        elif isinstance(move, Reorient):
-            way, filament, table = np.array([tip, tip]), np.zeros(1), (move.pose.tilt_deg, move.pose.turn_deg)
-        else:
-            continue
-        tip = way[-1]
-        ways.append(way)
-        pushed.append(filament)
-        speeds.append(move.speed_deg_s if isinstance(move, Reorient) else move.speed_mm_s)
-        indices.append(index)
-        accelerations.append(inf if acceleration is None else acceleration)
-        tables.append(table)
-    if not ways:
-        return Rows(np.zeros((0, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0))
-    counts = np.array([len(filament) for filament in pushed])
-    places, angles = np.concatenate(ways), np.array(tables)
-    first = np.arange(counts.sum()) + np.repeat(np.arange(len(counts)), counts)  # a way has a point more than rows
-    sums = _sums(np.concatenate(pushed), counts)
+    counts = np.diff(program.starts)
+    move = np.repeat(np.arange(len(program)), counts)
+    ends = np.ones(len(move), np.bool_)
+    ends[program.starts[:-1][(counts > 0) & (program.what <= WIPE)]] = False  # a path has a point more than steps
+    at = np.flatnonzero(ends)
+    stands = program.what[move[at]] > WIPE
+    places = program.points_mm[np.where(stands, at, at - 1)]
+    angles = [
+        (tilt_deg, turn_deg),
+        *((mark.pose.tilt_deg, mark.pose.turn_deg) for mark in program.marks if isinstance(mark, Reorient)),
+    ]
+    turns = np.cumsum(program.what == REORIENT)[move[at]]
+    before = turns - (program.what[move[at]] == REORIENT)
+    table = np.array(angles)
+    sums = _sums(program.filament_mm[at], np.bincount(move[at], minlength=len(program)))
     return Rows(
-        np.column_stack([places[first], np.repeat(angles[:-1], counts, axis=0), sums[:-1]]),
-        np.column_stack([places[first + 1], np.repeat(angles[1:], counts, axis=0), sums[1:]]),
-        np.repeat(speeds, counts),
-        np.repeat(np.array(indices, dtype=np.int64), counts),
-        np.repeat(accelerations, counts),
+        np.column_stack([places, table[before], sums[:-1]]),
+        np.column_stack([program.points_mm[at], table[turns], sums[1:]]),
+        program.speed[move[at]],
+        move[at],
+        program.acceleration_mm_s2[move[at]],
     )
 
 

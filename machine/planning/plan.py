@@ -1,7 +1,7 @@
 """Plan: sliced parts in order become one program of strokes, travels and reorientations in machine coordinates."""
 
 from collections.abc import Iterator, Sequence
-from math import inf, pi
+from math import isnan, pi
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.profile import Profile
-from slicer.paths import Kind, Layer, Path, SlicedPart, bead_area_mm2
+from slicer.paths import KINDS, Kind, Layer, Path, SlicedPart, bead_area_mm2
 from slicer.speed import stroke_accelerations
 from slicer.travel.wiping import wipe_trail
 
@@ -37,7 +37,7 @@ def plan(
     axis limits, or no safe place for the head while the table turns.
     """
     parts = {part.index: part for part in decomposition.parts}
-    pieces = [piece for piece in sliced if any(layer.paths for layer in piece.layers)]
+    pieces = [piece for piece in sliced if any(len(layer) for layer in piece.layers)]
     machine = profile.machine
     tip = Tip(np.zeros(3), level(machine))
     moves: list[Move] = []
@@ -63,7 +63,7 @@ def plan(
         for number, layer in enumerate(piece.layers, start=1):
             if (part.index, number) in stopped:
                 moves += _stop(tip, Pause(part.index, number, stopped[part.index, number]), profile, standing)
-            if layer.paths:
+            if len(layer):
                 begin_layer = BeginLayer(part.index, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
                 moves += [begin_layer, *_layer(tip, layer, shift, profile, on_plate=part.index == number == 1)]
         printed.append(_printed(piece, part, shift, profile))
@@ -71,7 +71,7 @@ def plan(
     if pieces:
         earlier = join_hulls(printed)
         moves += _finish(tip, pieces[-1].index, earlier, profile, earlier if has_limbs else None)
-    program = MachineProgram(decomposition.name, tuple(moves))
+    program = MachineProgram.of(decomposition.name, moves)
     limits.check(program, rows(program, machine.tilt.zero_deg, machine.turn.zero_deg), machine)
     return program
 
@@ -103,7 +103,8 @@ def _purge(tip: Tip, lanes: Floats, profile: Profile) -> Iterator[Move]:
     path = Path(
         Kind.PURGE, lanes[:, :2], width_mm, process.first_layer_speed_mm_s, profile.material.flow, np.zeros((0, 2)), False
     )
-    yield _stroke(path, process.first_layer_height_mm, lanes, profile, stroke_accelerations(profile, True))
+    line = Layer.of(0.0, process.first_layer_height_mm, [path], 0.0)
+    yield from _strokes(line, lanes, profile, stroke_accelerations(profile, True))
     tip.at_mm, tip.trail = lanes[-1], wipe_trail(lanes, width_mm)
 
 
@@ -154,17 +155,39 @@ def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
 
 
 def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate: bool) -> Iterator[Move]:
-    accelerations = stroke_accelerations(profile, on_plate)
-    z = layer.z_mm + float(shift[2])
-    for path, next_path in zip(layer.paths, [*layer.paths[1:], None], strict=True):
-        points = np.column_stack([path.points + shift[:2], z + path.z_mm])
-        yield from to_path(tip, path, points[0], shift, profile)
+    points = np.column_stack([layer.points, layer.points_z_mm]) + shift
+    starts, approach, passed = layer.starts.tolist(), layer.approach + shift[:2], layer.approach_starts.tolist()
+    strokes = _strokes(layer, points, profile, stroke_accelerations(profile, on_plate))
+    for k, (stroke, retracts) in enumerate(zip(strokes, layer.retract.tolist(), strict=True)):
+        yield from to_path(tip, stroke.points_mm[0], approach[passed[k] : passed[k + 1]], retracts, shift, profile)
         yield from prime(tip, profile)
-        coast = profile.material.coast_mm if next_path is not None and next_path.retract else 0.0
-        stroke = _stroke(path, layer.height_mm, points, profile, accelerations, coast_mm=coast)
-        yield run_in(stroke, layer, tip, profile)
-        tip.printed.append((points, path, shift))
-        tip.at_mm = points[-1]
+        yield run_in(stroke, layer, tip, profile) if tip.run_in_mm > 0.0 else stroke
+        tip.printed.append((points[starts[k] : starts[k + 1]], layer, k, shift))
+        tip.at_mm = stroke.points_mm[-1]
+
+
+def _strokes(layer: Layer, points: Floats, profile: Profile, accelerations: dict[Kind, float] | None) -> Iterator[Stroke]:
+    """The strokes of a layer whose points are at (n, 3) machine coordinates.
+
+    Filament by volume (a stroke's flow holds the material's); the speed lowered to what axes, extruder and hot end can do.
+    """
+    machine, material = profile.machine, profile.material
+    filament_mm2 = pi * material.diameter_mm**2 / 4.0
+    area_mm2 = bead_area_mm2(layer.width_mm, layer.height_mm) * layer.flow
+    with np.errstate(divide="ignore"):
+        fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s * filament_mm2) / np.maximum(area_mm2, 0.0)
+    speeds = limits.travel_speeds(points, layer.starts, np.minimum(layer.speed_mm_s, fastest), machine)
+    steps = np.diff(layer.points, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    filament_mm = lengths * np.repeat(area_mm2, np.diff(layer.starts))[1:] / filament_mm2
+    coasts = np.append(layer.retract[1:], False) & (material.coast_mm > 0.0)
+    starts, columns = layer.starts.tolist(), (layer.kind, speeds, layer.width_mm, layer.own_fan, coasts)
+    for k, (number, speed, width_mm, fan, coast) in enumerate(zip(*(column.tolist() for column in columns), strict=True)):
+        kind, way, pushed = KINDS[number], points[starts[k] : starts[k + 1]], filament_mm[starts[k] : starts[k + 1] - 1]
+        if coast:
+            way, pushed = _coasted(way, lengths[starts[k] : starts[k + 1] - 1], pushed, material.coast_mm)
+        acceleration = None if accelerations is None else accelerations[kind]
+        yield Stroke(kind, way, pushed, speed, width_mm, None if isnan(fan) else fan, acceleration)
 
 
 def _stop(tip: Tip, pause: Pause, profile: Profile, standing: Printed | None) -> Iterator[Move]:
@@ -181,39 +204,18 @@ def _stop(tip: Tip, pause: Pause, profile: Profile, standing: Printed | None) ->
     yield pause
 
 
-def _stroke(
-    path: Path,
-    height_mm: float,
-    points: Floats,
-    profile: Profile,
-    accelerations: dict[Kind, float] | None,
-    *,
-    coast_mm: float = 0.0,
-) -> Stroke:
-    """Filament by volume (the path's flow holds the material's); the speed lowered to what axes, extruder and hot end can do."""
-    machine, material = profile.machine, profile.material
-    area = bead_area_mm2(path.width_mm, height_mm) * path.flow
-    filament_area = pi * material.diameter_mm**2 / 4.0
-    length = np.hypot(*np.diff(path.points, axis=0).T)
-    pushing = length
-    if 0.0 < coast_mm < MOST_COASTED * float(length.sum()):
-        points, length, pushing = _coasted(points, length, coast_mm)
-    fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s * filament_area) / area if area > 0 else inf
-    speed = limits.travel_speed(points, min(path.speed_mm_s, fastest), machine)
-    acceleration = None if accelerations is None else accelerations[path.kind]
-    return Stroke(path.kind, points, pushing * area / filament_area, speed, path.width_mm, path.fan, acceleration)
-
-
-def _coasted(points: Floats, length: Floats, coast_mm: float) -> tuple[Floats, Floats, Floats]:
-    """Points, lengths and pushed lengths of a stroke whose last coast_mm push nothing; a step is cut where that begins."""
-    done = np.cumsum(length)
+def _coasted(points: Floats, lengths: Floats, filament_mm: Floats, coast_mm: float) -> tuple[Floats, Floats]:
+    """Points and filament of a stroke whose last coast_mm push nothing; a step is cut where that begins."""
+    done = np.cumsum(lengths)
+    if coast_mm >= MOST_COASTED * float(done[-1]):
+        return points, filament_mm
     until = float(done[-1]) - coast_mm
     k = int(np.searchsorted(done, until))
-    share = 1.0 - (done[k] - until) / length[k] if length[k] > 0.0 else 1.0
+    share = 1.0 - (done[k] - until) / lengths[k] if lengths[k] > 0.0 else 1.0
     points = np.insert(points, k + 1, points[k] + share * (points[k + 1] - points[k]), axis=0)
-    length = np.insert(length, k, share * length[k])
-    length[k + 1] *= 1.0 - share
-    return points, length, np.where(np.arange(len(length)) <= k, length, 0.0)
+    pushed = np.insert(filament_mm, k, share * filament_mm[k])
+    pushed[k + 1 :] = 0.0
+    return points, pushed
 
 
 def _finish(tip: Tip, part: int, printed: Printed, profile: Profile, standing: Printed | None) -> Iterator[Move]:
@@ -237,15 +239,14 @@ def _finish(tip: Tip, part: int, printed: Printed, profile: Profile, standing: P
 
 
 def _first_point(piece: SlicedPart) -> Floats:
-    """(3,) part frame: where the first path begins."""
-    layer = next(layer for layer in piece.layers if layer.paths)
-    return np.array([*layer.paths[0].points[0], layer.z_mm])
+    """(3,) part frame: where the first stroke begins."""
+    layer = next(layer for layer in piece.layers if len(layer))
+    return np.array([*layer.points[0], layer.z_mm])
 
 
 def _printed(piece: SlicedPart, part: Part, shift: Floats, profile: Profile) -> Printed:
     """What a finished part covers, in the workpiece frame."""
-    points = [
-        np.column_stack([path.points, np.full(len(path.points), layer.z_mm)]) for layer in piece.layers for path in layer.paths
-    ]
-    widest = max(path.width_mm for layer in piece.layers for path in layer.paths)
-    return hull(workpiece_points(profile.machine, part.pose, np.vstack(points) + shift), 0.5 * widest)
+    points = np.concatenate([layer.points for layer in piece.layers])
+    z_mm = np.repeat([layer.z_mm for layer in piece.layers], [len(layer.points) for layer in piece.layers])
+    widest = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
+    return hull(workpiece_points(profile.machine, part.pose, np.column_stack([points, z_mm]) + shift), 0.5 * widest)

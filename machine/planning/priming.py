@@ -24,7 +24,7 @@ def run_in(stroke: Stroke, layer: Layer, tip: Tip, profile: Profile) -> Stroke:
 
     A stroke that is seen takes it only in a layer that has no other.
     """
-    if tip.run_in_mm <= 0.0 or (stroke.kind in SEEN and any(path.kind not in SEEN for path in layer.paths)):
+    if tip.run_in_mm <= 0.0 or (stroke.kind in SEEN and not layer.is_of(*SEEN).all()):
         return stroke
     length = np.linalg.norm(np.diff(stroke.points_mm, axis=0), axis=1)
     run = np.where(np.cumsum(length) - length < RUN_MM, length, 0.0)

@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 
 from machine.kinematics.table import machine_points, part_shift, workpiece_points
-from machine.planning.moves import MachineProgram, Stroke
+from machine.planning.moves import MachineProgram
 from machine.planning.reorient import is_way_clear
 from mdp.decomposition import Part
 from mdp.mesh import Floats
@@ -15,7 +15,7 @@ from mdp.overhang import Mask
 from mdp.pose import level
 from profiles.machine import Machine
 from profiles.profile import Profile
-from slicer.paths import Kind, SlicedPart
+from slicer.paths import NUMBER, Kind, SlicedPart
 
 WIDTH = 2.0  # of the line, in nozzles: a fat bead fills the nozzle soon and is peeled off whole
 EDGE_MM, GAP_MM = 1.0, 3.0  # kept to the plate's edge and to what is printed near the plate
@@ -51,7 +51,7 @@ def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Pr
 
 def has_purge(program: MachineProgram) -> bool:
     """Whether a program prints the line."""
-    return any(isinstance(move, Stroke) and move.kind is Kind.PURGE for move in program.moves)
+    return bool((program.what == NUMBER[Kind.PURGE]).any())
 
 
 def _low_strokes(parts: Sequence[Part], sliced: Sequence[SlicedPart], machine: Machine) -> Floats:
@@ -68,12 +68,13 @@ def _low_strokes(parts: Sequence[Part], sliced: Sequence[SlicedPart], machine: M
 
 def _all_points(piece: SlicedPart) -> tuple[Floats, Mask]:
     """(n, 3) points of all paths in the part's frame, one path after the other, and (n,) which of them end a path."""
-    paths = [(path.points, layer.z_mm) for layer in piece.layers for path in layer.paths]
-    counts = np.array([len(points) for points, _ in paths], dtype=np.int64)
-    ends = np.zeros(int(counts.sum()), np.bool_)
+    counts = np.concatenate([np.diff(layer.starts) for layer in piece.layers])
+    flat = np.concatenate([layer.points for layer in piece.layers])
+    ends = np.zeros(len(flat), np.bool_)
     ends[np.cumsum(counts) - 1] = True
-    flat = np.concatenate([np.zeros((0, 2)), *(points for points, _ in paths)])
-    return np.column_stack([flat, np.repeat([z_mm for _, z_mm in paths], counts)]), ends
+    return np.column_stack(
+        [flat, np.repeat([layer.z_mm for layer in piece.layers], [len(layer.points) for layer in piece.layers])]
+    ), ends
 
 
 def _lanes(machine: Machine, outward: Floats, count: int, length_mm: float, width_mm: float) -> Floats | None:

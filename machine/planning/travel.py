@@ -14,8 +14,8 @@ from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import MoveError
 from profiles.profile import Profile
-from slicer.bead import length_mm
-from slicer.paths import Path
+from slicer.geometry.polyline import length_mm
+from slicer.paths import Layer, Path
 from slicer.speed import travel_mm_s2
 from slicer.travel.wiping import STANDING_MM, first_length, runs_round, wipe_trail
 
@@ -26,9 +26,9 @@ TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter
 class Tip:
     """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back.
 
-    trail: (n, 3) a way that a wipe may go over; printed: strokes (n, 3) after it, their paths and shifts from the part frame,
-    none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond their own. limb: while a
-    limb is printed, its part number and what stands beside it.
+    trail: (n, 3) a way that a wipe may go over; printed: strokes (n, 3) after it, each with its layer, its row there and the
+    shift from the part frame, none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond
+    their own. limb: while a limb is printed, its part number and what stands beside it.
     """
 
     at_mm: Floats
@@ -37,7 +37,7 @@ class Tip:
     prime_extra_mm: float = 0.0
     run_in_mm: float = 0.0
     trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    printed: list[tuple[Floats, Path, Floats]] = field(default_factory=list)
+    printed: list[tuple[Floats, Layer, int, Floats]] = field(default_factory=list)
     limb: tuple[int, Standing] | None = None
 
     def forget(self) -> None:
@@ -47,33 +47,36 @@ class Tip:
 
     def way_back(self, wipe_mm: float) -> Floats:
         """The way (n, 3) that a wipe may go from here, that long where there is as much."""
-        begin = next((k for k in range(len(self.printed) - 1, -1, -1) if _suffices(*self.printed[k][:2], wipe_mm)), 0)
-        trail = self.trail
-        for points, path, shift in self.printed[begin:]:
+        trail, since = self.trail, list[tuple[Floats, Path, Floats]]()
+        for points, layer, k, shift in reversed(self.printed):
+            since.append((points, layer.path(k), shift))
+            if _suffices(*since[-1][:2], wipe_mm):
+                break
+        for points, path, shift in reversed(since):
             trail = trail_after(points, path, trail, shift, wipe_mm)
         return trail
 
 
-def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile) -> Iterator[Move]:
-    """To a path's start: up to the layer first, then along the approach; or pulled back and lifted, straight.
+def to_path(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats, profile: Profile) -> Iterator[Move]:
+    """To a stroke's start: up to the layer first, then along the approach (k, 2); or pulled back and lifted, straight.
 
     Within a limb the filament is pulled back and the tip lifted wherever the head would meet what stands beside the limb.
     """
     if dist(start.tolist(), tip.at_mm.tolist()) <= STANDING_MM:
         return
-    if path.retract:
+    if retracts:
         yield from retract(tip, profile)
-    lift = profile.process.lift_mm if path.retract else 0.0
+    lift = profile.process.lift_mm if retracts else 0.0
     over = max(float(start[2]), min(float(start[2]) + lift, profile.machine.z.limits_mm[1]))
     if tip.limb is not None:
-        clear = _over_standing(tip, path, start, shift, over, profile)
-        if clear > over and not path.retract:
+        clear = _over_standing(tip, approach, start, shift, over, profile)
+        if clear > over and not retracts:
             yield from retract(tip, profile)  # a wipe moves the tip
-            clear = _over_standing(tip, path, start, shift, over, profile)
+            clear = _over_standing(tip, approach, start, shift, over, profile)
         over = clear
     if abs(over - float(tip.at_mm[2])) > STANDING_MM:
         yield from go(tip, [*tip.at_mm[:2], over], profile)
-    points = _way(tip, path, start, shift, over)
+    points = _way(tip, approach, start, over)
     if len(points) > 1:
         tip.at_mm = points[-1]
         yield Travel(points, travel_speed(profile), travel_mm_s2(profile))
@@ -81,10 +84,10 @@ def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile
     tip.at_mm = start
 
 
-def _way(tip: Tip, path: Path, start: Floats, shift: Floats, over: float) -> Floats:
+def _way(tip: Tip, approach: Floats, start: Floats, over: float) -> Floats:
     """(n, 3) from the tip along the approach to above a path's start; a single point where the tip is there already."""
-    if len(path.approach):
-        between = np.column_stack([path.approach + shift[:2], np.full(len(path.approach), over)])
+    if len(approach):
+        between = np.column_stack([approach, np.full(len(approach), over)])
         points = np.array([tip.at_mm, *between, [*start[:2], over]])
         moving: Floats = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])]
         return moving
@@ -92,11 +95,11 @@ def _way(tip: Tip, path: Path, start: Floats, shift: Floats, over: float) -> Flo
     return points if dist(*points.tolist()) > STANDING_MM else points[:1]
 
 
-def _over_standing(tip: Tip, path: Path, start: Floats, shift: Floats, over: float, profile: Profile) -> float:
+def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float, profile: Profile) -> float:
     """Z at which the head clears what stands beside a limb on the way to a path's start: `over` where that is enough, else the
     least height that is, with the clearance beneath the nozzle, too."""
     assert tip.limb is not None
-    (part, standing), way = tip.limb, _way(tip, path, start, shift, over)
+    (part, standing), way = tip.limb, _way(tip, approach, start, over)
     z_mm = clear_height_mm(standing, way[:, :2] - shift[:2], over - float(shift[2])) + float(shift[2])
     if z_mm <= over + STANDING_MM:
         return over

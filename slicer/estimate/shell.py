@@ -6,9 +6,10 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import PATH_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
+from slicer.bead import outer_wall_width_mm, spacing_mm
 from slicer.fill.region import sparse_area
 from slicer.geometry.polygons import Polygons, contours, edges, islands, offset, opening
+from slicer.geometry.polyline import PATH_RESOLUTION_MM
 from slicer.walls.gap import LEAST_GAP
 
 LEAST_LINE = 0.35  # of the line width: a thinner place of the section hardly ever gets a bead

@@ -11,11 +11,12 @@ from math import cos, pi, radians, sin, sqrt
 from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import bulge_flow, length_mm, outer_wall_width_mm, spacing_mm
+from slicer.bead import bulge_flow, outer_wall_width_mm, spacing_mm
 from slicer.estimate.duration import line_s, loop_s
 from slicer.estimate.hanging import ThickSupport
 from slicer.estimate.shell import Extent, Shell
 from slicer.geometry.polygons import close_loop
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, bead_area_mm2
 from slicer.speed import axes_mm_s2, stroke_accelerations, stroke_speeds
 

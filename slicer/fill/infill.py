@@ -5,13 +5,14 @@ from math import sqrt
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, length_mm, spacing_mm
+from slicer.bead import Bead, spacing_mm
 from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.gyroid import LENGTH, gyroid
 from slicer.fill.honeycomb import honeycomb
 from slicer.fill.pattern import LinePattern, PatternLayer, clip_pattern, parallel_lines
 from slicer.geometry.clip import border_of, merge_pieces
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 
 RANK = 3  # behind skins (slicer.fill.skin)

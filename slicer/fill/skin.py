@@ -7,12 +7,13 @@ from math import ceil
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.bead import Bead, length_mm, spacing_mm
+from slicer.bead import Bead, spacing_mm
 from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.monotonic import monotonic_lines
 from slicer.fill.pattern import MARGIN_MM, Box, LinePattern, Lines, clip_pattern, horizontal_lines
 from slicer.geometry.clip import border_of
 from slicer.geometry.polygons import Polygons, islands, offset, opening, strips
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 from slicer.walls.gap import LEAST_GAP, gaps
 

@@ -14,10 +14,10 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import length_mm
 from slicer.cooling import fan_share, rising_fan
 from slicer.fill.region import shell_layers
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
+from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.paths import Kind, Layer, Path, bead_area_mm2
 from slicer.sections import Sections
@@ -109,15 +109,15 @@ def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floa
     speed = max(min(fastest, slowed), min(fastest, process.least_speed_mm_s))
     fan = rising_fan(material, k) * fan_share(material, process, length / speed)
     whole = Path(Kind.OUTER_WALL, turn, width, speed, material.flow, NO_APPROACH, shares is not None, below_mm=(height_mm, 0.0))
-    return Layer(z_mm, height_mm, (whole,) if shares is None else _pieces(whole, shares, height_mm), fan)
+    return Layer.of(z_mm, height_mm, (whole,) if shares is None else _pieces(whole, shares, height_mm), fan)
 
 
 def _closed(layer: Layer, turn: Floats) -> Layer:
     """The last turn with one more at its end, level and running out."""
-    last = layer.paths[-1]
+    last = layer.path(len(layer) - 1)
     level = Path(last.kind, turn, last.width_mm, last.speed_mm_s, last.flow, NO_APPROACH, False)
     paths = (*layer.paths, *_pieces(level, np.linspace(1.0, 0.0, PIECES + 1), 0.0))
-    return Layer(layer.z_mm, layer.height_mm, paths, layer.fan)
+    return Layer.of(layer.z_mm, layer.height_mm, paths, layer.fan)
 
 
 def _pieces(path: Path, shares: Floats, climb_mm: float) -> tuple[Path, ...]:

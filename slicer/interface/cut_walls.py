@@ -8,10 +8,11 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, length_mm, spacing_mm
+from slicer.bead import Bead, spacing_mm
 from slicer.fill.region import Cover
 from slicer.fill.skin import uncovered_area
 from slicer.geometry.polygons import Polygons, close_loop, edges, offset
+from slicer.geometry.polyline import length_mm
 from slicer.interface.model import Model
 from slicer.paths import Kind
 from slicer.travel.split import Sides, cut_line

@@ -20,7 +20,7 @@ from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset
 from slicer.interface.interface import BELOW_MM, frame_change
 from slicer.paths import Kind
-from slicer.travel.order import Placed
+from slicer.strokes import Strokes
 from slicer.travel.split import split
 
 STRIPE = 2.0  # line widths: grooves and ridges as wide as two beads can be printed
@@ -59,11 +59,11 @@ def cut_grooves(
     return left
 
 
-def fill_grooves(placed: Sequence[Placed], part: Part, process: Process, height_mm: float) -> list[Placed]:
-    """The first layer's beads of a part on plastic, richer over its grooves by what they hold."""
+def fill_grooves(strokes: Strokes, part: Part, process: Process, height_mm: float) -> Strokes:
+    """The first layer's strokes of a part on plastic, richer over its grooves by what they hold."""
     area = grooves(part, process)
     if area.is_empty():
-        return list(placed)
+        return strokes
     richer = 1.0 + process.interlock_mm / height_mm
-    shortest = process.line_width_mm
-    return split(placed, area, SKINS, shortest, lambda bead: replace(bead, flow=bead.flow * richer))
+    strokes, within = split(strokes, area, strokes.is_of(*SKINS), process.line_width_mm)
+    return replace(strokes, flow=np.where(within, strokes.flow * richer, strokes.flow))

@@ -18,9 +18,10 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import Bead, length_mm
+from slicer.bead import Bead
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, area_mm2, clean, islands, offset, offset_round, union
+from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, layer_heights, limb_planes_mm
 from slicer.interface.interface import BELOW_MM, frame_change, touching
 from slicer.paths import Kind, bead_area_mm2

@@ -7,7 +7,7 @@ infill. Every piece ends near the next one, and where a layer ends the next one 
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from profiles.process import Process
 from slicer.bead import WALLS, Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
+from slicer.strokes import Strokes, strokes_of
 from slicer.travel.combing import NOWHERE
 from slicer.travel.islands import FIRST, SUPPORTS, islands_of
 from slicer.travel.path_order import order_paths
@@ -32,16 +33,6 @@ BEFORE_WALLS = -500  # beads of this rank come before the walls of their island;
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 
 
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """A bead in its place: points as printed, whether the travel to them retracts, and the (k, 2) points it passes."""
-
-    bead: Bead
-    points: Floats
-    retract: bool
-    approach: Floats
-
-
 def order_beads(
     beads: Sequence[Bead],
     section: Polygons,
@@ -49,14 +40,14 @@ def order_beads(
     tip: Floats | None,
     support: Polygons | None = None,
     skin: Polygons | None = None,
-) -> list[Placed]:
+) -> Strokes:
     """The beads of one layer in printing order.
 
     tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
     beside an edge of an interface, which no travel passes over.
     """
     if not beads:
-        return []
+        return strokes_of([], np.zeros(0, np.bool_), {}, process.small_wall_mm)
     support = Polygons() if support is None else support
     first = beads[0].points[0] if tip is None else tip
     placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
@@ -64,10 +55,7 @@ def order_beads(
     since = np.array([first, *(points[-1] for _, points in placed[:-1])])
     retracts, detours = travels(since, to, section, support, process, skin)
     retracts[0] = retracts[0] or tip is None
-    return [
-        Placed(bead, points, bool(pull), detours.get(k, NOWHERE))
-        for k, ((bead, points), pull) in enumerate(zip(placed, retracts, strict=True))
-    ]
+    return strokes_of(placed, retracts, detours, process.small_wall_mm)
 
 
 def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first: bool) -> list[tuple[Bead, Floats]]:

@@ -1,29 +1,24 @@
-"""Split: beads of a layer parted where they enter and leave a place, so that they are printed otherwise there."""
+"""Split: strokes of a layer parted where they enter and leave an area, so that they are printed otherwise there."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel
+from mdp.kernels.arrays import flags, floats, table
+from mdp.kernels.kernel import kernel, part
 from mdp.kernels.sorting import rank, sort
-from mdp.mesh import Floats
-from slicer.bead import Bead
+from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
 from slicer.geometry.polygons import Polygons, edges
 from slicer.geometry.segments import Segment, inside, orientation
-from slicer.paths import Kind
-from slicer.travel.combing import NOWHERE
-from slicer.travel.order import Placed
+from slicer.strokes import Strokes
 
 SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
 
 
 class Sides(NamedTuple):
-    """Sides (k, 4) of a place by rising least y; lows: (k,) that y; tallest: how far a side reaches along y at most."""
+    """Sides (k, 4) of an area by rising least y; lows: (k,) that y; tallest: how far a side reaches along y at most."""
 
     edges: Floats
     lows: Floats
@@ -37,69 +32,119 @@ class Sides(NamedTuple):
         return cls(edges[order], lows[order], float(np.abs(edges[:, 3] - edges[:, 1]).max(initial=0.0)))
 
 
-def split(
-    placed: Sequence[Placed], area: Polygons, kinds: Sequence[Kind], shortest_mm: float, change: Callable[[Bead], Bead]
-) -> list[Placed]:
-    """The beads in the same order, those of some kinds in pieces; change() makes what lies within the area.
+class _Pieces(NamedTuple):
+    """Buffers for pieces of strokes: points (n, 3); starts: (k + 1,); source: (k,) the stroke of each; within: (k,)."""
 
-    The pieces of a bead follow each other without a travel, only the first one keeps its approach. No piece is shorter than
-    shortest_mm.
+    points: Floats
+    starts: Indices
+    source: Indices
+    within: Mask
+
+
+def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float) -> tuple[Strokes, Mask]:
+    """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area.
+
+    No piece is shorter than shortest_mm.
     """
     sides = Sides.of(edges(area))
-    out: list[Placed] = []
-    for bead in placed:
-        out += _split_bead(bead, sides, shortest_mm, change) if bead.bead.kind in kinds else [bead]
-    return out
+    count, room = -1, 2 * len(strokes.points) + 64
+    while count < 0:
+        pieces = _Pieces(np.empty((room, 3)), np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.bool_))
+        count = _split(strokes.points, strokes.starts, wanted, sides, shortest_mm, pieces)
+        room *= 4
+    starts, source = pieces.starts[: count + 1].copy(), pieces.source[:count]
+    out = strokes.refined(pieces.points[: starts[-1]].copy(), starts, source)
+    is_whole = np.bincount(source, minlength=len(strokes))[source] == 1
+    return replace(out, small=out.small & (is_whole | out.varies)), pieces.within[:count].copy()
 
 
-def _split_bead(placed: Placed, sides: Sides, shortest_mm: float, change: Callable[[Bead], Bead]) -> list[Placed]:
-    points, within = cut_line(np.ascontiguousarray(placed.points), sides)
-    if not within.any():
-        return [placed]
-    within = _steady(within, np.hypot(*np.diff(points, axis=0).T), shortest_mm)
-    if not within.any():
-        return [placed]
-    bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
-    pieces = []
-    for a, b in pairwise(bounds):
-        piece = points[a : b + 1] if len(bounds) > 2 else placed.points
-        bead = replace(placed.bead, points=piece)
-        bead = change(bead) if within[a] else bead
-        pieces.append(
-            replace(
-                placed, bead=bead, points=piece, retract=placed.retract and a == 0, approach=NOWHERE if a else placed.approach
-            )
-        )
-    return pieces
+@kernel
+def _split(points: Floats, starts: Indices, wanted: Mask, sides: Sides, shortest_mm: float, out: _Pieces) -> int:
+    """Fills in the pieces and returns how many there are, -1 where there is no room for them."""
+    room = len(out.points)
+    cut, within = table(room, 3), flags(room)
+    count = n = 0
+    out.starts[0] = 0
+    for k in range(len(starts) - 1):
+        a, b = starts[k], starts[k + 1]
+        size = 0
+        if wanted[k]:
+            size = _cut_into(points[a:b], sides.edges, sides.lows, sides.tallest, cut, within)
+            if size < 0:
+                return -1
+            _steady(cut, within, size, shortest_mm)
+        whole = True
+        for i in range(1, size - 1):
+            whole = whole and within[i] == within[0]
+        if n + (b - a if whole else 2 * size) > room or count + max(size, 1) >= room:
+            return -1
+        if whole:
+            for i in range(a, b):
+                for axis in range(3):
+                    out.points[n, axis] = points[i, axis]
+                n += 1
+            out.source[count], out.within[count], out.starts[count + 1] = k, size > 0 and within[0], n
+            count += 1
+            continue
+        begin = 0
+        for i in range(size - 1):
+            if i + 2 < size and within[i + 1] == within[begin]:
+                continue
+            for at in range(begin, i + 2):
+                for axis in range(3):
+                    out.points[n, axis] = cut[at, axis]
+                n += 1
+            out.source[count], out.within[count], out.starts[count + 1] = k, within[begin], n
+            count, begin = count + 1, i + 1
+    return count
 
 
-def _steady(within: NDArray[np.bool_], lengths: Floats, shortest_mm: float) -> NDArray[np.bool_]:
-    """Runs shorter than that take after their surroundings, those within last so that none is overlooked for a gap."""
-    for value in (False, True):
-        bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
-        if len(bounds) == 2:
-            break  # a short bead that lies within as a whole has no surroundings
-        for a, b in pairwise(bounds):
-            if within[a] == value and float(lengths[a:b].sum()) < shortest_mm:
-                within[a:b] = not value
-    return within
+@part
+def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None:
+    """Runs of steps shorter than that take after their surroundings, those within last so that none is overlooked for a gap.
+
+    points: of which `size` count; within: of as many steps less one. A line that is a single run has no surroundings.
+    """
+    for inner in range(2):
+        a = 0
+        while a < size - 1:
+            b, length_mm = a, 0.0
+            while b < size - 1 and within[b] == within[a]:
+                length_mm += np.hypot(points[b + 1, 0] - points[b, 0], points[b + 1, 1] - points[b, 1])
+                b += 1
+            if a == 0 and b == size - 1:
+                return
+            if within[a] == (inner > 0) and length_mm < shortest_mm:
+                for step in range(a, b):
+                    within[step] = inner == 0
+            a = b
 
 
-def cut_line(points: Floats, sides: Sides) -> tuple[Floats, NDArray[np.bool_]]:
+def cut_line(points: Floats, sides: Sides) -> tuple[Floats, Mask]:
     """The polyline (n, 2) with the places added where it crosses sides, and which steps lie within."""
     size, room = -1, 2 * len(points) + 64
     while size < 0:
         out, within = np.empty((room, 2)), np.empty(room, np.bool_)
-        size = _cut_into(points, *sides, out, within)
+        size = _cut(points, sides, out, within)
         room *= 4
     return out[:size], within[: size - 1]
 
 
 @kernel
-def _cut_into(points: Floats, sides: Floats, lows: Floats, tallest: float, out: Floats, marks: NDArray[np.bool_]) -> int:
-    """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them."""
+def _cut(points: Floats, sides: Sides, out: Floats, marks: Mask) -> int:
+    return _cut_into(points, sides.edges, sides.lows, sides.tallest, out, marks)
+
+
+@part
+def _cut_into(points: Floats, sides: Floats, lows: Floats, tallest: float, out: Floats, marks: Mask) -> int:
+    """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
+
+    points, out: (n, 2 or more), further columns are interpolated.
+    """
     shares, within = floats(len(sides) + 2, 0.0), False
-    out[0, 0], out[0, 1] = points[0, 0], points[0, 1]
+    columns = points.shape[1]
+    for axis in range(columns):
+        out[0, axis] = points[0, axis]
     n = 1
     for k in range(len(points) - 1):
         step = Segment(points[k, 0], points[k, 1], points[k + 1, 0], points[k + 1, 1])
@@ -125,8 +170,10 @@ def _cut_into(points: Floats, sides: Floats, lows: Floats, tallest: float, out: 
             if touched:
                 middle = 0.5 * (shares[s] + shares[s + 1])
                 within = inside(sides, x0 + middle * dx, y0 + middle * dy)
-            out[n, 0], out[n, 1] = x0 + shares[s + 1] * dx, y0 + shares[s + 1] * dy
+            for axis in range(columns):
+                out[n, axis] = points[k, axis] + shares[s + 1] * (points[k + 1, axis] - points[k, axis])
             marks[n - 1] = within
             n += 1
-        out[n - 1, 0], out[n - 1, 1] = points[k + 1, 0], points[k + 1, 1]
+        for axis in range(columns):
+            out[n - 1, axis] = points[k + 1, axis]
     return n

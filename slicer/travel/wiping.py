@@ -1,33 +1,31 @@
 """Wiping: over what the tip goes while the filament is pulled back: what it has just printed, so that the drop stays there."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.bead import length_mm
+from mdp.overhang import Mask
 from slicer.geometry.cells import cells_of
 from slicer.geometry.polygons import Polygons
-from slicer.paths import Path
+from slicer.geometry.polyline import length_mm
+from slicer.strokes import Strokes
 from slicer.travel.combing import crosses, lie_within
 
 STANDING_MM = 1e-6
 RING = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
 
 
-def keep_wipes_off(paths: Sequence[Path], skin: Polygons, wipe_mm: float) -> tuple[Path, ...]:
-    """The paths, unwiped where they end beside the skin and a wipe of that length would lead onto it."""
-    if skin.is_empty():
-        return tuple(paths)
+def may_wipe_over(strokes: Strokes, skin: Polygons, wipe_mm: float) -> Mask:
+    """(k,) whether a wipe may go over each stroke: not where it ends beside the skin and such a wipe would lead onto it."""
+    may = np.ones(len(strokes), np.bool_)
+    if skin.is_empty() or not len(strokes):
+        return may
     border = cells_of(skin)
-    ends = lie_within(border, np.array([path.points[-1] for path in paths]).reshape(-1, 2))
-    out = list[Path]()
-    for path, ends_on_it in zip(paths, ends.tolist(), strict=True):
-        way = first_length(wipe_trail(path.points, path.width_mm), wipe_mm)
-        leads_there = not ends_on_it and len(way) > 1 and bool(crosses(border, way[:-1], way[1:]).any())
-        out.append(replace(path, wiped=False) if leads_there else path)
-    return tuple(out)
+    off = ~lie_within(border, strokes.last_points)
+    for k in np.flatnonzero(off).tolist():
+        points = strokes.points[strokes.starts[k] : strokes.starts[k + 1], :2]
+        way = first_length(wipe_trail(points, float(strokes.width_mm[k])), wipe_mm)
+        may[k] = len(way) < 2 or not crosses(border, way[:-1], way[1:]).any()
+    return may
 
 
 def runs_round(points: Floats, width_mm: float) -> bool:

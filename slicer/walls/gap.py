@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from slicer.bead import Bead, Course, length_mm, simplify_bead, spacing_mm
+from slicer.bead import Bead, Course, simplify_bead, spacing_mm
 from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 from slicer.walls.variable.rule import SPLIT, Rule
 from slicer.walls.variable.variable import variable_walls

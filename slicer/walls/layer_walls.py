@@ -8,8 +8,9 @@ from itertools import chain
 import numpy as np
 
 from profiles.process import Process
-from slicer.bead import PATH_RESOLUTION_MM, length_mm, outer_wall_width_mm, spacing_mm
+from slicer.bead import outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, close_loop, contours, islands, offset, offset_round, opening, strips
+from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm
 from slicer.walls.variable.rule import FEATURE, ROOM, Rule
 from slicer.walls.variable.variable import Wall, variable_walls
 from slicer.walls.walls import SLACK_MM, Walls, walls

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+
+import numpy as np
 
 from profiles.process import Process
-from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, offset
-from slicer.paths import Kind
-from slicer.travel.order import Placed
+from slicer.paths import NUMBER, Kind
+from slicer.strokes import Strokes
 from slicer.travel.split import split
 
 SPLIT = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
@@ -17,33 +17,31 @@ SHORTEST = 2.0  # line widths: no stretch is split off for less, the speed would
 NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 
-def split_overhangs(placed: Sequence[Placed], section: Polygons, below: Polygons | None, process: Process) -> list[Placed]:
-    """The beads of a layer with its walls and gap lines split where less and less of their width lies on plastic.
+def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None, process: Process) -> Strokes:
+    """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic.
 
     below: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the
     share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share.
     """
-    out = list(placed)
     if below is None or process.overhang_share <= 0.0:
-        return out
+        return strokes
     shortest_mm = SHORTEST * process.line_width_mm
     for share in sorted({*STEPS, process.overhang_share}, reverse=True):
         hanging = hanging_area(section, below, share, process.line_width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:
             break
         kinds = SPLIT if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
-        out = split(out, hanging, kinds, shortest_mm, partial(_hanging, share=share, process=process))
-    return out
+        strokes, within = split(strokes, hanging, strokes.is_of(*kinds), shortest_mm)
+        kind, overhang = strokes.kind, np.where(within, sum(step >= share for step in STEPS), strokes.overhang)
+        if share <= process.overhang_share:
+            kind = np.where(within, NUMBER[Kind.OVERHANG], kind)
+        strokes = replace(strokes, kind=kind.astype(np.int8), overhang=overhang.astype(np.int8))
+    return strokes
 
 
 def hanging_area(section: Polygons, below: Polygons, share: float, width_mm: float) -> Polygons:
     """Where the centreline of a bead has less than a share of its width on what is below."""
     return section - offset(below, (0.5 - share) * width_mm + NOISE_MM)
-
-
-def _hanging(bead: Bead, share: float, process: Process) -> Bead:
-    kind = Kind.OVERHANG if share <= process.overhang_share else bead.kind
-    return replace(bead, kind=kind, overhang=sum(step >= share for step in STEPS))
 
 
 def strengthen_overhangs(

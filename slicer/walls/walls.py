@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import PATH_RESOLUTION_MM, Bead, bulge_flow, outer_wall_width_mm, spacing_mm
+from slicer.bead import Bead, bulge_flow, outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, contours, offset, opening
+from slicer.geometry.polyline import PATH_RESOLUTION_MM
 from slicer.paths import Kind
 from slicer.walls.variable.variable import Wall
 

@@ -49,7 +49,7 @@ def squares(piece: Part, profile: Profile, layers: int = 3) -> SlicedPart:
             x0, y0, x1, y1 = lo[0] + inset * 0.45, lo[1] + inset * 0.45, hi[0] - inset * 0.45, hi[1] - inset * 0.45
             ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
             paths.append(Path(kind, ring, process.line_width_mm, 40.0, 1.0, NO_APPROACH, kind is Kind.OUTER_WALL))
-        layers_made.append(Layer((k + 1) * 0.2, 0.2, tuple(paths), 0.0 if k == 0 else 1.0))
+        layers_made.append(Layer.of((k + 1) * 0.2, 0.2, tuple(paths), 0.0 if k == 0 else 1.0))
     return SlicedPart(piece.index, tuple(layers_made))
 
 

@@ -140,7 +140,7 @@ def test_a_flipped_sign_of_the_tilt_is_found(machine: str) -> None:
     profile, decomposition, sliced, _ = _planned(machine)
     tilt = profile.machine.tilt.model_copy(update={"sign": -profile.machine.tilt.sign, "limits_deg": (-360.0, 360.0)})
     changed = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": tilt})})
-    program = MachineProgram("flipped", plan(decomposition, sliced, profile).moves)
+    program = MachineProgram.of("flipped", plan(decomposition, sliced, profile).moves)
     codes = _errors(list(write_gcode(program, changed)), machine)
     assert "sign" in codes
 

@@ -1,7 +1,9 @@
 """Parts made by hand, and what the tests of the slicer ask of sliced parts."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import manifold3d as m3
 import numpy as np
@@ -16,9 +18,10 @@ from profiles.profile import Profile, load
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights
-from slicer.paths import Kind, SlicedPart
+from slicer.paths import KINDS, Kind, SlicedPart
 from slicer.paths import Path as Stroke
 from slicer.sections import Sections
+from slicer.strokes import Strokes
 from tests.shapes import from_manifold
 
 BARE = ("process.skirt_loops=0", "process.small_base_brim_mm=0", "process.support=none")
@@ -71,7 +74,26 @@ def of_kind(sliced: SlicedPart, *kinds: Kind) -> list[Stroke]:
 
 def volume_mm3(sliced: SlicedPart, *kinds: Kind) -> float:
     """Plastic of some kinds."""
-    return sum(layer.volume_mm3(path) for layer in sliced.layers for path in layer.paths if path.kind in kinds)
+    return float(sum(layer.volumes_mm3[layer.is_of(*kinds)].sum() for layer in sliced.layers))
+
+
+class Row(NamedTuple):
+    """A stroke of a table; points (n, 2) as printed, approach (k, 2)."""
+
+    kind: Kind
+    points: Floats
+    width_mm: float
+    retract: bool
+    approach: Floats
+
+
+def rows_of(strokes: Strokes) -> list[Row]:
+    """The strokes of a table one by one."""
+    points = [strokes.points[a:b, :2] for a, b in pairwise(strokes.starts)]
+    approaches = [strokes.approach[a:b] for a, b in pairwise(strokes.approach_starts)]
+    kinds = [KINDS[number] for number in strokes.kind]
+    columns = kinds, points, strokes.width_mm.tolist(), strokes.retract.tolist(), approaches
+    return [Row(*row) for row in zip(*columns, strict=True)]
 
 
 def content(sliced: SlicedPart) -> bytes:

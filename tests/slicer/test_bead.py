@@ -4,7 +4,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
-from slicer.bead import PATH_RESOLUTION_MM, simplify
+from slicer.geometry.polyline import PATH_RESOLUTION_MM, simplify
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from tests.shapes import box, standing, tee
@@ -54,9 +54,7 @@ def test_wide_infill_keeps_its_density() -> None:
 
 def test_the_first_layers_flow_is_its_own() -> None:
     plain, rich = (slice_part(whole(box(20, 20, 1)), profile(f"process.first_layer_flow={f}")) for f in (1.0, 1.1))
-    ratios = [
-        sum(map(b.volume_mm3, b.paths)) / sum(map(a.volume_mm3, a.paths)) for a, b in zip(plain.layers, rich.layers, strict=True)
-    ]
+    ratios = [b.volumes_mm3.sum() / a.volumes_mm3.sum() for a, b in zip(plain.layers, rich.layers, strict=True)]
     assert ratios == pytest.approx([1.1, 1.0, 1.0, 1.0, 1.0])
 
 

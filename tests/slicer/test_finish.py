@@ -58,10 +58,10 @@ def test_a_top_is_ironed_with_dense_lines_across_its_own() -> None:
     assert {k for k, layer in enumerate(sliced.layers) if any(path.kind is Kind.IRONING for path in layer.paths)} == {9}
     last = sliced.layers[-1]
     ironed = [path for path in last.paths if path.kind is Kind.IRONING]
-    assert last.paths[-len(ironed) :] == tuple(ironed)
+    assert last.is_of(Kind.IRONING)[-len(ironed) :].all()
     assert {path.speed_mm_s for path in ironed} == {15.0}
     inside_mm2 = (10.0 - 2 * 3 * 0.41) ** 2
-    assert sum(last.volume_mm3(path) for path in ironed) == pytest.approx(0.15 * 0.2 * inside_mm2, rel=0.1)
+    assert last.volumes_mm3[-len(ironed) :].sum() == pytest.approx(0.15 * 0.2 * inside_mm2, rel=0.1)
     assert sum(path.length_mm for path in ironed) == pytest.approx(inside_mm2 / 0.1, rel=0.1)
 
 

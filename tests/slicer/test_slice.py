@@ -83,7 +83,7 @@ def test_infill_is_as_dense_as_asked() -> None:
     settings_ = [(*BARE, f"process.infill_density={d}") for d in (0.0, 0.3)]
     empty, filled = (slice_part(whole(thick), profile(*s)) for s in settings_)
     layer = filled.layers[10]
-    sparse = sum(layer.volume_mm3(p) for p in layer.paths if p.kind is Kind.INFILL) / layer.height_mm
+    sparse = layer.volumes_mm3[layer.is_of(Kind.INFILL)].sum() / layer.height_mm
     side = 60 - 2 * (0.225 + 2.5 * (0.45 - 0.2 * (1 - np.pi / 4)))
     assert sparse == pytest.approx(0.3 * side**2, rel=0.03)
     assert of_kind(empty, Kind.INFILL) == []
@@ -109,7 +109,7 @@ def test_a_part_on_plastic_is_pressed_in_solid_slow_and_rich() -> None:
 def test_a_part_in_its_own_frame_does_not_care_how_it_stood_in_the_workpiece() -> None:
     base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
     sliced = slice_part(arm, profile(*SOLID), [base])
-    rich = 0.1 * sum(sliced.layers[0].volume_mm3(p) / 1.1 for p in sliced.layers[0].paths)
+    rich = 0.1 * sliced.layers[0].volumes_mm3.sum() / 1.1
     assert sliced.volume_mm3 == pytest.approx(arm.mesh.volume_mm3 + rich, rel=0.015)
 
 
@@ -128,7 +128,7 @@ def test_material_flow_multiplies_all_plastic() -> None:
 def test_the_skirt_runs_once_around_the_first_layer_only() -> None:
     sliced = slice_part(whole(box(10, 10, 2)), profile())
     (skirt,) = of_kind(sliced, Kind.SKIRT)
-    assert skirt is sliced.layers[0].paths[0]
+    assert sliced.layers[0].paths[0].kind is Kind.SKIRT
     assert np.abs(skirt.points).max() == pytest.approx(5 + 4 + 0.225)
 
 

@@ -31,7 +31,7 @@ def test_the_wall_climbs_evenly_from_the_bottom_to_the_top() -> None:
     assert [Kind.SKIN in {path.kind for path in layer.paths} for layer in sliced.layers[:5]] == [True] * 4 + [False]
     climbing = [path for layer in sliced.layers[5:-1] for path in layer.paths]
     assert len(climbing) == len(sliced.layers) - 6
-    heights = np.concatenate([path.z_mm + layer.z_mm for layer in sliced.layers[4:] for path in layer.paths])
+    heights = np.concatenate([layer.points_z_mm for layer in sliced.layers[4:]])
     assert (np.diff(heights) >= -1e-9).all()
     assert (heights[0], heights[-1]) == pytest.approx((0.8, 6.0))
     ends = [path for layer in sliced.layers[4:] for path in layer.paths]
@@ -42,7 +42,7 @@ def test_the_wall_climbs_evenly_from_the_bottom_to_the_top() -> None:
 def test_the_wall_holds_as_much_plastic_as_it_is_long_with_half_of_it_in_the_first_and_the_last_turn() -> None:
     sliced = slice_part(whole(standing(m3.Manifold.cylinder(6, 10, 10, 96))), profile(*VASE))
     turn_mm3 = 2 * np.pi * (10 - 0.225) * bead_area_mm2(0.45, 0.2)
-    turns = sum(layer.volume_mm3(path) for layer in sliced.layers[4:] for path in layer.paths) / turn_mm3
+    turns = sum(layer.volumes_mm3.sum() for layer in sliced.layers[4:]) / turn_mm3
     assert turns == pytest.approx(0.5 + 25 + 0.5, rel=0.01)
 
 

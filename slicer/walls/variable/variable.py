@@ -25,9 +25,10 @@ from itertools import pairwise
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.bead import PATH_RESOLUTION_MM, Course, length_mm
+from slicer.bead import Course
 from slicer.geometry.distance import distances
 from slicer.geometry.polygons import Polygons, close_loop, contours, edges, resample
+from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm
 from slicer.geometry.triangulation import Triangulation, triangulate
 from slicer.walls.variable.counts import Counts, count_beads
 from slicer.walls.variable.course import corners, smoothed

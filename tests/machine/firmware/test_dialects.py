@@ -23,7 +23,7 @@ from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile, load
-from slicer.paths import Kind, Path
+from slicer.paths import Kind, Layer, Path
 from tests.machine.hand import post_and_arm, printed, squares
 
 MODES = [(name, "table") for name in dialects()] + [
@@ -69,7 +69,7 @@ def golden(dialect: str, coordinates: str) -> list[str]:
     around = np.linspace(0.0, 1.5 * np.pi, 60)
     ring = np.column_stack([3.0 * np.cos(around), 3.0 * np.sin(around)])
     hole = Path(Kind.OVERHANG, ring, 0.45, 25.0, 1.05, ring[:1], False, fan=0.6)
-    layers = tuple(replace(layer, paths=(*layer.paths, hole)) for layer in sliced[0].layers)
+    layers = tuple(Layer.of(layer.z_mm, layer.height_mm, (*layer.paths, hole), layer.fan) for layer in sliced[0].layers)
     sliced[0] = replace(sliced[0], layers=layers, unsupported=())
     program = plan(decomposition, sliced, chosen, parse_stops(["1:2"], ["2:2"]))
     return [line for line in write_gcode(program, chosen) if not line.startswith(";")]
@@ -222,7 +222,7 @@ def program_of(parts: list) -> MachineProgram:
         moves += [Travel(np.array([at, path[0]]), 50.0), Stroke(Kind.SKIN, path, np.full(len(path) - 1, 0.731), 33.0, 0.45)]
         moves += [Retract(0.8, 35.0), Retract(-0.8, 35.0)]
         at = path[-1]
-    return MachineProgram("random", tuple(moves))
+    return MachineProgram.of("random", tuple(moves))
 
 
 @given(ANGLE, ANGLE, PLACE)

@@ -42,7 +42,7 @@ def _program(flat: Floats, profile: Profile) -> tuple[list[str], Stroke]:
     points = np.column_stack([flat, np.full(len(flat), 0.2)])
     stroke = Stroke(Kind.OUTER_WALL, points, 0.03 * np.hypot(*np.diff(flat, axis=0).T), 30.0, 0.45)
     arrive = Travel(np.array([points[0] + [0, 0, 1], points[0]]), 50.0)
-    return list(write_gcode(MachineProgram("arcs", (arrive, arrive, stroke)), profile)), stroke
+    return list(write_gcode(MachineProgram.of("arcs", (arrive, arrive, stroke)), profile)), stroke
 
 
 @settings(deadline=None, max_examples=40)

@@ -1,39 +1,87 @@
-"""The lines of a path, against Python's own way to write numbers."""
+"""The lines of many moves, against Python's own way to write numbers."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.gcode.path_text import PathWords, as_bytes, path_text
+from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, PathWords, Texts, as_bytes, path_text
+from mdp.mesh import Floats
 
-WHOLE = st.integers(-(10**9), 10**9)
-POINTS = st.lists(st.tuples(st.sampled_from([0, 5, -1500]), WHOLE, st.sampled_from([200, -7]), WHOLE), min_size=1, max_size=20)
+Point = tuple[float, float, float, float]  # X Y Z, and the filament of the step to it
+MM = st.integers(-(10**8), 10**8).map(lambda thousandths: thousandths / 1000.0)
+ROWS = st.lists(st.tuples(st.sampled_from([0.0, 0.005, -1.5]), MM, st.sampled_from([0.2, -0.007]), MM), min_size=2, max_size=20)
+NO_TEXT = ("", "")
 
 
-def by_python(points: list[tuple[int, int, int, int]], relative: bool, known: list[int]) -> list[str]:
-    lines, ending = [], " F1200"
-    for *point, pushed in points:
-        changed = [k for k in range(3) if point[k] != known[k]]
+def words(letter: str = "E", relative: bool = True) -> PathWords:
+    return PathWords(as_bytes("G1"), as_bytes("G0"), ord(letter), relative)
+
+
+def known() -> np.typing.NDArray[np.int64]:
+    return np.zeros(5, dtype=np.int64)
+
+
+def texts(*lines: str) -> Texts:
+    return Texts(as_bytes("".join(lines)), np.cumsum([0, *map(len, lines)]))
+
+
+def path(rows: list[Point], does: int, speed: float = 20.0) -> Paths:
+    table = np.array(rows)
+    return Paths(table[:, :3].copy(), table[:, 3].copy(), np.array([0, len(rows)]), np.array([does], np.int8), np.array([speed]))
+
+
+def by_python(rows: list[Point]) -> list[str]:
+    """A travel through points that are whole thousandths."""
+    lines, tip, ending = [], (0.0, 0.0, 0.0), " F1200"
+    for *point, _ in rows[1:]:
+        changed = "".join(f" {'XYZ'[k]}{point[k]:.3f}" for k in range(3) if point[k] != tip[k])
         if changed:
-            words = "".join(f" {'XYZ'[k]}{point[k] / 1000:.3f}" for k in changed)
-            lines.append(f"G1{words} E{(pushed - known[3] if relative else pushed) / 1e5:.5f}{ending}")
-            known[:], ending = [*point, pushed], ""
+            lines.append(f"G0{changed}{ending}")
+            tip, ending = (point[0], point[1], point[2]), ""
     return lines
 
 
+@given(ROWS)
+def test_a_travel_is_written_as_python_writes_it(rows: list[Point]) -> None:
+    assert path_text(path(rows, TRAVELLING), texts(*NO_TEXT), words(), known(), np.zeros(1)).splitlines() == by_python(rows)
+
+
 @pytest.mark.parametrize("relative", [True, False])
-@given(POINTS)
-def test_lines_are_those_that_python_writes(relative: bool, points: list[tuple[int, int, int, int]]) -> None:
-    table = np.array(points, dtype=np.int64)
-    words = PathWords(as_bytes("G1"), ord("E"), relative, as_bytes(" F1200"))
-    theirs, ours = [0, 0, 200, 17], np.array([0, 0, 200, 17])
-    assert path_text(table[:, :3].copy(), table[:, 3].copy(), words, ours).splitlines() == by_python(points, relative, theirs)
-    assert ours.tolist() == theirs
+@given(st.lists(st.integers(1, 10**6), min_size=1, max_size=20))
+def test_the_filament_of_a_stroke_adds_up_to_the_last_digit(relative: bool, pushed: list[int]) -> None:
+    rows = [(0.0, 0.0, 0.0, 0.0), *((float(k), 0.0, 0.0, 1e-5 * e) for k, e in enumerate(pushed, 1))]
+    lines = path_text(path(rows, PUSHING), texts(*NO_TEXT), words("U", relative), known(), np.zeros(1)).splitlines()
+    written = [line.split(" U")[1].split()[0] for line in lines]
+    sums = np.cumsum(pushed)
+    assert written == [f"{e / 1e5:.5f}" for e in (pushed if relative else sums.tolist())]
 
 
 def test_a_point_where_the_tip_is_gives_its_filament_to_the_next_line() -> None:
-    words = PathWords(as_bytes("G1"), ord("U"), True, as_bytes(""))
-    points = np.array([[1000, 0, 0], [1000, 0, 0], [1000, -5, 0]])
-    lines = path_text(points, np.array([100, 300, 700]), words, np.array([0, 0, 0, 0])).splitlines()
-    assert lines == ["G1 X1.000 U0.00100", "G1 Y-0.005 U0.00600"]
+    rows = [(1.0, 0.0, 0.0, 0.0), (1.0, 0.0004, 0.0, 0.002), (1.0, -0.005, 0.0, 0.004)]
+    place = np.array([1000, 0, 0, 0, 1200])
+    (line,) = path_text(path(rows, PUSHING), texts(*NO_TEXT), words("U"), place, np.zeros(1)).splitlines()
+    assert line.split(" F")[0] == "G1 Y-0.005 U0.00600"
+
+
+def test_a_retraction_is_a_line_of_filament_alone() -> None:
+    tip = np.array([1000, 0, 0, 0, 1200])
+    assert (
+        path_text(path([(1.0, 0.0, 0.0, -0.8)], STANDING, 35.0), texts(*NO_TEXT), words(), tip, np.zeros(1))
+        == "G1 E-0.80000 F2100\n"
+    )
+
+
+def test_texts_stand_before_their_paths_and_behind_the_last() -> None:
+    points: Floats = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]])
+    two = Paths(points, np.array([0, 0.5, 0, 0.5]), np.array([0, 2, 4]), np.array([0, 0], np.int8), np.array([20.0, 20.0]))
+    text = path_text(two, texts(";first\n", ";second\n", ";end\n"), words(), known(), np.zeros(1))
+    assert text.splitlines() == [";first", "G1 X1.000 E0.50000 F1200", ";second", "G1 X2.000 E0.50000", ";end"]
+
+
+def test_a_path_of_which_nothing_is_written_leaves_the_speed_that_the_firmware_knows() -> None:
+    points: Floats = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]])
+    speed = np.array([20.0, 50.0, 20.0])
+    three = Paths(points, np.zeros(6), np.array([0, 2, 4, 6]), np.array([1, 1, 1], np.int8), speed)
+    lines = path_text(three, texts("", "", "", ""), words(), known(), np.zeros(1)).splitlines()
+    assert lines == ["G0 X1.000 F1200", "G0 X2.000"]

@@ -13,7 +13,7 @@ MACHINE = load().machine
 
 
 def _checked(*moves) -> None:
-    program = MachineProgram("p", (BeginPart(3, Pose(0, 0), 1), BeginLayer(3, 7, 0.2, 0.2, 0.0), *moves))
+    program = MachineProgram.of("p", (BeginPart(3, Pose(0, 0), 1), BeginLayer(3, 7, 0.2, 0.2, 0.0), *moves))
     check(program, rows(program, 0.0, 0.0), MACHINE)
 
 

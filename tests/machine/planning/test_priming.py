@@ -33,7 +33,7 @@ def _stroke(kind: Kind, *steps_mm: float, speed: float = 25.0) -> Stroke:
 
 def _layer(*kinds: Kind) -> Layer:
     line = np.array([[0.0, 0.0], [9.0, 0.0]])
-    return Layer(0.1, 0.2, tuple(Path(kind, line, 0.45, 25.0, 1.0, np.zeros((0, 2)), False) for kind in kinds), 0.3)
+    return Layer.of(0.1, 0.2, tuple(Path(kind, line, 0.45, 25.0, 1.0, np.zeros((0, 2)), False) for kind in kinds), 0.3)
 
 
 def test_the_filament_is_spread_over_the_first_stretch_and_then_all_is_as_usual() -> None:

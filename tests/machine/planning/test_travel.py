@@ -13,7 +13,7 @@ from machine.reader.parse import parse_gcode
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from profiles.profile import Profile, load
-from slicer.bead import length_mm
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
 from slicer.travel.wiping import first_length, wipe_trail

@@ -6,9 +6,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import length_mm, spacing_mm
+from slicer.bead import spacing_mm
 from slicer.estimate.shell import Extent, extent_of, shell_of
 from slicer.geometry.polygons import Polygons, area_mm2, close_loop
+from slicer.geometry.polyline import length_mm
 from tests.slicer.hand import as_shapely, profile, ragged
 
 PROCESS = profile().process

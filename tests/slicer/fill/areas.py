@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from hypothesis import strategies as st
 
-from slicer.bead import Bead, length_mm
+from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import length_mm
 from slicer.paths import bead_area_mm2
 
 WIDTH, HEIGHT, OVERLAP = 0.45, 0.2, 0.15

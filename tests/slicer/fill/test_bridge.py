@@ -101,7 +101,7 @@ def portal(span: float) -> Mesh:
 def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
     sliced = slice_part(whole(portal(5)), profile(*SOLID, "process.bridge_speed_mm_s=27", "process.bridge_flow=0.9"))
     beads = of_kind(sliced, Kind.BRIDGE)
-    layer = next(layer for layer in sliced.layers if any(p in beads for p in layer.paths))
+    layer = next(layer for layer in sliced.layers if layer.is_of(Kind.BRIDGE).any())
     assert layer.z_mm == pytest.approx(8.2)
     assert {p.speed_mm_s for p in beads} == {27.0}
     ends = np.concatenate([p.points for p in beads])

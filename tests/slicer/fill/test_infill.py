@@ -9,13 +9,14 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import Bead, length_mm
+from slicer.bead import Bead
 from slicer.fill.gyroid import LENGTH, gyroid
 from slicer.fill.honeycomb import honeycomb, side_mm
 from slicer.fill.infill import PATTERNS, infill_beads, pattern_density
 from slicer.fill.pattern import PatternLayer, clip_pattern
 from slicer.geometry.clip import border_of, rotation_2d
 from slicer.geometry.polygons import Polygons, offset
+from slicer.geometry.polyline import length_mm
 from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, ring, square
 from tests.slicer.hand import as_shapely, distances_mm, profile
 

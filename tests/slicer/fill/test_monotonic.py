@@ -13,7 +13,7 @@ from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, clean
 from slicer.paths import Kind
 from slicer.travel.order import order_beads
-from tests.slicer.hand import profile
+from tests.slicer.hand import profile, rows_of
 
 WIDTH, HEIGHT = 0.45, 0.2
 SPACING = 0.45 - 0.2 * (1 - np.pi / 4)
@@ -91,5 +91,5 @@ def test_the_order_of_a_layer_keeps_it() -> None:
     area = plate([(3, 2, 3), (-5, -3, 2)])
     beads = skin_beads(area, Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, in_order=True))
     placed = order_beads(beads, area, profile().process, np.array([20.0, 20.0]))
-    printed = [Bead(laid.bead.kind, laid.points, WIDTH, 2) for laid in placed if laid.bead.kind is Kind.TOP_SKIN]
+    printed = [Bead(row.kind, row.points, WIDTH, 2) for row in rows_of(placed) if row.kind is Kind.TOP_SKIN]
     assert out_of_order(lines_of(printed, 45.0)) == 0

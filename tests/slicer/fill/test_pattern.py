@@ -7,9 +7,9 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import length_mm
 from slicer.fill.pattern import zigzag_lines
 from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import length_mm
 from tests.slicer.fill.areas import STARS
 from tests.slicer.hand import as_shapely
 

@@ -43,7 +43,7 @@ def test_the_tip_stays_at_its_height_and_only_the_first_layer_is_richer() -> Non
     assert [lay.z_mm for lay in rich] == [lay.z_mm for lay in plain]
     flows = [max(p.flow for p in layers[0].paths if p.kind is Kind.SKIN) for layers in (plain, rich)]
     assert flows[1] == pytest.approx((0.1 + 0.2) / 0.1 * flows[0], rel=0.05)
-    assert sum(rich[1].volume_mm3(p) for p in rich[1].paths) == pytest.approx(sum(plain[1].volume_mm3(p) for p in plain[1].paths))
+    assert rich[1].volumes_mm3.sum() == pytest.approx(plain[1].volumes_mm3.sum())
 
 
 def test_grooves_of_a_leaning_part_lie_just_below_its_base_plane() -> None:

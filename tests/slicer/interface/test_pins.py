@@ -162,14 +162,14 @@ def test_the_tip_circles_in_the_mouth_before_anything_else_and_never_below_the_l
     own = profile(*BARE, *PINS, *keys)
     pins, first = plan_pins([base, top], own)[2], slice_part(top, own, [base]).layers[0]
     middles = np.array([[pin.x_mm, pin.y_mm] for pin in pins])
-    for path in first.paths[:25]:
+    for path, mm3 in zip(first.paths[:25], first.volumes_mm3[:25], strict=True):
         away = np.hypot(*(path.points[:, None] - middles).transpose(2, 0, 1)).min(axis=1)
-        mm2 = first.volume_mm3(path) / path.length_mm
+        mm2 = mm3 / path.length_mm
         assert (path.kind, path.below_mm) == (Kind.GAP, (0.0, 0.0))
         assert away.max() <= 0.5 * (WIDE - 0.4) + 1e-9
         assert mm2 < 4.0 * 0.4**2  # Klipper's max_extrude_cross_section
         assert path.speed_mm_s * mm2 <= own.material.volumetric_limit_mm3_s + 1e-9
-    assert sum(first.volume_mm3(path) for path in first.paths[:25]) == pytest.approx(removed_mm3([base, top], *keys), rel=0.01)
+    assert first.volumes_mm3[:25].sum() == pytest.approx(removed_mm3([base, top], *keys), rel=0.01)
 
 
 def test_a_part_too_slender_or_too_low_below_has_none() -> None:

@@ -45,7 +45,7 @@ def test_the_model_is_printed_as_on_the_platform() -> None:
     alone = slice_part(whole(box()), profile("process.skirt_loops=0")).layers
     assert [lay.height_mm for lay in model] == pytest.approx([lay.height_mm for lay in alone])
     for ours, theirs in zip(model, alone, strict=True):
-        plastic = [sum(lay.volume_mm3(p) for p in lay.paths) for lay in (ours, theirs)]
+        plastic = [lay.volumes_mm3.sum() for lay in (ours, theirs)]
         assert plastic[0] == pytest.approx(plastic[1], rel=0.01)
         assert kinds([ours]) == kinds([theirs])
 
@@ -58,7 +58,7 @@ def test_the_pedestal_s_margin_is_no_part_of_the_model() -> None:
 def test_the_roof_is_closed_and_the_inside_sparse() -> None:
     pedestal, _ = lifted(box())
     area = 24 * 24 - (4 - np.pi) * 4
-    shares = [sum(lay.volume_mm3(p) for p in lay.paths if p.kind is not Kind.SKIRT) / lay.height_mm / area for lay in pedestal]
+    shares = [lay.volumes_mm3[~lay.is_of(Kind.SKIRT)].sum() / lay.height_mm / area for lay in pedestal]
     assert min(shares[0], *shares[-3:]) > 0.95
     assert max(shares[1:-3]) < 0.4
     assert {p.kind for p in pedestal[-1].paths} == {Kind.SUPPORT, Kind.SUPPORT_INTERFACE}

@@ -13,7 +13,7 @@ from slicer.travel.combing import SAFE
 from slicer.travel.islands import FIRST, OUTSIDE, islands_of
 from slicer.travel.order import order_beads
 from slicer.travel.retracting import travels
-from tests.slicer.hand import as_shapely, profile, ragged
+from tests.slicer.hand import as_shapely, profile, ragged, rows_of
 
 seeds = st.integers(0, 10**6)
 STRAIGHT = profile("process.combing=false").process
@@ -79,13 +79,14 @@ def test_a_layer_prints_every_bead_once_island_by_island_and_by_rising_rank(seed
     beads = [
         Bead(Kind.INFILL, s + np.array([(0.0, 0.0), (0.5, 0.3)]), 0.45, int(random.choice([-3, -1, 0, 4, 120]))) for s in starts
     ]
-    placed = order_beads(beads, section, STRAIGHT, np.array([5.0, 5.0]))
-    printed = [tuple(sorted(map(tuple, p.points.tolist()))) for p in placed]
-    assert sorted(printed) == sorted(tuple(sorted(map(tuple, bead.points.tolist()))) for bead in beads)
-    right = [bool(p.points[:, 0].mean() > 11.0) for p in placed]
+    rank_of = {tuple(sorted(map(tuple, bead.points.tolist()))): bead.rank for bead in beads}
+    placed = rows_of(order_beads(beads, section, STRAIGHT, np.array([5.0, 5.0])))
+    printed = [tuple(sorted(map(tuple, row.points.tolist()))) for row in placed]
+    assert sorted(printed) == sorted(rank_of)
+    right = [bool(row.points[:, 0].mean() > 11.0) for row in placed]
     assert right in (sorted(right), sorted(right, reverse=True))
     for side in (False, True):
-        ranks = [p.bead.rank for p, on in zip(placed, right, strict=True) if on == side]
+        ranks = [rank_of[ends] for ends, on in zip(printed, right, strict=True) if on == side]
         assert ranks == sorted(ranks)
 
 
@@ -102,9 +103,9 @@ def test_every_outer_wall_comes_right_after_the_inner_wall_nearest_to_it(seed: i
         for kind, size, rank in ((Kind.INNER_WALL, 1.5, -1), (Kind.OUTER_WALL, 2.0, 0))
     ]
     plate = Polygons.square((120.0, 120.0), True).translate((45.0, 45.0))
-    placed = order_beads([walls[k] for k in random.permutation(len(walls))], plate, STRAIGHT, np.zeros(2))
-    assert [p.bead.kind for p in placed] == [Kind.INNER_WALL, Kind.OUTER_WALL] * count
-    around = [p.points[:4].mean(axis=0) for p in placed]
+    placed = rows_of(order_beads([walls[k] for k in random.permutation(len(walls))], plate, STRAIGHT, np.zeros(2)))
+    assert [row.kind for row in placed] == [Kind.INNER_WALL, Kind.OUTER_WALL] * count
+    around = [row.points[:4].mean(axis=0) for row in placed]
     assert np.array(around[::2]) == pytest.approx(np.array(around[1::2]))
 
 
@@ -112,8 +113,8 @@ def test_every_outer_wall_comes_right_after_the_inner_wall_nearest_to_it(seed: i
 def test_support_comes_before_the_part_where_a_part_begins_and_else_where_the_way_is_short(first: bool) -> None:
     section, support = Polygons.square((10.0, 10.0)), Polygons.square((10.0, 10.0)).translate((30.0, 0.0))
     beads = [line(5, 5), line(35, 5, OUTSIDE, Kind.SUPPORT)]
-    kinds = [p.bead.kind for p in order_beads(beads, section, STRAIGHT, None if first else np.array([4.0, 5.0]), support)]
-    assert kinds == ([Kind.SUPPORT, Kind.INFILL] if first else [Kind.INFILL, Kind.SUPPORT])
+    placed = order_beads(beads, section, STRAIGHT, None if first else np.array([4.0, 5.0]), support)
+    assert [row.kind for row in rows_of(placed)] == ([Kind.SUPPORT, Kind.INFILL] if first else [Kind.INFILL, Kind.SUPPORT])
 
 
 def test_a_travel_goes_round_the_outer_wall_beside_an_interface_or_retracts() -> None:

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats
-from slicer.bead import length_mm
+from slicer.geometry.polyline import length_mm
 from slicer.travel.rings import AS_IT_IS, CLOSED, OPEN, Run, order_lines
 
 SQUARE = np.array([[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]], dtype=float)

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, offset
-from slicer.paths import Kind, Path
-from slicer.travel.wiping import keep_wipes_off
+from slicer.paths import Kind
+from slicer.strokes import strokes_of
+from slicer.travel.wiping import may_wipe_over
 
 SQUARE = Polygons.square((20.0, 20.0))
 SKIN = SQUARE - offset(SQUARE, -0.36)
@@ -16,6 +18,7 @@ UP_TO_THE_EDGE, BACK_OVER_THE_EDGE = [(10, 5), (10, 0.2)], [(10, 0.2), (10, 1.5)
 
 @pytest.mark.parametrize(("points", "wiped"), [(LED, False), (INNER, True), (UP_TO_THE_EDGE, True), (BACK_OVER_THE_EDGE, False)])
 def test_what_ends_inside_is_not_wiped_over_the_outer_wall(points: list[tuple[float, float]], wiped: bool) -> None:
-    path = Path(Kind.OUTER_WALL, np.array(points, dtype=float), 0.45, 30.0, 1.0, np.zeros((0, 2)), False)
-    assert keep_wipes_off([path], SKIN, 2.0)[0].wiped is wiped
-    assert keep_wipes_off([path], Polygons(), 2.0) == (path,)
+    bead = Bead(Kind.OUTER_WALL, np.array(points, dtype=float), 0.45, 0)
+    strokes = strokes_of([(bead, bead.points)], np.array([False]), {}, 0.0)
+    assert may_wipe_over(strokes, SKIN, 2.0).tolist() == [wiped]
+    assert may_wipe_over(strokes, Polygons(), 2.0).tolist() == [True]

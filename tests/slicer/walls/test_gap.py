@@ -9,25 +9,23 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import Bead, length_mm
+from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, bead_area_mm2
+from slicer.strokes import strokes_of
 from slicer.walls.gap import LEAST_GAP, MOST_WIDER, gaps
-from slicer.walls.variable.pieces import split_course
-from tests.slicer.hand import as_shapely
+from slicer.walls.variable.pieces import in_pieces
+from tests.slicer.hand import as_shapely, rows_of
 
 WIDTH, HEIGHT = 0.45, 0.2
 
 
 def strips(beads: Sequence[Bead]) -> list[tuple[shapely.LineString, float]]:
     """The middle of every piece as it is printed, and its cross-section over the height, mm: as wide a place it fills."""
-    out = []
-    for bead in beads:
-        pieces = [(bead.points, bead.width_mm)]
-        if bead.course is not None:
-            pieces = list(split_course(bead.course.points, bead.course.widths))
-        out += [(shapely.LineString(points), bead_area_mm2(width, HEIGHT) / HEIGHT) for points, width in pieces]
-    return out
+    placed = [(bead, bead.points if bead.course is None else bead.course.points) for bead in beads]
+    pieces = in_pieces(strokes_of(placed, np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
+    return [(shapely.LineString(row.points), bead_area_mm2(row.width_mm, HEIGHT) / HEIGHT) for row in rows_of(pieces)]
 
 
 def plastic_mm2(beads: Sequence[Bead]) -> float:

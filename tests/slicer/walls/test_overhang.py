@@ -1,6 +1,6 @@
 """Overhanging walls: which stretches, by how much of the bead lies on the layer below, and what becomes of the rest."""
 
-from itertools import groupby, pairwise
+from itertools import groupby
 from typing import Any
 
 import manifold3d as m3
@@ -15,49 +15,53 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
+from slicer.strokes import Strokes, strokes_of
 from slicer.travel.combing import NOWHERE
-from slicer.travel.order import Placed
 from slicer.walls.overhang import split_overhangs
 from tests.shapes import standing
-from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
+from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, rows_of, whole
 
 WIDTH = 0.45
 
 
-def placed(points: Any, of: Kind = Kind.OUTER_WALL) -> Placed:
+def placed(points: Any, of: Kind = Kind.OUTER_WALL) -> Strokes:
     bead = Bead(of, np.array(points, dtype=float), WIDTH, 0)
-    return Placed(bead, bead.points, True, np.array([[-1.0, -1.0]]))
+    return strokes_of([(bead, bead.points)], np.array([True]), {0: np.array([[-1.0, -1.0]])}, 0.0)
+
+
+def kinds(strokes: Strokes) -> list[Kind]:
+    return [row.kind for row in rows_of(strokes)]
 
 
 def square(side: float) -> list[tuple[float, float]]:
     return [(0, 0), (side, 0), (side, side), (0, side), (0, 0)]
 
 
-def split(wall: Placed, section: Polygons, bank: Polygons | None, share: float = 0.5) -> list[Placed]:
-    return split_overhangs([wall], section, bank, profile(f"process.overhang_share={share}").process)
+def split(wall: Strokes, section: Polygons, bank: Polygons | None, share: float = 0.5) -> Strokes:
+    return split_overhangs(wall, section, bank, profile(f"process.overhang_share={share}").process)
 
 
 def test_the_stretch_beyond_the_bank_overhangs_and_nothing_is_lost() -> None:
     pieces = split(
         placed(square(10)), Polygons.square((12, 12)).translate((-1, -1)), Polygons.square((6, 20)).translate((-1, -5))
     )
-    assert [kind for kind, _ in groupby(p.bead.kind for p in pieces)] == [Kind.OUTER_WALL, Kind.OVERHANG, Kind.OUTER_WALL]
-    assert sum(p.bead.length_mm for p in pieces if p.bead.kind is Kind.OVERHANG) == pytest.approx(5 + 10 + 5, abs=0.3)
-    assert max(pieces, key=lambda p: p.bead.length_mm).bead.overhang == 4  # most of it has nothing under it
-    assert sum(p.bead.length_mm for p in pieces) == pytest.approx(40)
-    assert all((a.points[-1] == b.points[0]).all() for a, b in pairwise(pieces))
-    assert [p.retract for p in pieces] == [True] + [False] * (len(pieces) - 1)
-    assert [len(p.approach) for p in pieces] == [1] + [0] * (len(pieces) - 1)
+    assert [kind for kind, _ in groupby(kinds(pieces))] == [Kind.OUTER_WALL, Kind.OVERHANG, Kind.OUTER_WALL]
+    assert pieces.lengths_mm[pieces.is_of(Kind.OVERHANG)].sum() == pytest.approx(5 + 10 + 5, abs=0.3)
+    assert pieces.overhang[pieces.lengths_mm.argmax()] == 4  # most of it has nothing under it
+    assert pieces.lengths_mm.sum() == pytest.approx(40)
+    assert (pieces.last_points[:-1] == pieces.first_points[1:]).all()
+    assert pieces.retract.tolist() == [True] + [False] * (len(pieces) - 1)
+    assert [len(row.approach) for row in rows_of(pieces)] == [1] + [0] * (len(pieces) - 1)
 
 
 def test_a_line_that_fills_a_gap_beside_a_bridge_overhangs_as_walls_do() -> None:
     pieces = split(placed([(1, 5), (9, 5)], Kind.GAP), Polygons.square((10, 10)), Polygons.square((3, 10)))
-    assert [piece.bead.kind for piece in pieces] == [Kind.GAP, Kind.OVERHANG]
+    assert kinds(pieces) == [Kind.GAP, Kind.OVERHANG]
 
 
 def test_a_bead_shorter_than_two_lines_overhangs_where_all_of_it_hangs() -> None:
-    (piece,) = split(placed([(8, 5), (8.5, 5)]), Polygons.square((20, 10)), Polygons.square((5, 10)))
-    assert piece.bead.kind is Kind.OVERHANG
+    pieces = split(placed([(8, 5), (8.5, 5)]), Polygons.square((20, 10)), Polygons.square((5, 10)))
+    assert kinds(pieces) == [Kind.OVERHANG]
 
 
 @pytest.mark.parametrize(
@@ -65,8 +69,8 @@ def test_a_bead_shorter_than_two_lines_overhangs_where_all_of_it_hangs() -> None
 )
 def test_the_share_of_the_width_on_the_bank_decides(out: float, share: float, kind: Kind) -> None:
     bank = Polygons.square((20, 10)).translate((0, -out))
-    (piece,) = split(placed([(0, 10), (20, 10)]), Polygons.square((20, 15)), bank, share)
-    assert piece.bead.kind is kind
+    pieces = split(placed([(0, 10), (20, 10)]), Polygons.square((20, 15)), bank, share)
+    assert kinds(pieces) == [kind]
 
 
 @settings(max_examples=40, deadline=None)
@@ -76,11 +80,11 @@ def test_the_overhanging_length_is_shapelys(corners: int, radius: float, x: floa
     loop = radius * np.column_stack([np.cos(around), np.sin(around)])
     bank = Polygons.square((8, 8), True).translate((x, y))
     wall, section = placed(np.vstack([loop, loop[:1]])), Polygons([loop * 1.3])
-    pieces = split_overhangs([wall], section, bank, profile().process)
-    hangs = shapely.LineString(wall.points).difference(as_shapely(bank).buffer(0.02, join_style="mitre"))
-    hanging_mm = sum(p.bead.length_mm for p in pieces if p.bead.kind is Kind.OVERHANG)
+    pieces = split_overhangs(wall, section, bank, profile().process)
+    hangs = shapely.LineString(wall.points[:, :2]).difference(as_shapely(bank).buffer(0.02, join_style="mitre"))
+    hanging_mm = pieces.lengths_mm[pieces.is_of(Kind.OVERHANG)].sum()
     assert hanging_mm == pytest.approx(hangs.length, abs=4 * 2 * WIDTH)
-    assert sum(p.bead.length_mm for p in pieces) == pytest.approx(wall.bead.length_mm)
+    assert pieces.lengths_mm.sum() == pytest.approx(wall.lengths_mm[0])
 
 
 def funnel(angle: float) -> Mesh:
@@ -111,5 +115,5 @@ def test_a_part_on_plastic_overhangs_where_its_base_reaches_beyond() -> None:
 
 
 def test_nothing_overhangs_on_the_platform() -> None:
-    assert split(placed(square(10)), Polygons.square((12, 12)), None)[0].bead.kind is Kind.OUTER_WALL
+    assert kinds(split(placed(square(10)), Polygons.square((12, 12)), None)) == [Kind.OUTER_WALL]
     assert len(NOWHERE) == 0

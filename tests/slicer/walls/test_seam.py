@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, length_mm
+from slicer.bead import Bead
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import slice_part
 from slicer.walls.seam import Surroundings, place_seams, rear_of, seam_limits

@@ -7,9 +7,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import PATH_RESOLUTION_MM, spacing_mm
+from slicer.bead import spacing_mm
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import PATH_RESOLUTION_MM
 from slicer.paths import Kind, bead_area_mm2
 from slicer.walls.walls import wall_beads, walls
 from tests.slicer.hand import distances_mm, profile, section_at, shared

@@ -25,14 +25,14 @@ def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
 
 
 def _count(sliced: SlicedPart, kinds: tuple[Kind, ...]) -> int:
-    return sum(len(path.points) - 1 for layer in sliced.layers for path in layer.paths if path.kind in kinds)
+    return sum(int((np.diff(layer.starts) - 1)[layer.is_of(*kinds)].sum()) for layer in sliced.layers)
 
 
 def _pieces(layer: Layer, kinds: tuple[Kind, ...], step: int) -> Floats:
     """(n, 7) in the part frame: two ends and the height, which is that of so many layers."""
-    rows, high = [np.zeros((0, 7))], layer.height_mm * step
-    for path in layer.paths:
-        if path.kind in kinds:
-            points = np.column_stack([path.points, layer.z_mm + path.z_mm - high / 2.0])
-            rows.append(np.column_stack([points[:-1], points[1:], np.full(len(points) - 1, high)]))
-    return np.concatenate(rows)
+    high = layer.height_mm * step
+    points = np.column_stack([layer.points, layer.points_z_mm - high / 2.0])
+    begins = np.repeat(layer.is_of(*kinds), np.diff(layer.starts))
+    begins[layer.starts[1:] - 1] = False  # nothing leads from a stroke's last point to the next stroke
+    at = np.flatnonzero(begins)
+    return np.column_stack([points[at], points[at + 1], np.full(len(at), high)])

@@ -11,22 +11,24 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import ROUND_SIDES, length_mm
+from slicer.bead import ROUND_SIDES, Bead
 from slicer.geometry.distance import distances
 from slicer.geometry.polygons import Polygons, close_loop, edges, resample
+from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
 from slicer.slice import slice_part
+from slicer.strokes import strokes_of
 from slicer.walls.layer_walls import bead_rule, layer_walls
 from slicer.walls.variable.counts import count_beads
 from slicer.walls.variable.loops import trace_loops
-from slicer.walls.variable.pieces import split_course
+from slicer.walls.variable.pieces import in_pieces
 from slicer.walls.variable.rule import FEATURE
 from slicer.walls.variable.skeleton import skeleton_of
 from slicer.walls.variable.variable import STEP, Wall, variable_walls
 from slicer.walls.walls import wall_beads
 from tests.shapes import from_manifold
-from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, volume_mm3, whole
+from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, rows_of, volume_mm3, whole
 
 WIDTH, HEIGHT, NOZZLE = 0.45, 0.2, 0.4
 PROCESS = profile().process
@@ -40,8 +42,9 @@ def plate(thickness: float, length: float = 12.0) -> Polygons:
 
 def plastic(walls: Sequence[Wall]) -> shapely.Geometry:
     """What walls cover, laid in pieces of one width as they are printed."""
-    pieces = [piece for wall in walls for piece in split_course(wall.course.points, wall.course.widths)]
-    return shapely.union_all([shapely.LineString(points).buffer(0.5 * width) for points, width in pieces])
+    beads = [Bead(Kind.OUTER_WALL, wall.course.points, wall.course.width_mm, 0, course=wall.course) for wall in walls]
+    pieces = in_pieces(strokes_of([(bead, bead.points) for bead in beads], np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
+    return shapely.union_all([shapely.LineString(row.points).buffer(0.5 * row.width_mm) for row in rows_of(pieces)])
 
 
 def across(walls: Sequence[Wall], x: float) -> int:
