@@ -12,6 +12,9 @@ from slicer.geometry.polyline import length_mm, simplify
 from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
+OUTSIDE = -1000  # ranks up to this belong to no island of the section: skirt, brim, support
+BEFORE_WALLS = -500  # beads of this rank come before the walls of their island; those of walls are above
+FILL, LAST = 1, 99  # beads of these ranks fill what the walls enclose, in any order; what smooths a top comes after
 ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: what two half circles leave of their square, as in PrusaSlicer's Flow
 INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin bead so wide stays under the flat of the tip
 EVEN_MM = 0.03  # widths that differ by less are one

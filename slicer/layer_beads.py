@@ -5,8 +5,8 @@ from dataclasses import replace
 from slicer.bead import WALLS, Bead, simplify_bead, with_line_width
 from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area, infill_bridge_beads
 from slicer.fill.infill import infill_beads
+from slicer.fill.ironing import ironing_beads
 from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_beads
-from slicer.finish.ironing import ironing_beads
 from slicer.geometry.polygons import union
 from slicer.paths import Kind
 from slicer.shells import Shells

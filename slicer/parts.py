@@ -21,13 +21,13 @@ from mdp.decomposition import Part
 from mdp.kernels import threads
 from mdp.kernels.processes import end_with
 from profiles.profile import Profile
-from slicer.finish.vase import check_vase
 from slicer.interface.pins import plan_pins
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import SlicedPart
 from slicer.sectioning import section_part
 from slicer.slice import slice_supported
-from slicer.support.handed_down.plan import plan_supports
+from slicer.strokes.vase import check_vase
+from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, own_supports
 
 FEWEST_LAYERS = 250  # fewer are sliced sooner than processes are forked and their paths brought back

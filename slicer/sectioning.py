@@ -9,15 +9,16 @@ from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.support_need.patches import NARROW
 from profiles.profile import Profile
 from slicer.bead import first_layer_process
-from slicer.finish.compensation import compensate, compensate_elephant_foot
-from slicer.finish.vase import vase_profile
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset, opening
 from slicer.heights import layer_heights, limb_planes_mm
+from slicer.interface.compensation import compensate, compensate_elephant_foot
 from slicer.interface.interface import plastic_below
 from slicer.interface.interlock import cut_grooves
+from slicer.interface.model import surroundings_of
 from slicer.interface.pins import NONE, Pins, cut_pins
 from slicer.sections import Sections
+from slicer.strokes.vase import vase_profile
 from slicer.support.pedestal import pedestal_layers, without_pedestal
 from slicer.walls.brim import plate_outline
 from slicer.walls.layer_walls import without_hairs
@@ -45,7 +46,8 @@ def section_part(
         outlines = lay_on_plate(
             outlines, int(np.searchsorted(heights.cut_mm, PLATFORM_TOLERANCE_MM)), base, process.line_width_mm
         )
-    outlines = compensate(outlines, part, later, heights.cut_mm, process)
+    around = surroundings_of(part, earlier, later, heights, process)
+    outlines = compensate(outlines, part, later, around.beside, heights.cut_mm, process)
     outlines = cut_pins(outlines, part, later, pins, heights.cut_mm, of_print)
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
@@ -62,6 +64,7 @@ def section_part(
         outlines=outlines,
         own=own,
         ungrooved=ungrooved,
+        surroundings=around,
         plastic_below=plastic_below(part, earlier, outlines[0]),
         plate=plate_outline(profile.machine.table),
         pedestal_layers=pedestal,

@@ -25,6 +25,19 @@ class Pin:
 
 
 @dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Sections of the model's other parts in a part's frame, each taken once.
+
+    beside: of later parts at the heights of the part's layers; above: of later parts over the last layer, as many as shells look;
+    below: of the model under the base plane, the nearest first; empty where the earlier parts are not known.
+    """
+
+    beside: Sequence[Polygons]
+    above: Sequence[Polygons] = ()
+    below: Sequence[Polygons] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Sections:
     """A part's layers, one entry each, before anything is laid.
 
@@ -43,6 +56,7 @@ class Sections:
     outlines: Sequence[Polygons]
     own: Sequence[Polygons]
     ungrooved: Sequence[Polygons]
+    surroundings: Surroundings
     plastic_below: Polygons | None
     plate: Polygons
     pedestal_layers: int = 0
@@ -77,4 +91,5 @@ class Sections:
         tips_mm = tip_mm[-1] + height_mm * np.arange(1, count + 1)
         more = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
         outlines, own, ungrooved = ([*places, *[Polygons()] * count] for places in (self.outlines, self.own, self.ungrooved))
-        return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved)
+        around = replace(self.surroundings, beside=[*self.surroundings.beside, *[Polygons()] * count])
+        return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved, surroundings=around)

@@ -7,15 +7,15 @@ from profiles.process import Process
 from slicer.bead import Bead, first_layer_process, interface_process, with_line_width
 from slicer.fill.bridge import Bridge
 from slicer.fill.infill import pattern_density
+from slicer.fill.ironing import ironed_areas
 from slicer.fill.region import Region, regions
-from slicer.finish.ironing import ironed_areas
 from slicer.geometry.polygons import Polygons
 from slicer.interface.cut_walls import cover, cut_walls
 from slicer.interface.model import model_around
 from slicer.overhangs import Overhang, bridges_of_layers
 from slicer.sections import Sections
+from slicer.strokes.overhanging import strengthen_overhangs
 from slicer.support.support import Supports
-from slicer.walls.overhang import strengthen_overhangs
 from slicer.walls.walls import Walls
 
 
@@ -69,7 +69,8 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     covers = cover(model, sections.own, walled)
     filled = regions([layer.walls.inside for layer in walled], covers, not sections.on_platform, process)
     bridges = bridges_of_layers(sections, overhangs, supports.areas)
-    ironed = ironed_areas(sections, filled)
+    around = sections.surroundings
+    ironed = ironed_areas(filled, [*around.beside, *around.above[:1]], process)
     infill = with_line_width(process, process.infill_line_width_mm)
     return Shells(
         supports,

@@ -1,7 +1,7 @@
 """Slicing: one part of a decomposition becomes layers of paths in its own frame.
 
 Each value is made from the one before: the part's sections (slicer.sectioning), what of them overhangs (slicer.overhangs), the
-support that this needs (slicer.support.support; for all parts together slicer.support.handed_down.plan), the shells of every
+support that this needs (slicer.support.support; for all parts together slicer.support.handed_down), the shells of every
 layer (slicer.shells), its beads (slicer.layer_beads), and these in order, with speed and flow.
 """
 
@@ -16,8 +16,6 @@ from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead
-from slicer.cooling import fan_share, layer_time_s, own_fans, rising_fan, speeds_mm_s
-from slicer.finish.vase import bottom_layers, vase_layers
 from slicer.geometry.polygons import Polygons
 from slicer.interface.interface import begin_inside, interface_edges, skin_beside
 from slicer.interface.interlock import fill_grooves
@@ -29,15 +27,16 @@ from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, Unsupported
 from slicer.sectioning import section_part
 from slicer.sections import Sections
 from slicer.shells import Shells, build_shells
-from slicer.speed import first_layer_speeds
+from slicer.strokes.order import order_beads
+from slicer.strokes.overhanging import split_overhangs
+from slicer.strokes.pieces import in_pieces
+from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams, rear_of, seam_limits
+from slicer.strokes.seam_plan import plan_seams
+from slicer.strokes.speed import fan_share, first_layer_speeds, layer_time_s, own_fans, rising_fan, speeds_mm_s
+from slicer.strokes.vase import bottom_layers, vase_layers
+from slicer.strokes.wiping import may_wipe_over
 from slicer.support.reason import explain
 from slicer.support.support import Supports, own_supports
-from slicer.travel.order import order_beads
-from slicer.travel.wiping import may_wipe_over
-from slicer.walls.overhang import split_overhangs
-from slicer.walls.seam import NO_SEAMS, Surroundings, place_seams, rear_of, seam_limits
-from slicer.walls.seam_plan import plan_seams
-from slicer.walls.variable.pieces import in_pieces
 from slicer.zones import no_seam_segments
 
 OnLayer = Callable[[int, int], None]

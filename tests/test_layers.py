@@ -31,7 +31,7 @@ CONFINED = {
         "machine/calibration/coupon/",
     ),
     "numba": ("mdp/kernels/kernel",),
-    "shapely": ("slicer/travel/islands", "machine/dryrun/placement"),
+    "shapely": ("slicer/strokes/order", "machine/dryrun/placement"),
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
     "httpx": ("machine/network/http.py",),

@@ -19,7 +19,7 @@ from profiles.errors import UserError
 from profiles.profile import Profile, load
 from slicer.overhangs import find_overhangs
 from slicer.sectioning import section_part
-from slicer.support.handed_down.plan import plan_supports
+from slicer.support.handed_down import plan_supports
 from slicer.support.reason import explain
 from slicer.support.support import Supports, own_supports
 

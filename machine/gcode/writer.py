@@ -24,7 +24,7 @@ from mdp.pose import level
 from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import KINDS, NUMBER, Kind
-from slicer.speed import travel_mm_s2
+from slicer.strokes.speed import travel_mm_s2
 
 ROUNDING_MM = 0.0015  # an arc's centre is written in thousandths
 BLOCKS = ("start", "before_part", "after_part", "end")

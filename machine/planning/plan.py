@@ -21,8 +21,8 @@ from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.profile import Profile
 from slicer.paths import KINDS, Kind, Layer, Path, SlicedPart, bead_area_mm2
-from slicer.speed import stroke_accelerations
-from slicer.travel.wiping import wipe_trail
+from slicer.strokes.speed import stroke_accelerations
+from slicer.strokes.wiping import wipe_trail
 
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 

@@ -16,8 +16,8 @@ from profiles.errors import MoveError
 from profiles.profile import Profile
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Layer, Path
-from slicer.speed import travel_mm_s2
-from slicer.travel.wiping import STANDING_MM, first_length, runs_round, wipe_trail
+from slicer.strokes.speed import travel_mm_s2
+from slicer.strokes.wiping import STANDING_MM, first_length, runs_round, wipe_trail
 
 TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
 

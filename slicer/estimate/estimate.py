@@ -17,10 +17,10 @@ from slicer.estimate.duration import line_s
 from slicer.estimate.sampled_part import SampledPart, sample_part
 from slicer.estimate.shell import extent_of
 from slicer.estimate.strokes import LayerSpeeds, Strokes, line_strokes, loop_strokes, shell_strokes, support_strokes
-from slicer.finish.vase import vase_profile
 from slicer.geometry.polygons import contours, offset
 from slicer.paths import Kind, bead_area_mm2
-from slicer.speed import axes_mm_s2, first_layer_speeds, travel_mm_s2
+from slicer.strokes.speed import axes_mm_s2, first_layer_speeds, travel_mm_s2
+from slicer.strokes.vase import vase_profile
 from slicer.support.pedestal import DENSITY, ROOF_LAYERS
 from slicer.walls.brim import brim
 

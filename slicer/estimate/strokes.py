@@ -18,7 +18,7 @@ from slicer.estimate.shell import Extent, Shell
 from slicer.geometry.polygons import close_loop
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, bead_area_mm2
-from slicer.speed import axes_mm_s2, stroke_accelerations, stroke_speeds
+from slicer.strokes.speed import axes_mm_s2, stroke_accelerations, stroke_speeds
 
 NARROW_STROKE_MM = 10.0  # a stroke in a narrow place is hardly longer before its width changes
 SPREAD = (0.3, 1.7)  # times the mean: lines of a pattern are of all lengths, and short ones cost more than their share

@@ -1,15 +1,24 @@
-"""Infill: sparse patterns; a pattern gives the families of lines that one layer takes."""
+"""Infill: sparse patterns; a pattern gives the families of lines that one layer takes.
+
+Gyroid: the level layers of Schoen's minimal surface sin x cos y + sin y cos z + sin z cos x = 0 as wavy lines. At height z the
+equation has the form A sin(u + phase) = B in one of x and y: in y when |cos z| > |sin z|, else in x; so every line is the graph
+of a function and runs through the whole layer (PrusaSlicer's gyroid has the same lines).
+
+Honeycomb: hexagons drawn by zigzag lines that lie side by side where neighbouring cells meet. Every line runs along one flat
+side, over a slanted one, along the next flat side and back, so the flat sides are double; the frame turns by 60 degrees from
+layer to layer, so that every side is double in one layer of three.
+"""
 
 from collections.abc import Callable, Sequence
-from math import sqrt
+from math import cos, pi, sin, sqrt
+
+import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
 from slicer.fill.anchor import Limits, anchor_lines
-from slicer.fill.gyroid import LENGTH, gyroid
-from slicer.fill.honeycomb import honeycomb
-from slicer.fill.pattern import LinePattern, PatternLayer, clip_pattern, parallel_lines
+from slicer.fill.pattern import Box, LinePattern, Lines, PatternLayer, clip_pattern, grid_numbers, parallel_lines
 from slicer.geometry.clip import border_of, merge_pieces
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.geometry.polyline import length_mm
@@ -19,6 +28,75 @@ RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 SAMPLES = 6  # layers from which the plastic of anchors is judged
 MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border
+# Of the lines in a period squared, in periods, mean over all heights, chords instead of arcs: integrated numerically.
+LENGTH = 2.454
+STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
+TURN_DEG = 60.0  # a third of the half turn after which lines are themselves again
+
+
+def honeycomb(layer: PatternLayer) -> LinePattern:
+    """Zigzags of the density."""
+    side = side_mm(layer.spacing_mm, min(layer.density, 1.0))
+    return LinePattern(layer.angle_deg + TURN_DEG * (layer.number % 3), lambda box: _rows(box, side, layer.spacing_mm))
+
+
+def side_mm(spacing_mm: float, density: float) -> float:
+    """Side a of the hexagons: a strip of sqrt(3)/2 a holds one line of length 3 a + 2 d / sqrt(3) in every 3 a.
+
+    d = sqrt(3)/2 a - spacing is how far the slanted sides reach from one flat side to the next.
+    """
+    per_side, fixed = 3.0 + 1.0, 2.0 / sqrt(3.0) * spacing_mm
+    strip = 1.5 * sqrt(3.0) * density / spacing_mm
+    return (per_side + sqrt(per_side**2 - 4.0 * strip * fixed)) / (2.0 * strip)
+
+
+def _rows(box: Box, side: float, spacing_mm: float) -> Lines:
+    strip = 0.5 * sqrt(3.0) * side
+    reach = max(strip - spacing_mm, 0.0)
+    slant = reach / sqrt(3.0)
+    flat = 1.5 * side - slant
+    first, last = np.floor(box[0] / (3.0 * side)) - 1, np.ceil(box[2] / (3.0 * side)) + 1
+    along = (3.0 * side * np.arange(first, last + 1))[:, None] + np.array([0.0, flat, flat + slant, 2.0 * flat + slant])
+    across = np.tile(0.5 * reach * np.array([1.0, 1.0, -1.0, -1.0]), len(along))
+    lines = []
+    for k in grid_numbers(box[1] - strip, box[3] + strip, strip):
+        lines.append(np.stack([along.ravel(), (k + 0.5) * strip + (across if k % 2 == 0 else -across)], axis=1))
+    points = np.concatenate(lines) if lines else np.zeros((0, 2))
+    return points, np.arange(len(lines)) * along.size
+
+
+def gyroid(layer: PatternLayer) -> LinePattern:
+    """Waves whose plastic is the density on average over the layers."""
+    period = LENGTH * layer.spacing_mm / layer.density
+    height = 2.0 * pi * layer.z_mm / period
+    along_x = abs(cos(height)) > abs(sin(height))
+    return LinePattern(layer.angle_deg + (0.0 if along_x else 90.0), lambda box: _waves(box, period, height, along_x))
+
+
+def _waves(box: Box, period: float, height: float, along_x: bool) -> Lines:
+    """Two waves a period; in the frame turned by 90 degrees x is the gyroid's y and y its -x."""
+    unit = period / (2.0 * pi)
+    low, high = np.floor(box[0] / period * STEPS) - 1, np.ceil(box[2] / period * STEPS) + 1
+    run = np.arange(low, high + 1) * (2.0 * pi / STEPS)
+    rising, falling = _graphs(run, height) if along_x else _graphs_of_x(run, height)
+    first, last = np.floor(box[1] / period) - 2, np.ceil(box[3] / period) + 2
+    lines = [graph + 2.0 * pi * k for k in np.arange(first, last + 1) for graph in (rising, falling)]
+    points = np.stack([np.stack([run, line], axis=1) for line in lines]) * unit
+    return np.ascontiguousarray(points.reshape(-1, 2)), np.arange(len(lines)) * len(run)
+
+
+def _graphs(x: Floats, z: float) -> tuple[Floats, Floats]:
+    """The two y(x) of one period: sin x cos y + cos z sin y = -sin z cos x."""
+    amplitude, phase = np.hypot(np.sin(x), cos(z)), np.arctan2(np.full_like(x, cos(z)), np.sin(x))
+    away = np.arccos(np.clip(-sin(z) * np.cos(x) / amplitude, -1.0, 1.0))
+    return phase + away, phase - away
+
+
+def _graphs_of_x(y: Floats, z: float) -> tuple[Floats, Floats]:
+    """The two -x(y) of one period: cos y sin x + sin z cos x = -sin y cos z."""
+    amplitude, phase = np.hypot(np.cos(y), sin(z)), np.unwrap(np.arctan2(np.cos(y), np.full_like(y, sin(z))))
+    away = np.arccos(np.clip(-np.sin(y) * cos(z) / amplitude, -1.0, 1.0))
+    return -(phase + away), -(phase - away)
 
 
 def infill_cell_mm(process: Process) -> float:

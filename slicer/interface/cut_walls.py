@@ -15,7 +15,7 @@ from slicer.geometry.polygons import Polygons, close_loop, edges, offset
 from slicer.geometry.polyline import length_mm
 from slicer.interface.model import Model
 from slicer.paths import Kind
-from slicer.travel.split import Sides, cut_line
+from slicer.strokes.split import Sides, cut_line
 from slicer.walls.gap import gaps
 from slicer.walls.layer_walls import layer_walls
 from slicer.walls.walls import Walls, wall_rank, walls

@@ -8,14 +8,12 @@ import numpy as np
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from profiles.process import Process
-from slicer.bead import Bead, outer_wall_width_mm
+from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead, outer_wall_width_mm
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, offset, union
 from slicer.geometry.segments import near_height
 from slicer.paths import Kind
 from slicer.sections import Sections
-from slicer.travel.islands import OUTSIDE
-from slicer.travel.order import BEFORE_WALLS, FILL, LAST
 
 SKIN = 0.8  # line widths inside the section from where on a tip is off the outer wall, whose middle lies at 0.5
 SIDES = 32  # of what is round about an edge

@@ -20,8 +20,8 @@ from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset
 from slicer.interface.interface import BELOW_MM, frame_change
 from slicer.paths import Kind
-from slicer.strokes import Strokes
-from slicer.travel.split import split
+from slicer.strokes.split import split
+from slicer.strokes.strokes import Strokes
 
 STRIPE = 2.0  # line widths: grooves and ridges as wide as two beads can be printed
 SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)

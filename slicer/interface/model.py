@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.decomposition import Part
+from profiles.process import Process
 from slicer.fill.region import shell_layers
 from slicer.geometry.polygons import CLOSING_MM, Polygons, closing, islands, union
+from slicer.heights import Heights
+from slicer.interface.compensation import reach_mm
 from slicer.interface.interface import sections_of, touching
-from slicer.sections import Sections
+from slicer.sections import Sections, Surroundings
 
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 
@@ -34,33 +37,35 @@ class Model:
         return any(not area.is_empty() for area in self.others)
 
 
-def model_around(sections: Sections) -> Model:
-    """The model around the layers of a part.
-
-    Earlier parts that are not handed over are taken to fill the first section.
-    """
-    process, part, own, heights = sections.process, sections.part, sections.own, sections.heights
+def surroundings_of(
+    part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process
+) -> Surroundings:
+    """What of other parts lies around the layers of a part, as far as its shells look."""
     top, bottom = shell_layers(process)
     step = process.layer_height_mm
     over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
-    reach_mm = step * max(top, bottom, process.interface_top_layers)
-    earlier, later = (touching(part, others, reach_mm) for others in (sections.earlier, sections.later))
-    others = sections_of(later, part, np.concatenate([heights.cut_mm, over]))
-    whole = [joined(*three) for three in zip(sections.ungrooved, own, others[: len(own)], strict=True)]
+    reach = max(step * max(top, bottom, process.interface_top_layers), reach_mm(process))
+    before, after = (touching(part, others, reach) for others in (earlier, later))
+    others = sections_of(after, part, np.concatenate([heights.cut_mm, over]))
+    below: list[Polygons] = []
+    if earlier:
+        deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
+        below = [closing(model, CLOSING_MM) for model in sections_of([*before, *after], part, deep)[::-1]]
+    count = len(heights.cut_mm)
+    return Surroundings(others[:count], others[count:], below)
+
+
+def model_around(sections: Sections) -> Model:
+    """The model around the layers of a part.
+
+    Earlier parts that are not known are taken to fill the first section; under the platform is nothing.
+    """
+    own, around = sections.own, sections.surroundings
+    top, bottom = shell_layers(sections.process)
+    whole = [joined(*three) for three in zip(sections.ungrooved, own, around.beside, strict=True)]
     beside = [model - mine if model is not None else Polygons() for model, mine in zip(whole, own, strict=True)]
-    above = others[len(own) :]
-    below = _below(part, None if sections.earlier else own[0], [*earlier, *later], step, bottom)
-    return Model(whole, [*beside, *above], below, above[:top])
-
-
-def _below(part: Part, first: Polygons | None, others: Sequence[Part], step: float, count: int) -> list[Polygons]:
-    """The model under a base plane, first where that is given; under the platform is nothing."""
-    if part.index == 1:
-        return [Polygons()] * count
-    if first is not None:
-        return [first] * count
-    deep = np.asarray(-step * (np.arange(count)[::-1] + 0.5), dtype=np.float64)
-    return [closing(model, CLOSING_MM) for model in sections_of(others, part, deep)[::-1]]
+    below = around.below or [Polygons() if sections.on_platform else own[0]] * bottom
+    return Model(whole, [*beside, *around.above], below, around.above[:top])
 
 
 def joined(ungrooved: Polygons, own: Polygons, beside: Polygons) -> Polygons | None:

@@ -18,7 +18,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import Bead
+from slicer.bead import OUTSIDE, Bead
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, area_mm2, clean, islands, offset, offset_round, union
 from slicer.geometry.polyline import length_mm
@@ -26,7 +26,6 @@ from slicer.heights import Heights, layer_heights, limb_planes_mm
 from slicer.interface.interface import BELOW_MM, frame_change, touching
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sections import Pin
-from slicer.travel.islands import OUTSIDE
 
 SIDES = 24  # of a hole
 MOUTH_MM = 1.0  # holes are cut so far beyond the base plane, where there is nothing, so that no skin is left over them

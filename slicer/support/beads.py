@@ -4,11 +4,10 @@ from collections.abc import Sequence
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, spacing_mm
+from slicer.bead import OUTSIDE, Bead, spacing_mm
 from slicer.fill.pattern import zigzag_lines
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset, opening
 from slicer.paths import Kind
-from slicer.travel.islands import OUTSIDE
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
 SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it

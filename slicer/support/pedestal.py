@@ -11,13 +11,12 @@ import numpy as np
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.process import Process
-from slicer.bead import Bead, spacing_mm
+from slicer.bead import OUTSIDE, Bead, spacing_mm
 from slicer.fill.pattern import zigzag_lines
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, close_loop, contours, offset
 from slicer.paths import Kind
-from slicer.travel.islands import OUTSIDE
 
 ROOF_LAYERS = 3  # the first of them sags between the sparse lines, the last one is even
 DENSITY = 0.25  # of its inside: lines near enough for the roof to span, as a raft's base

@@ -26,10 +26,28 @@ from math import floor
 
 from slicer.geometry.polygons import Polygons, closing, islands, union
 from slicer.support.branch import Branch, Growth, branch_of, lower_branches
-from slicer.support.columns import JOIN_MM
-from slicer.support.reachable import LEAST_MM2, SMOOTH_MM, ReachableAreas
+from slicer.support.reachable import LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, carrying_area
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
+JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The places of a layer's support."""
+
+    area: Polygons
+
+    def add_contact(self, contact: Polygons, reachable: Polygons, top_mm: float) -> "Columns":
+        """With what begins in this layer."""
+        return self if contact.is_empty() else Columns(closing(self.area + contact, JOIN_MM).simplify(SMOOTH_MM) ^ reachable)
+
+    def lower(self, areas: ReachableAreas, layer: int) -> "Columns":
+        """What carries a layer's support in the layer below."""
+        if (self.area - areas.reachable[layer - 1]).is_empty():
+            return self
+        lower = carrying_area(self.area, areas.reachable[layer - 1], areas.placeable[layer], float(areas.lean_mm[layer]))
+        return Columns(lower.simplify(SLIVER_MM))
 
 
 @dataclass(frozen=True, eq=False)

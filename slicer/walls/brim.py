@@ -8,7 +8,7 @@ from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
 from slicer.geometry.polygons import Polygons, area_mm2, contours, offset, offset_round
 from slicer.paths import Kind
-from slicer.walls.seam import start_at_rear
+from slicer.strokes.seam import start_at_rear
 
 RANK = -2000  # before all walls; the loops count down from it
 LEAST_MM2 = 1e-3  # areas smaller than this are rounding

@@ -6,8 +6,8 @@ import pytest
 
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
-from slicer.finish.compensation import compensate_elephant_foot
 from slicer.geometry.polygons import Polygons
+from slicer.interface.compensation import compensate_elephant_foot
 from slicer.paths import Kind, SlicedPart
 from slicer.slice import slice_part
 from tests.shapes import box, standing

@@ -16,7 +16,7 @@ from profiles.profile import Profile, load
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
-from slicer.travel.wiping import first_length, wipe_trail
+from slicer.strokes.wiping import first_length, wipe_trail
 from tests.shapes import box
 from tests.slicer.hand import whole
 

@@ -10,9 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import Bead
-from slicer.fill.gyroid import LENGTH, gyroid
-from slicer.fill.honeycomb import honeycomb, side_mm
-from slicer.fill.infill import PATTERNS, infill_beads, pattern_density
+from slicer.fill.infill import LENGTH, PATTERNS, gyroid, honeycomb, infill_beads, pattern_density, side_mm
 from slicer.fill.pattern import PatternLayer, clip_pattern
 from slicer.geometry.clip import border_of, rotation_2d
 from slicer.geometry.polygons import Polygons, offset

@@ -12,7 +12,7 @@ from slicer.bead import Bead
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, clean
 from slicer.paths import Kind
-from slicer.travel.order import order_beads
+from slicer.strokes.order import order_beads
 from tests.slicer.hand import profile, rows_of
 
 WIDTH, HEIGHT = 0.45, 0.2

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
-from slicer.bead import Bead
+from slicer.bead import OUTSIDE, Bead
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean
 from slicer.interface.interface import (
@@ -28,7 +28,6 @@ from slicer.interface.plastic import _nearest_areas
 from slicer.paths import Kind, Layer
 from slicer.sectioning import section_part
 from slicer.slice import slice_part
-from slicer.travel.islands import OUTSIDE
 from tests.mdp.solids import random_direction, random_solid
 from tests.shapes import box
 from tests.slicer.hand import as_shapely, cut, profile

@@ -18,11 +18,11 @@ from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
 from slicer.slice import slice_part
-from slicer.strokes import strokes_of
+from slicer.strokes.pieces import in_pieces
+from slicer.strokes.strokes import strokes_of
 from slicer.walls.layer_walls import bead_rule, layer_walls
 from slicer.walls.variable.counts import count_beads
 from slicer.walls.variable.loops import trace_loops
-from slicer.walls.variable.pieces import in_pieces
 from slicer.walls.variable.rule import FEATURE
 from slicer.walls.variable.skeleton import skeleton_of
 from slicer.walls.variable.variable import STEP, Wall, variable_walls

@@ -1,1 +1,0 @@
-"""Finish: sizes that come out as the model has them, and smooth tops."""

@@ -1,0 +1,247 @@
+"""Order: in which sequence the beads of a layer are printed, and which travels between them retract.
+
+Skirt and support come first. The pieces of support, then the islands of the section, follow each other in a short order; inside
+an island the walls come first, each outer wall right after the inner walls behind its seam, then by rising rank gaps, skin and
+infill. Every piece ends near the next one, and where a layer ends the next one begins.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.arrays import longs
+from mdp.kernels.kernel import kernel
+from mdp.kernels.sorting import counting_sort
+from mdp.mesh import Floats, Ints
+from profiles.process import Process
+from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, WALLS, Bead
+from slicer.geometry.polygons import Polygons, area_mm2, contours
+from slicer.paths import Kind
+from slicer.strokes.path_order import order_paths
+from slicer.strokes.rings import AS_IT_IS, CLOSED, OPEN, order_lines
+from slicer.strokes.strokes import Strokes, strokes_of
+from slicer.strokes.travels import NOWHERE, travels
+
+SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
+ROUNDS = 2  # a phase ends well only once it is known where the next one begins
+SUPPORTS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+FIRST = -1  # the number of what comes before all islands: skirt and brim
+
+
+def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> Ints:
+    """(n,) the number of each bead's island: the smallest outer contour round its start, of the section or of its support.
+
+    Those of support come after those of the section; FIRST: skirt and brim.
+    """
+    ranks = np.array([bead.rank for bead in beads], dtype=np.int32)
+    starts = np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
+    torn_off = np.array([bead.kind in SUPPORTS for bead in beads], dtype=np.bool_)
+    islands = np.where(ranks <= OUTSIDE, FIRST, 0).astype(np.int32)
+    own, after = ranks > OUTSIDE, 0
+    for wanted, area in ((own, section), (~own & torn_off, support)):
+        if wanted.any():
+            islands[wanted] = after + _pieces_around(starts[wanted], area)
+            after = int(islands.max()) + 1
+    return islands
+
+
+def _pieces_around(starts: Floats, area: Polygons) -> Ints:
+    """(n,) the number of the area's piece that each start lies in; those in none have a number of their own."""
+    outer = sorted((loop for loop in contours(area) if area_mm2(loop) > 0), key=lambda loop: abs(area_mm2(loop)))
+    if len(outer) < 2:
+        return np.zeros(len(starts), np.int32)
+    import shapely  # 30 ms, which commands that slice nothing need not spend
+
+    rings = shapely.linearrings(np.concatenate(outer), indices=np.repeat(np.arange(len(outer)), [len(loop) for loop in outer]))
+    piece, start = shapely.STRtree(shapely.points(starts)).query(shapely.polygons(rings), "contains")
+    pieces = np.full(len(starts), len(outer), np.int32)
+    np.minimum.at(pieces, start, piece.astype(np.int32))  # of an island in a hole of another one the inner, which is smaller
+    return pieces
+
+
+def order_beads(
+    beads: Sequence[Bead],
+    section: Polygons,
+    process: Process,
+    tip: Floats | None,
+    support: Polygons | None = None,
+    skin: Polygons | None = None,
+) -> Strokes:
+    """The beads of one layer in printing order.
+
+    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
+    beside an edge of an interface, which no travel passes over.
+    """
+    if not beads:
+        return strokes_of([], np.zeros(0, np.bool_), {}, process.small_wall_mm)
+    support = Polygons() if support is None else support
+    first = beads[0].points[0] if tip is None else tip
+    placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
+    to = np.array([points[0] for _, points in placed])
+    since = np.array([first, *(points[-1] for _, points in placed[:-1])])
+    retracts, detours = travels(since, to, section, support, process, skin)
+    retracts[0] = retracts[0] or tip is None
+    return strokes_of(placed, retracts, detours, process.small_wall_mm)
+
+
+def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first: bool) -> list[tuple[Bead, Floats]]:
+    """The beads in order, each with its points as printed."""
+    groups: defaultdict[int, list[Bead]] = defaultdict(list)
+    for bead, island in zip(beads, islands.tolist(), strict=True):
+        groups[island].append(bead)
+    order = _island_order(groups, first, support_first)
+    tip, placed = first, list[tuple[Bead, Floats]]()
+    for island, after in zip(order, [*order[1:], order[-1]], strict=True):
+        phases = _phases(groups[island])
+        goal = NOWHERE if after == island and len(phases) == 1 else _middle(groups[after])[None]
+        placed += _in_phases(phases, tip, goal)
+        tip = placed[-1][1][-1]
+    return placed
+
+
+def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: bool) -> list[int]:
+    """The islands in a short order after skirt and brim, support before the part where that is asked for."""
+    stages: defaultdict[int, list[int]] = defaultdict(list)
+    for island in sorted(groups):
+        stages[0 if island == FIRST else 1 if support_first and groups[island][0].kind in SUPPORTS else 2].append(island)
+    islands: list[int] = []
+    for stage in sorted(stages):
+        places = np.array([_middle(groups[island]) for island in stages[stage]])
+        goal = NOWHERE
+        if stage == 1 and 2 in stages:
+            parts = np.array([_middle(groups[island]) for island in stages[2]])
+            goal = parts[np.argmin(((parts - places.mean(axis=0)) ** 2).sum(axis=1))][None]
+        order, _ = order_paths(places, places, np.ones(len(places), np.bool_), first, goal)
+        islands += [stages[stage][k] for k in order]
+        first = _middle(groups[islands[-1]])
+    return islands
+
+
+def _middle(beads: Sequence[Bead]) -> Floats:
+    """(2,) the place that stands for an island: where its first outer wall begins, of others the middle of all that they are."""
+    leader = next((bead for bead in beads if bead.kind is Kind.OUTER_WALL), None)
+    points = np.concatenate([bead.points for bead in beads]) if leader is None else leader.points[:1]
+    middle: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return middle
+
+
+def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], tip: Floats, goal: Floats) -> list[tuple[Bead, Floats]]:
+    """The phases of an island one after the other, each once more when it is known where the next one begins."""
+    goals = [NOWHERE] * (len(phases) - 1) + [goal]
+    for _ in range(min(len(phases), ROUNDS)):
+        runs, at = list[list[tuple[Bead, Floats]]](), tip
+        for phase, end in zip(phases, goals, strict=True):
+            runs.append(_short_order(phase, at, end))
+            at = runs[-1][-1][1][-1]
+        goals = [*(np.ascontiguousarray(run[0][1][:1]) for run in runs[1:]), goal]
+    return [placed for run in runs for placed in run]
+
+
+def _short_order(items: Sequence[Sequence[Bead]], tip: Floats, goal: Floats) -> list[tuple[Bead, Floats]]:
+    """Chains of beads in a short order from the tip on, each bead with its points as printed."""
+    lines = [item[0].points if len(item) == 1 else np.array([item[0].points[0], item[-1].points[-1]]) for item in items]
+    fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
+    placed: list[tuple[Bead, Floats]] = []
+    for run in order_lines(lines, fixed, [_freedom(item) for item in items], tip, goal):
+        item = items[run.number]
+        if len(item) > 1:
+            placed += [(bead, bead.points) for bead in item]
+        elif len(run.pieces) > 1:
+            placed += [(replace(item[0], points=piece), piece) for piece in run.pieces]
+        else:
+            placed.append((item[0], run.pieces[0]))
+    return placed
+
+
+def _freedom(chain: Sequence[Bead]) -> int:
+    """What may be done with a chain so that the ways to and from it are short."""
+    bead = chain[0]
+    if len(chain) > 1 or bead.kind in SEAMED:
+        return AS_IT_IS
+    return CLOSED if bead.closed else OPEN if bead.kind is Kind.INFILL else AS_IT_IS
+
+
+def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
+    """What of an island is printed before what: by rank, but all walls at once, in families that stay together."""
+    leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
+    walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
+    phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
+    for bead in beads:
+        if leaders and BEFORE_WALLS < bead.rank <= 0:
+            continue
+        phase = FILL if FILL <= bead.rank <= LAST else bead.rank
+        if bead.follows and phases[phase]:
+            phases[phase][-1].append(bead)
+        else:
+            phases[phase].append([bead])
+    if walls:
+        phases[0] = _families(walls, leaders)
+    return [phases[rank] for rank in sorted(phases)]
+
+
+def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]]:
+    """Each outer wall with the inner walls nearest to it, in chains from the inside out that begin side by side."""
+    points = np.concatenate([leader.points for leader in leaders])
+    which = np.repeat(np.arange(len(leaders)), [len(leader.points) for leader in leaders])
+    inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
+    members: list[list[Bead]] = [[] for _ in leaders]
+    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, _starts(inner))]
+    for bead, k in zip(inner, near, strict=True):
+        members[k].append(bead)
+    return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]
+
+
+def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
+    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
+
+    The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
+    print them first would mean to go there and back.
+    """
+    chain, others = [leader], list[Bead]()
+    for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
+        equal = [bead for bead in family if bead.rank == rank]
+        equal.sort(key=lambda bead: float(((bead.points[0] - leader.points[0]) ** 2).sum()))
+        chain.append(equal[0])
+        others += equal[1:]
+    yield sorted(chain, key=lambda bead: bead.rank)
+    if others:
+        yield from _chains(others[0], others[1:])
+
+
+def _starts(beads: Sequence[Bead]) -> Floats:
+    return np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
+
+
+@kernel
+def _nearest(points: Floats, places: Floats) -> NDArray[np.int64]:
+    """The point nearest to each place; points sorted into square cells, searched ring by ring."""
+    low_x, high_x, low_y, high_y = points[0, 0], points[0, 0], points[0, 1], points[0, 1]
+    for k in range(len(points)):
+        low_x, high_x = min(low_x, points[k, 0]), max(high_x, points[k, 0])
+        low_y, high_y = min(low_y, points[k, 1]), max(high_y, points[k, 1])
+    cells = max(int(np.sqrt(len(points) / 2.0)), 1)
+    size = (max(high_x - low_x, high_y - low_y) + 1e-6) / cells
+    cell = longs(len(points), 0)
+    for k in range(len(points)):
+        cell[k] = int((points[k, 0] - low_x) / size) * cells + int((points[k, 1] - low_y) / size)
+    first, order = counting_sort(cell, cells * cells)
+    out: NDArray[np.int64] = longs(len(places), 0)
+    for p in range(len(places)):
+        px, py = places[p, 0], places[p, 1]
+        column, row = min(max(int((px - low_x) / size), 0), cells - 1), min(max(int((py - low_y) / size), 0), cells - 1)
+        best, least, ring = 0, np.inf, 0
+        while ring <= cells and (ring - 1) * size < least:
+            for c in range(max(column - ring, 0), min(column + ring, cells - 1) + 1):
+                for r in range(max(row - ring, 0), min(row + ring, cells - 1) + 1):
+                    if max(abs(c - column), abs(r - row)) != ring:
+                        continue
+                    for k in range(first[c * cells + r], first[c * cells + r + 1]):
+                        distance = np.hypot(points[order[k], 0] - px, points[order[k], 1] - py)
+                        if distance < least:
+                            best, least = order[k], distance
+            ring += 1
+        out[p] = best
+    return out

@@ -1,0 +1,371 @@
+"""Seam: where a wall that runs round begins and ends.
+
+Every outer wall begins at the place of least cost: the distance to a target (a planned place, the seam of the layer below, the
+rear, the tip), less a reward for corners, which hide a seam. Places near the edge of an interface are out of the question.
+Inner walls begin beside their outer wall. Where no seam is wanted anywhere along an outer wall, it begins and ends inside, over
+its inner walls (its lead).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import Bead
+from slicer.geometry.distance import distances
+from slicer.geometry.polygons import edges_of, start_at
+from slicer.geometry.segments import Segment, near_height, nearest_share, squared_distance_in_space
+from slicer.paths import Kind
+
+WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
+REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
+ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
+NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
+PLANNED = (0.7, 0.2)  # the same beside a planned place
+NO_CORNER = (0.0, 0.0)  # no corner is worth a way
+FOLLOW_MM, FOLLOW = 2.0, 0.3  # a planned place so near to the seam below draws it by this share of the way: the line is smooth
+GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
+FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
+NO_SEAMS = np.zeros((0, 2))
+SAMPLE_MM = 2.0  # straight sides are tried at this distance, too
+OFF_WALL = 0.7  # of its length a lead has to reach inside: so far beside its middle the outer wall is out of the tip's way
+ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise is none
+SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, and from where on it does so fully
+SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
+
+
+@part
+def corner_strength(loop: Floats, i: int) -> float:
+    """How much a corner the vertex of a loop (n, 2), solid on its left, is: 0 up to SMOOTH_DEG of turn, from SHARP_DEG on 1 where
+    it is an inner one and -1 where it is an outer one."""
+    px, py = _arm(loop, i, -1)
+    qx, qy = _arm(loop, i, 1)
+    bx, by, cx, cy = loop[i, 0] - px, loop[i, 1] - py, qx - loop[i, 0], qy - loop[i, 1]
+    cross, dot = bx * cy - by * cx, bx * cx + by * cy
+    if dot > SMOOTH_COSINE * np.hypot(bx, by) * np.hypot(cx, cy):
+        return 0.0
+    turn = np.degrees(np.arctan2(abs(cross), dot))
+    strength = min((turn - SMOOTH_DEG) / (SHARP_DEG - SMOOTH_DEG), 1.0)
+    return float(strength if cross < 0.0 else -strength)
+
+
+@part
+def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
+    """The point ARM_MM along the loop from a vertex, forward or backward."""
+    n, left, at = len(loop), ARM_MM, i
+    for _ in range(n):
+        ax, ay = loop[at % n, 0], loop[at % n, 1]
+        dx, dy = loop[(at + sense) % n, 0] - ax, loop[(at + sense) % n, 1] - ay
+        step = np.hypot(dx, dy)
+        if step >= left:
+            return ax + left / step * dx, ay + left / step * dy
+        left -= step
+        at += sense
+    return loop[at % n, 0], loop[at % n, 1]
+
+
+def lead_in(loop: Floats, lead_mm: float) -> Floats:
+    """(2,) from the loop's beginning to where a lead inside begins, as far as there is room."""
+    way = _inward(loop)
+    lead: Floats = way * min(lead_mm, 0.5 * _room_mm(loop, way))
+    return lead
+
+
+def begin_with_room(loop: Floats, lead_mm: float) -> Floats:
+    """The loop, begun at the place nearest to its beginning from which a lead leaves its outer wall; the one with most room where
+    there is none: in a sharp corner the way inside runs along the wall.
+    """
+    deepest, most = loop, _depth_mm(loop, lead_mm)
+    if most >= OFF_WALL * lead_mm:
+        return loop
+    steps = start_at(loop, 1) - loop
+    counts = (np.hypot(*steps.T) / SAMPLE_MM).astype(np.int64) + 1
+    places = [(i, s / counts[i]) for i in range(len(loop)) for s in range(counts[i])]
+    places.sort(key=lambda place: float(np.hypot(*(loop[place[0]] + place[1] * steps[place[0]] - loop[0]))))
+    for i, share in places:
+        begun = start_at(loop, i)
+        if share:
+            begun = np.concatenate([(loop[i] + share * steps[i])[None], start_at(loop, (i + 1) % len(loop))])
+        depth = _depth_mm(begun, lead_mm)
+        if depth > most:
+            deepest, most = begun, depth
+        if depth >= OFF_WALL * lead_mm:
+            break
+    return deepest
+
+
+def _depth_mm(loop: Floats, lead_mm: float) -> float:
+    """How far from the loop a lead begins."""
+    return float(distances((loop[0] + lead_in(loop, lead_mm))[None], edges_of([loop]))[0])
+
+
+def _inward(loop: Floats) -> Floats:
+    """Unit vector to the left of the loop at its beginning, where the solid is."""
+    steps = np.array([loop[0] - loop[-1], loop[1] - loop[0]])
+    steps /= np.maximum(np.hypot(*steps.T), 1e-12)[:, None]
+    along = steps.sum(axis=0)
+    length = float(np.hypot(*along))
+    along = along / length if length > 1e-6 else steps[1]
+    return np.array([-along[1], along[0]])
+
+
+def _room_mm(loop: Floats, way: Floats) -> float:
+    """How far the inside of a loop (n, 2) reaches from its beginning along a unit vector; 0 where that leads out of it."""
+    sides, beside = start_at(loop, 1) - loop, (loop - loop[0]) @ np.array([-way[1], way[0]])
+    following = start_at(beside, 1)
+    crossed = np.flatnonzero((beside > 0.0) != (following > 0.0))
+    share = beside[crossed] / (beside[crossed] - following[crossed])
+    along = (loop[crossed] + share[:, None] * sides[crossed] - loop[0]) @ way
+    along = along[along > 1e-6]
+    return float(along.min()) if len(along) % 2 else 0.0
+
+
+class SeamLimits(NamedTuple):
+    """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
+
+    edges: Floats
+    z: float
+    keep_mm: Floats
+
+
+NO_LIMITS = SeamLimits(np.zeros((0, 6)), 0.0, np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
+
+    tip: (2,) where the nozzle comes from. limits: what they keep clear of. layer: number. planned: (m, 2) where seams are hidden
+    best, of use to aligned ones.
+    """
+
+    rear: Floats
+    before: Floats
+    tip: Floats
+    limits: SeamLimits
+    layer: int
+    planned: Floats = field(default_factory=lambda: NO_SEAMS)
+
+
+def rear_of(bounds_mm: Floats) -> Floats:
+    """(2,) a point behind the middle of a part, as far as the part is deep; bounds_mm: (2, 3)."""
+    low, high = bounds_mm
+    return np.array([0.5 * (low[0] + high[0]), 2.0 * high[1] - low[1]])
+
+
+def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -> tuple[list[Bead], Floats]:
+    """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls.
+
+    The walls that run round come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its
+    beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
+    inside instead, over its inner walls, and so does one on which a person wants no seam anywhere.
+    """
+    seams: dict[int, Floats] = {}
+    out = list(beads)
+    for kind in WALLS:
+        known = np.array(list(seams.values())).reshape(-1, 2)
+        for k, bead in enumerate(beads):
+            if bead.kind is kind and not bead.line:
+                loop = np.ascontiguousarray(bead.points)
+                lead_mm = 0.0
+                if kind is Kind.INNER_WALL:
+                    loop, _ = _start_at_best(loop, _beside(loop, known), NO_LIMITS)
+                else:
+                    loop, free = _start_at_best(loop, _target(loop, process, around), around.limits)
+                    lead_mm = 0.0 if free else bead.width_mm
+                    loop = loop if free else begin_with_room(loop, lead_mm)
+                    seams[k] = loop[0]
+                out[k] = replace(bead, points=_open(loop, process.seam_gap * bead.width_mm, lead_mm))
+    return out, np.array(list(seams.values())).reshape(-1, 2)
+
+
+def start_at_rear(loop: Floats) -> Floats:
+    """A loop (n, 2) closed and begun at its rearmost point, the leftmost of several."""
+    at = int(np.lexsort((loop[:, 0], -loop[:, 1]))[0])
+    return np.concatenate([loop[at:], loop[: at + 1]])
+
+
+class _Target(NamedTuple):
+    """Where a seam is drawn to, and the distance, mm, that an inner or outer corner is worth."""
+
+    x: float
+    y: float
+    inner_mm: float
+    outer_mm: float
+
+
+def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Process) -> SeamLimits:
+    """Those of (n, 6) interface edges that lie within reach of a layer, and (k, 6) where a person wants no seam in it."""
+    keep_mm = process.interface_seam_mm
+    near = near_height(interfaces, z_mm, keep_mm)
+    distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(unwanted)])
+    return SeamLimits(np.concatenate([near, unwanted]), float(z_mm), distances_mm)
+
+
+@kernel
+def keeps_clear(places: Floats, limits: SeamLimits) -> NDArray[np.bool_]:
+    """(n,) whether (n, 2) places are clear of the limits."""
+    clear = np.ones(len(places), np.bool_)
+    for k in range(len(places)):
+        clear[k] = _clear(limits, places[k, 0], places[k, 1])
+    return clear
+
+
+def _start_at_best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[Floats, bool]:
+    """The loop (n, 2) begun at its place of least cost, and whether that is clear of interface edges."""
+    at, share, free = _best(loop, target, interfaces)
+    if share > 0.0:
+        new = loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at])
+        return np.concatenate([new[None], loop[at + 1 :], loop[: at + 1]]), free
+    return start_at(loop, at), free
+
+
+def _beside(loop: Floats, outer: Floats) -> _Target:
+    """Where an inner wall's seam is drawn to: the nearest of the (k, 2) seams of outer walls."""
+    distance, x, y = _nearest(loop, outer, np.inf)
+    return _Target(x, y, *NO_CORNER) if distance < np.inf else _Target(float(loop[0, 0]), float(loop[0, 1]), *NO_CORNER)
+
+
+def _target(loop: Floats, process: Process, around: Surroundings) -> _Target:
+    """Where an outer wall's seam is drawn to."""
+    rear = float(around.rear[0]), float(around.rear[1])
+    if process.seam == "rear":
+        return _Target(*rear, *NO_CORNER)
+    if process.seam == "nearest":
+        return _Target(float(around.tip[0]), float(around.tip[1]), *NO_CORNER)
+    if process.seam == "random":
+        return _Target(*_point_at(loop, (GOLDEN * (around.layer + 1)) % 1.0), *NO_CORNER)
+    distance, x, y = _nearest(loop, around.before, REACH_MM)
+    planned, px, py = _nearest(loop, around.planned, REACH_MM)
+    if planned < np.inf:
+        if np.hypot(px - x, py - y) < FOLLOW_MM and distance < np.inf:
+            px, py = x + FOLLOW * (px - x), y + FOLLOW * (py - y)
+        return _Target(px, py, *PLANNED)
+    if distance == np.inf:
+        return _Target(*rear, *ANYWHERE)
+    return _Target(x, y, *(ANYWHERE if process.seam == "corner" else NEARBY))
+
+
+def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
+    """The loop as a polyline that ends a gap before its beginning; lead_mm: both ends are drawn inside by that, as far as
+    there is room."""
+    points = np.concatenate([loop, loop[:1]])
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    if gap_mm > 0.0 and steps.sum() > 4.0 * gap_mm:
+        beyond = np.cumsum(steps[::-1])[::-1]  # from each point to the end
+        last = int(np.flatnonzero(beyond > gap_mm)[-1])
+        share = (beyond[last] - gap_mm) / steps[last]
+        points = np.concatenate([points[: last + 1], (points[last] + share * (points[last + 1] - points[last]))[None]])
+    if lead_mm > 0.0:
+        inward = lead_in(loop, lead_mm)
+        points = np.concatenate([(points[0] + inward)[None], points, (points[-1] + 0.5 * inward)[None]])
+    return points
+
+
+@kernel
+def _point_at(loop: Floats, share: float) -> tuple[float, float]:
+    """The point at a share of a loop's length, counted from its least point, so that it does not depend on the loop's start."""
+    n = len(loop)
+    first = 0
+    for i in range(n):
+        if loop[i, 0] < loop[first, 0] or (loop[i, 0] == loop[first, 0] and loop[i, 1] < loop[first, 1]):
+            first = i
+    total = 0.0
+    for i in range(n):
+        total += np.hypot(loop[i, 0] - loop[i - 1, 0], loop[i, 1] - loop[i - 1, 1])
+    left = share * total
+    for i in range(first, first + n):
+        ax, ay = loop[i % n, 0], loop[i % n, 1]
+        dx, dy = loop[(i + 1) % n, 0] - ax, loop[(i + 1) % n, 1] - ay
+        step = np.hypot(dx, dy)
+        if step >= left:
+            along = left / step if step > 0.0 else 0.0
+            return ax + along * dx, ay + along * dy
+        left -= step
+    return loop[first, 0], loop[first, 1]
+
+
+@part
+def _side(loop: Floats, i: int) -> Segment:
+    """The side from a vertex of a loop to the next one."""
+    after = (i + 1) % len(loop)
+    return Segment(loop[i, 0], loop[i, 1], loop[after, 0], loop[after, 1])
+
+
+@part
+def _project(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
+    """Distance from a point to a loop, the side that is nearest and how far along it."""
+    least, at, share = np.inf, 0, 0.0
+    for i in range(len(loop)):
+        side = _side(loop, i)
+        t = nearest_share(side, x, y)
+        distance = np.hypot(side.x0 + t * (side.x1 - side.x0) - x, side.y0 + t * (side.y1 - side.y0) - y)
+        if distance < least:
+            least, at, share = distance, i, t
+    return least, at, share
+
+
+@kernel
+def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, float, float]:
+    """The point nearest to a loop as (distance, x, y); the distance is infinite when none is within reach."""
+    low_x, high_x, low_y, high_y = loop[0, 0], loop[0, 0], loop[0, 1], loop[0, 1]
+    for i in range(len(loop)):
+        low_x, high_x = min(low_x, loop[i, 0]), max(high_x, loop[i, 0])
+        low_y, high_y = min(low_y, loop[i, 1]), max(high_y, loop[i, 1])
+    best, bx, by = np.inf, 0.0, 0.0
+    for p in range(len(points)):
+        x, y = points[p, 0], points[p, 1]
+        out = np.hypot(max(low_x - x, 0.0, x - high_x), max(low_y - y, 0.0, y - high_y))
+        if out < min(best, reach_mm):
+            distance = _project(loop, x, y)[0]
+            if distance < min(best, reach_mm):
+                best, bx, by = distance, x, y
+    return best, bx, by
+
+
+@kernel
+def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, float, bool]:
+    """The place of least cost as (side, share of it), and whether it keeps clear of interface edges."""
+    n = len(loop)
+    distance, at, share = _project(loop, target.x, target.y)
+    if share >= 1.0 - 1e-6:
+        at, share = (at + 1) % n, 0.0
+    elif share <= 1e-6:
+        share = 0.0
+    side = _side(loop, at)
+    free = _clear(interfaces, side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0))
+    least = distance + (0.0 if free else FORBIDDEN)
+    if target.inner_mm == 0.0 and target.outer_mm == 0.0 and free:
+        return at, share, free
+    for i in range(n):
+        side = _side(loop, i)
+        dx, dy = side.x1 - side.x0, side.y1 - side.y0
+        count = 1 if free and len(interfaces.edges) == 0 else int(np.hypot(dx, dy) / SAMPLE_MM) + 1
+        for s in range(count):
+            cx, cy = side.x0 + s / count * dx, side.y0 + s / count * dy
+            cost = np.hypot(cx - target.x, cy - target.y) + 1e-6 * cx
+            if s == 0 and target.inner_mm > 0.0:
+                strength = corner_strength(loop, i)
+                cost -= strength * target.inner_mm if strength > 0.0 else -strength * target.outer_mm
+            if cost < least:
+                clear = _clear(interfaces, cx, cy)
+                if clear or not free:
+                    cost += 0.0 if clear else FORBIDDEN
+                    if cost < least:
+                        least, at, share, free = cost, i, s / count, clear
+    return at, share, free
+
+
+@part
+def _clear(interfaces: SeamLimits, x: float, y: float) -> bool:
+    """Whether a place at their height keeps clear of all interface edges."""
+    for e in range(len(interfaces.edges)):
+        begin, end = interfaces.edges[e, :3], interfaces.edges[e, 3:]
+        if squared_distance_in_space((x, y, interfaces.z), begin, end) < interfaces.keep_mm[e] * interfaces.keep_mm[e]:
+            return False
+    return True

@@ -1,0 +1,189 @@
+"""Speed: how fast each kind of bead is laid and how hard it is accelerated, and how layers are cooled.
+
+A layer that would be done too soon is slowed down so that it has time to set; the fan follows the time of the layer, and is set
+for itself on bridges and overhangs.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.material import Material
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.geometry.polyline import length_mm
+from slicer.paths import KINDS, Kind, bead_area_mm2
+from slicer.strokes.strokes import RINGS, Strokes
+
+KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
+INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
+HANGING = (Kind.BRIDGE, Kind.OVERHANG)
+STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
+
+
+def speeds_mm_s(
+    strokes: Strokes, profile: Profile, height_mm: float, fixed_mm_s: Mapping[Kind, float] | None, flow: float
+) -> Floats:
+    """(k,) speeds of a layer's strokes; fixed_mm_s replaces the process's speeds by kind, flow multiplies every stroke's flow.
+
+    Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
+    below least_speed_mm_s.
+    """
+    process = profile.process
+    usual = _by_kind(stroke_speeds(process))[strokes.kind] if fixed_mm_s is None else _by_kind(fixed_mm_s)[strokes.kind]
+    asked = usual if fixed_mm_s is not None else _of_strokes(strokes, usual, process)
+    areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
+    speeds = np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas)
+    time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
+    return _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
+
+
+def _by_kind(speeds: Mapping[Kind, float]) -> Floats:
+    return np.array([speeds[kind] for kind in KINDS])
+
+
+def _of_strokes(strokes: Strokes, usual: Floats, process: Process) -> Floats:
+    """The kind's speed, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
+    hanging = np.array([np.inf, *_overhang_mm_s(process)])[strokes.overhang]
+    small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
+    lowered = np.minimum(usual, np.where(strokes.overhang > 0, hanging, small))
+    return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
+
+
+def _overhang_mm_s(process: Process) -> tuple[float, ...]:
+    return (
+        process.overhang_75_speed_mm_s,
+        process.overhang_50_speed_mm_s,
+        process.overhang_25_speed_mm_s,
+        process.overhang_0_speed_mm_s,
+    )
+
+
+def travel_time_s(strokes: Strokes, profile: Profile) -> float:
+    """What a layer's travels and retractions take at least."""
+    material = profile.material
+    pulls = int(strokes.retract.sum()) * 2.0 * material.retract_mm / material.retract_speed_mm_s
+    return _travels_mm(strokes) / profile.process.travel_speed_mm_s + pulls
+
+
+def _travels_mm(strokes: Strokes) -> float:
+    """Length of all ways between strokes."""
+    steps = strokes.first_points[1:] - strokes.last_points[:-1]
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    passes = strokes.approach_starts
+    for k in np.flatnonzero(np.diff(passes)).tolist():
+        if k:
+            way = [strokes.last_points[k - 1 : k], strokes.approach[passes[k] : passes[k + 1]], strokes.first_points[k : k + 1]]
+            lengths[k - 1] = length_mm(np.concatenate(way))
+    return float(lengths.sum())
+
+
+def layer_time_s(strokes: Strokes, speeds: Floats, profile: Profile) -> float:
+    """What a layer takes at least, accelerations left out."""
+    return float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)
+
+
+def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:
+    """Speeds by one factor slower so that the lengths take the time, none pushed below the least speed."""
+    floor = np.minimum(speeds, least_mm_s)
+    factor = 1.0
+    for _ in range(4):  # beads that reach the floor leave the rest of the waiting to the others
+        slowed = np.maximum(speeds * factor, floor)
+        free = slowed > floor
+        missing = time_s - float((lengths / slowed).sum())
+        busy = float((lengths[free] / slowed[free]).sum())
+        if missing <= 1e-9 or busy <= 0.0:
+            break
+        factor *= busy / (busy + missing)
+    return np.maximum(speeds * factor, floor)
+
+
+def fan_share(material: Material, process: Process, time_s: float) -> float:
+    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then less and less.
+
+    Straight from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as PrusaSlicer has it.
+    """
+    least = min(material.fan_least, material.fan)
+    quick, slow = process.least_layer_time_s, material.fan_layer_time_s
+    falling = max(0.0, (slow - time_s) / (slow - quick)) if slow > quick else 0.0
+    share = 1.0 if time_s <= quick else falling
+    return round((least + share * (material.fan - least)) / STEP) * STEP
+
+
+def rising_fan(material: Material, layer: int) -> float:
+    """Factor on the fan of part 1's layer (counted from 0): none up to fan_off_layers, then rising, 1 from fan_full_layer on."""
+    if layer < material.fan_off_layers:
+        return 0.0
+    return min((layer + 1 - material.fan_off_layers) / max(material.fan_full_layer - material.fan_off_layers, 1), 1.0)
+
+
+def own_fans(strokes: Strokes, material: Material, factor: float, layer_fan: float) -> Floats:
+    """(k,) part fan of bridges and overhanging walls, half way there of walls that lean; NaN: the layer's fan."""
+    hanging = factor * (material.fan if material.fan_bridge is None else material.fan_bridge)
+    over_infill = hanging if material.fan_infill_bridge is None else factor * material.fan_infill_bridge
+    own = np.where(strokes.over_infill, over_infill, hanging)
+    leaning = np.where(strokes.overhang > 0, np.round(0.5 * (layer_fan + own) / STEP) * STEP, np.nan)
+    return np.where(strokes.is_of(*HANGING), own, leaning)
+
+
+def stroke_speeds(process: Process) -> dict[Kind, float]:
+    """mm/s by kind of bead."""
+    return {
+        Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
+        Kind.INNER_WALL: process.inner_wall_speed_mm_s,
+        Kind.OVERHANG: process.overhang_75_speed_mm_s,
+        Kind.GAP: process.gap_speed_mm_s,
+        Kind.INFILL: process.infill_speed_mm_s,
+        Kind.SKIN: process.skin_speed_mm_s,
+        Kind.TOP_SKIN: process.top_skin_speed_mm_s,
+        Kind.BRIDGE: process.bridge_speed_mm_s,
+        Kind.IRONING: process.ironing_speed_mm_s,
+        Kind.SKIRT: process.first_layer_speed_mm_s,
+        Kind.PURGE: process.first_layer_speed_mm_s,
+        Kind.SUPPORT: process.support_speed_mm_s,
+        Kind.SUPPORT_INTERFACE: process.support_interface_speed_mm_s,
+    }
+
+
+def first_layer_speeds(process: Process, on_platform: bool) -> dict[Kind, float]:
+    """mm/s by kind of a part's first layer, on the platform or on plastic."""
+    if not on_platform:
+        return dict.fromkeys(Kind, process.interface_speed_mm_s)
+    inside = process.first_layer_infill_speed_mm_s or process.first_layer_speed_mm_s
+    return dict.fromkeys(Kind, process.first_layer_speed_mm_s) | dict.fromkeys(INSIDE, inside)
+
+
+def stroke_accelerations(profile: Profile, first_layer: bool) -> dict[Kind, float] | None:
+    """mm/s2 by kind; None where the process sets no acceleration at all, so that the firmware's own rule."""
+    process = profile.process
+    if not sets_acceleration(process):
+        return None
+    usual = process.acceleration_mm_s2 or axes_mm_s2(profile)
+    if first_layer:
+        return dict.fromkeys(Kind, process.first_layer_acceleration_mm_s2 or usual)
+    infill = process.infill_acceleration_mm_s2 or usual
+    hanging = process.bridge_acceleration_mm_s2 or usual
+    return dict.fromkeys(Kind, usual) | {
+        Kind.OUTER_WALL: process.outer_wall_acceleration_mm_s2 or usual,
+        Kind.INFILL: infill,
+        Kind.SUPPORT: infill,
+        Kind.SUPPORT_INTERFACE: infill,
+        Kind.BRIDGE: hanging,
+        Kind.OVERHANG: hanging,
+    }
+
+
+def travel_mm_s2(profile: Profile) -> float | None:
+    """mm/s2 of travels; None as for strokes."""
+    return (profile.process.travel_acceleration_mm_s2 or axes_mm_s2(profile)) if sets_acceleration(profile.process) else None
+
+
+def sets_acceleration(process: Process) -> bool:
+    """Whether the process sets any acceleration."""
+    return any(getattr(process, key) is not None for key in KEYS)
+
+
+def axes_mm_s2(profile: Profile) -> float:
+    """mm/s2 that both X and Y allow."""
+    return min(profile.machine.x.acceleration_mm_s2, profile.machine.y.acceleration_mm_s2)

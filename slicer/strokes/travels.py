@@ -1,0 +1,270 @@
+"""Travels: which of them pull the filament back, and which make a detour through the inside of an area instead.
+
+A travel may ooze where it stays inside the section, or over one and the same piece of support. All other ways lead through open
+air or over a surface: what oozes there is a string or a blob on a wall. Beside the edge of an interface, where a blob is seen all
+along the joint, a travel does not pass over the outer walls either.
+
+A detour follows the border of the area's inside from where the straight line leaves it to where it comes back, the shorter
+way round, and is then pulled taut. Every segment of it is tested against the border of the area's safe inside.
+"""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.arrays import floats, longs
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import outer_wall_width_mm
+from slicer.geometry.cells import Cells, cells_of, crossings, free, nearest, within
+from slicer.geometry.polygons import Polygons, offset
+from slicer.geometry.segments import Segment
+
+SAFE = 0.4  # line widths inside the area within which travels ooze unseen; centrelines of outer walls lie at 0.5
+BEHIND = 1.1  # detours run behind the outer wall where the area is wide enough,
+AMONG = 0.45  # else as near to its middle as the walls themselves
+TAUT = 3.0  # a detour along the border may be longer than allowed by this factor before it is pulled taut
+NOWHERE = np.zeros((0, 2))
+
+
+def travels(
+    since: Floats, to: Floats, section: Polygons, support: Polygons, process: Process, skin: Polygons | None = None
+) -> tuple[NDArray[np.bool_], dict[int, Floats]]:
+    """Which of the n travels, (n, 2) by two, retract, and the detours (k, 2) of some others, by the travel's number.
+
+    Those no shorter than process.retract_travel_mm retract that leave the inside both of the section and of its support and
+    find no short detour inside either. skin: outer walls beside an edge of an interface; short ones retract as well where they
+    would pass over it, unless they begin or end on it.
+    """
+    retracts: NDArray[np.bool_] = np.hypot(*(to - since).T) >= process.retract_travel_mm
+    detours: dict[int, Floats] = {}
+    widths_mm = (
+        min(process.line_width_mm, outer_wall_width_mm(process)),
+        process.support_line_width_mm or process.line_width_mm,
+    )
+    if retracts.any():
+        areas = zip((section, support), widths_mm, strict=True)
+        inside = [Combing(area, width) for area, width in areas if not area.is_empty()]
+        for combing in inside:
+            at = np.flatnonzero(retracts)
+            retracts[at] = combing.leaves(since[at], to[at])
+        for combing in inside if process.combing else []:
+            for k in np.flatnonzero(retracts).tolist():
+                detour = combing.detour(since[k], to[k], process.combing_detour_mm)
+                if detour is not None:
+                    retracts[k], detours[k] = False, detour
+    if skin is not None and not skin.is_empty():
+        combing, border = Combing(section, widths_mm[0], skin), cells_of(skin)
+        for k in np.flatnonzero(~retracts & ~lie_within(border, since) & ~lie_within(border, to)).tolist():
+            way = np.vstack([since[k], detours.get(k, to[:0]), to[k]])
+            if not crosses(border, way[:-1], way[1:]).any():
+                continue
+            detours.pop(k, None)
+            detour = combing.detour(since[k], to[k], process.combing_detour_mm) if process.combing else None
+            if detour is None:
+                retracts[k] = True
+            else:
+                detours[k] = detour
+    return retracts, detours
+
+
+@kernel
+def crosses(border: Cells, since: Floats, to: Floats) -> NDArray[np.bool_]:
+    """(n, 2) by two whether segments cross a border."""
+    out = np.empty(len(to), np.bool_)
+    for k in range(len(to)):
+        out[k] = not free(border, Segment(since[k, 0], since[k, 1], to[k, 0], to[k, 1]))
+    return out
+
+
+@kernel
+def lie_within(border: Cells, points: Floats) -> NDArray[np.bool_]:
+    """Which of (n, 2) points a border encloses."""
+    out = np.empty(len(points), np.bool_)
+    for k in range(len(points)):
+        out[k] = within(border, points[k, 0], points[k, 1])
+    return out
+
+
+class Combing:
+    """Where the tip may travel over an area of one layer, a section or its support, without a retraction."""
+
+    def __init__(self, area: Polygons, width_mm: float, barred: Polygons | None = None) -> None:
+        """barred: what of it no travel passes."""
+        self._area, self._width_mm, self._barred = area, width_mm, barred
+
+    @cached_property
+    def safe(self) -> Cells:
+        """The border that no travel without a retraction crosses."""
+        inside = offset(self._area, -SAFE * self._width_mm)
+        return cells_of(inside if self._barred is None else inside - self._barred)
+
+    @cached_property
+    def _behind(self) -> Cells:
+        return cells_of(offset(self._area, -BEHIND * self._width_mm))
+
+    @cached_property
+    def _among(self) -> Cells:
+        return cells_of(offset(self._area, -AMONG * self._width_mm))
+
+    def leaves(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
+        """(n, 2) by two whether the travels between these points leave the safe inside."""
+        out: NDArray[np.bool_] = _leaves(self.safe, since, to)
+        return out
+
+    def detour(self, start: Floats, end: Floats, most_mm: float) -> Floats | None:
+        """Points (k, 2) between start and end of a path inside, at most most_mm longer than the straight line; or None."""
+        straight = Segment(float(start[0]), float(start[1]), float(end[0]), float(end[1]))
+        longest = float(np.hypot(*(end - start))) + most_mm
+        for track in (self._behind, self._among):
+            path = np.empty((len(track.edges) + 2 * len(track.begins) + 4, 2))
+            count = _comb(self.safe, track, straight, longest, 2.0 * self._width_mm, path)
+            if count > 1:
+                return path[1 : count - 1].copy()
+        return None
+
+
+class _Stretch(NamedTuple):
+    """A stretch of a loop's border: from its edge `leaving` to the point x, y of its edge `coming`."""
+
+    leaving: int
+    coming: int
+    x: float
+    y: float
+
+
+@kernel
+def _leaves(safe: Cells, since: Floats, to: Floats) -> NDArray[np.bool_]:
+    """Which segments cross the border, or begin outside."""
+    out = np.empty(len(to), np.bool_)
+    for k in range(len(to)):
+        x, y = since[k, 0], since[k, 1]
+        out[k] = not within(safe, x, y) or not free(safe, Segment(x, y, to[k, 0], to[k, 1]))
+    return out
+
+
+@part
+def _enter(safe: Cells, track: Cells, x: float, y: float, reach: float) -> tuple[float, float, bool]:
+    """Where a detour from a point begins: there, or where it reaches the track's inside; and whether it does."""
+    if within(track, x, y):
+        return x, y, True
+    ax, ay, side = nearest(track, x, y, reach)
+    return ax + 1e-7 * (ax - x), ay + 1e-7 * (ay - y), side >= 0 and free(safe, Segment(x, y, ax, ay))
+
+
+@kernel
+def _comb(safe: Cells, track: Cells, straight: Segment, longest: float, reach: float, path: Floats) -> int:
+    """Fills in the path from end to end, both included; returns how many points it has, 0 where there is none."""
+    ax, ay, begins = _enter(safe, track, straight.x0, straight.y0, reach)
+    if not begins:
+        return 0
+    bx, by, ends = _enter(safe, track, straight.x1, straight.y1, reach)
+    if not ends:
+        return 0
+    path[0, 0], path[0, 1] = straight.x0, straight.y0
+    n = _follow(track, Segment(ax, ay, bx, by), TAUT * longest, path)
+    if n == 0:
+        return 0
+    path[n, 0], path[n, 1] = straight.x1, straight.y1
+    n += 1
+    for _ in range(2):
+        n = _pull_taut(safe, path, n)
+        if n == 0:
+            return 0
+    total = 0.0
+    for i in range(1, n):
+        total += np.hypot(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
+    return n if total <= longest else 0
+
+
+@part
+def _follow(track: Cells, straight: Segment, longest: float, path: Floats) -> int:
+    """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by.
+
+    From row 1 on; returns the number of rows, 0 where there is no such path.
+    """
+    room = 16
+    shares, crossed = floats(room, 0.0), longs(room, 0)
+    many = crossings(track, straight, shares, crossed)
+    while many < 0:
+        room *= 4
+        shares, crossed = floats(room, 0.0), longs(room, 0)
+        many = crossings(track, straight, shares, crossed)
+    x0, y0, x1, y1 = straight
+    path[1, 0], path[1, 1] = x0, y0
+    n, left, k = 2, longest, 0
+    while k < many:
+        last = k
+        for j in range(k + 1, many):
+            if track.loop[crossed[j]] == track.loop[crossed[k]]:
+                last = j
+        if last == k:  # the end lies beyond this loop: in another island
+            return 0
+        path[n, 0], path[n, 1] = x0 + shares[k] * (x1 - x0), y0 + shares[k] * (y1 - y0)
+        back_x, back_y = x0 + shares[last] * (x1 - x0), y0 + shares[last] * (y1 - y0)
+        n, length = _go_round(track, _Stretch(crossed[k], crossed[last], back_x, back_y), left, path, n)
+        if n == 0:
+            return 0
+        left -= length
+        k = last + 1
+    path[n, 0], path[n, 1] = x1, y1
+    return n + 1
+
+
+@part
+def _go_round(track: Cells, stretch: _Stretch, longest: float, path: Floats, n: int) -> tuple[int, float]:
+    """Appends the shorter of the two stretches of a loop from row n on.
+
+    Returns the new number of rows, 0 when the stretch is too long, and its length.
+    """
+    least, shorter = np.inf, 1
+    for sense in range(1, -2, -2):
+        _, length = _walk(track, stretch, longest, sense, path, n)
+        if length < least:
+            least, shorter = length, sense
+    if least > longest:
+        return 0, least
+    end, least = _walk(track, stretch, longest, shorter, path, n)
+    return end, least
+
+
+@part
+def _walk(track: Cells, stretch: _Stretch, longest: float, sense: int, path: Floats, n: int) -> tuple[int, float]:
+    """Appends a stretch forward (1) or backward (-1) until it is too long; the new number of rows and the length."""
+    begin, end = track.begins[track.loop[stretch.leaving]], track.begins[track.loop[stretch.leaving] + 1]
+    side, length, corner = stretch.leaving, 0.0, 1 + sense
+    while side != stretch.coming and length <= longest:
+        path[n + 1, 0], path[n + 1, 1] = track.edges[side, corner], track.edges[side, corner + 1]
+        length += np.hypot(path[n + 1, 0] - path[n, 0], path[n + 1, 1] - path[n, 1])
+        side = begin + (side - begin + sense) % (end - begin)
+        n += 1
+    path[n + 1, 0], path[n + 1, 1] = stretch.x, stretch.y
+    return n + 2, length + np.hypot(stretch.x - path[n, 0], stretch.y - path[n, 1])
+
+
+@part
+def _pull_taut(safe: Cells, path: Floats, count: int) -> int:
+    """Leaves as few points of a path as the border allows, in reverse order; returns how many, 0 when it crosses the border."""
+    n, i, last = 1, 0, count - 1
+    while i < last:
+        step = last - i
+        while step > 1 and not _sees(safe, path, i, i + step):
+            step = step - 1 if step <= 8 else (3 * step) // 4
+        if step == 1 and not _sees(safe, path, i, i + 1):
+            return 0
+        i += step
+        path[n, 0], path[n, 1] = path[i, 0], path[i, 1]
+        n += 1
+    for k in range(n // 2):
+        for axis in range(2):
+            path[k, axis], path[n - 1 - k, axis] = path[n - 1 - k, axis], path[k, axis]
+    return n
+
+
+@part
+def _sees(safe: Cells, path: Floats, i: int, j: int) -> bool:
+    """Whether the straight line between two points of a path crosses no border."""
+    return free(safe, Segment(path[i, 0], path[i, 1], path[j, 0], path[j, 1]))

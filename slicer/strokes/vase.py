@@ -1,0 +1,138 @@
+"""Vase: a model in one part as a bottom and one wall that climbs round and round without a seam.
+
+Each turn climbs by a layer's height to the outline of the layer it ends at. The first one lies on a level wall, so it begins
+with no plastic and ends with all; a last one at the height of the top ends with none.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from profiles.errors import SliceError
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.fill.region import shell_layers
+from slicer.geometry.polygons import Polygons, close_loop, contours, offset
+from slicer.geometry.polyline import length_mm
+from slicer.heights import Heights
+from slicer.paths import Kind, Layer, Path, bead_area_mm2
+from slicer.sections import Sections
+from slicer.strokes.speed import fan_share, rising_fan
+
+PIECES = 16  # of the first and the last turn, each with a flow of its own
+NO_APPROACH = np.zeros((0, 2))
+
+
+def vase_profile(profile: Profile) -> Profile:
+    """The profile with which the bottom is sliced, and which knows of one wall and no inside above it."""
+    if not profile.process.spiral_vase:
+        return profile
+    hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
+    return profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
+
+
+def check_vase(parts: Sequence[Part], profile: Profile) -> None:
+    """Raise SliceError for a vase of several parts."""
+    if profile.process.spiral_vase and len(parts) > 1:
+        raise SliceError(
+            f"process.spiral_vase climbs round a model in one part, this one is in {len(parts)}: --parts 1 prints it in one piece"
+        )
+
+
+def bottom_layers(process: Process) -> int:
+    """How many layers are printed as usual before the wall begins to climb."""
+    return max(1, shell_layers(process)[1])
+
+
+def vase_layers(sections: Sections, supported: Sequence[Polygons], tip: Floats) -> list[Layer]:
+    """The layers above the bottom; supported: where each layer's support is; tip: (2,) where the bottom ends.
+
+    Raises SliceError where the model needs support or one of its layers is not one area without holes.
+    """
+    profile, heights, outlines = sections.profile, sections.heights, sections.outlines
+    first = bottom_layers(profile.process)
+    hanging = next((k for k, area in enumerate(supported) if not area.is_empty()), None)
+    if hanging is not None:
+        raise SliceError(
+            f"process.spiral_vase prints no support, and at {heights.tip_mm[hanging]:.2f} mm some is needed: "
+            "process.support = none leaves it out"
+        )
+    loops = [_loop(outlines[k], float(heights.tip_mm[k]), profile.process) for k in range(first, len(outlines))]
+    layers: list[Layer] = []
+    for k, loop in enumerate(loops, start=first):
+        turn = _begun_near(loop, tip, joined=k > first)
+        layers.append(_turn(heights, k, turn, profile, np.linspace(0.0, 1.0, PIECES + 1) if k == first else None))
+        tip = turn[-1]
+    if loops:
+        layers[-1] = _closed(layers[-1], _begun_near(loops[-1], tip, joined=True))
+    return layers
+
+
+def _loop(outline: Polygons, z_mm: float, process: Process) -> Floats:
+    """(n, 2) the wall's centreline, closed."""
+    width = process.outer_wall_line_width_mm or process.line_width_mm
+    loops, holes = contours(offset(outline, -0.5 * width)), sum(len(loop) > 2 for loop in outline.to_polygons())
+    if holes != 1 or len(loops) != 1:
+        instead = f"{holes} outlines" if holes != 1 else "a place too narrow for a wall"
+        raise SliceError(
+            f"process.spiral_vase needs one outline without holes in every layer: at {z_mm:.2f} mm there is {instead}"
+        )
+    return close_loop(loops[0])
+
+
+def _begun_near(loop: Floats, tip: Floats, joined: bool) -> Floats:
+    """The closed loop begun at its point nearest to the tip, from the tip itself where it is joined."""
+    steps = np.diff(loop, axis=0)
+    share = ((tip - loop[:-1]) * steps).sum(axis=1) / np.maximum((steps**2).sum(axis=1), 1e-18)
+    nearest = loop[:-1] + np.clip(share, 0.0, 1.0)[:, None] * steps
+    k = int(np.hypot(*(nearest - tip).T).argmin())
+    begin = nearest[k : k + 1]
+    turn = np.concatenate([*([tip[None]] if joined else []), begin, loop[k + 1 :], loop[1 : k + 1], begin])
+    keep = np.concatenate([[True], np.hypot(*np.diff(turn, axis=0).T) > 1e-6])
+    begun: Floats = turn[keep]
+    return begun
+
+
+def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floats | None) -> Layer:
+    """One turn, climbing to its layer's height; shares: of the plastic at equal distances, None: all everywhere."""
+    process, material = profile.process, profile.material
+    z_mm, height_mm = float(heights.tip_mm[k]), float(heights.height_mm[k])
+    width = process.outer_wall_line_width_mm or process.line_width_mm
+    fastest = min(
+        process.outer_wall_speed_mm_s, material.volumetric_limit_mm3_s / bead_area_mm2(width, height_mm) / material.flow
+    )
+    length, least_s = length_mm(turn), process.least_layer_time_s
+    slowed = length / least_s if least_s > 0.0 else fastest
+    speed = max(min(fastest, slowed), min(fastest, process.least_speed_mm_s))
+    fan = rising_fan(material, k) * fan_share(material, process, length / speed)
+    whole = Path(Kind.OUTER_WALL, turn, width, speed, material.flow, NO_APPROACH, shares is not None, below_mm=(height_mm, 0.0))
+    return Layer.of(z_mm, height_mm, (whole,) if shares is None else _pieces(whole, shares, height_mm), fan)
+
+
+def _closed(layer: Layer, turn: Floats) -> Layer:
+    """The last turn with one more at its end, level and running out."""
+    last = layer.path(len(layer) - 1)
+    level = Path(last.kind, turn, last.width_mm, last.speed_mm_s, last.flow, NO_APPROACH, False)
+    paths = (*layer.paths, *_pieces(level, np.linspace(1.0, 0.0, PIECES + 1), 0.0))
+    return Layer.of(layer.z_mm, layer.height_mm, paths, layer.fan)
+
+
+def _pieces(path: Path, shares: Floats, climb_mm: float) -> tuple[Path, ...]:
+    """A path in equal pieces that climb together, each with the mean of the plastic at its ends."""
+    steps = np.hypot(*np.diff(path.points, axis=0).T)
+    done = np.concatenate([[0.0], np.cumsum(steps)])
+    bounds = np.linspace(0.0, done[-1], len(shares))
+    pieces = []
+    for k, (begin, end) in enumerate(pairwise(bounds)):
+        inner = path.points[(done > begin + 1e-9) & (done < end - 1e-9)]
+        ends = np.array([[np.interp(at, done, path.points[:, axis]) for axis in (0, 1)] for at in (begin, end)])
+        points = np.concatenate([ends[:1], inner, ends[1:]])
+        below = (climb_mm * (1.0 - k / (len(shares) - 1)), climb_mm * (1.0 - (k + 1) / (len(shares) - 1)))
+        flow = path.flow * 0.5 * float(shares[k] + shares[k + 1])
+        pieces.append(
+            Path(path.kind, points, path.width_mm, path.speed_mm_s, flow, NO_APPROACH, path.retract and k == 0, below_mm=below)
+        )
+    return tuple(pieces)

@@ -1,0 +1,278 @@
+"""Plan: the support of all parts together, so that what finds no ground above its base plane stands on support printed earlier.
+
+Every place over the platform lies above the base plane of some part and below those of all later ones (that of a limb counts
+beside the limb alone): there is just one part with which support can be printed there. So what a part's own support misses is
+handed down in three passes: upward, where support of each part may stand if that of the parts before it may (Room); downward,
+from the last part to the first, the support itself, whose feet on a base plane become patches for the parts before (HandedDown);
+and upward again, what of it stands on what was really built.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot, radians, tan
+
+import numpy as np
+
+from mdp.mesh import Floats
+from mdp.pose import shift
+from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union
+from slicer.interface.base_plane import BasePlane
+from slicer.interface.interface import frame_change
+from slicer.overhangs import LEAST_MM2
+from slicer.sections import Sections
+from slicer.support.blocker import blocked_areas, near_table, support_reach_mm
+from slicer.support.missed import find_missed
+from slicer.support.reachable import ReachableAreas, reachable_areas
+from slicer.support.support import Grown, Supports, grow, stand, widen_foot
+
+AROUND_MM = 3.0  # support handed down may go so much farther aside than its lean takes it
+SHALLOW_MM = 1.2  # so far below a plane the middles of support that can come up to it lie
+DEEP_MM = 1.0  # support begins within this below a plane: as much as keeps a wall along a steep plane upright
+NEAR_MM = 0.35  # what ends nearer to a plane carries what begins on it: a step of a slope and the space beside a disc
+STEP_MM = 0.15  # steps of a slope are joined over this
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Places on a base plane, in its part's frame, under which support has to end gap_mm below the plane."""
+
+    places: Polygons
+    gap_mm: float
+
+    def under(self, plane: BasePlane, layer: int, deep_mm: float) -> Polygons:
+        """What of a layer lies under the patch, from its gap to deep_mm below the plane."""
+        return plane.shadow(self.places, layer) ^ plane.band(layer, -deep_mm, -self.gap_mm)
+
+    def begins(self, plane: BasePlane, count: int) -> dict[int, Polygons]:
+        """By layers, of the lowest `count`, the places at which support of the patch has to begin there."""
+        deep_mm = self.gap_mm + DEEP_MM
+        layers = plane.layers_near(self.places, deep_mm)
+        begins = {layer: self.under(plane, layer, deep_mm) for layer in layers if layer < count}
+        return {layer: area for layer, area in begins.items() if not area.is_empty()}
+
+
+def keep_off(bodies: Sequence[Polygons], patches: Sequence[Patch], plane: BasePlane, gap_mm: float) -> list[Polygons]:
+    """Support of the earlier part's layers that keeps gap_mm from the plane, under patches no more than their own gap."""
+    wide = [Patch(offset(patch.places, gap_mm), patch.gap_mm) for patch in patches]
+    clear = []
+    for layer, body in enumerate(bodies):
+        if not body.is_empty():
+            near = plane.band(layer, -gap_mm, plane.far_mm) ^ bounding_box(body, 1.0)
+            for patch in wide if not near.is_empty() else ():
+                near = near - patch.under(plane, layer, gap_mm)
+            body = body if near.is_empty() else body - near
+        clear.append(body)
+    return clear
+
+
+def upper_side(areas: Sequence[Polygons], plane: BasePlane, window: Polygons, deep_mm: float) -> Polygons:
+    """What of the areas of an earlier part's layers ends less than deep_mm below the plane, carried onto a window of it."""
+    pieces = []
+    for layer in plane.layers_near(window, deep_mm):
+        if layer < len(areas) and not areas[layer].is_empty():
+            near = areas[layer] ^ plane.band(layer, -deep_mm, 0.0)
+            if not near.is_empty():
+                pieces.append(plane.project(near, layer))
+    return closing(offset(union(pieces), 0.5 * STEP_MM), STEP_MM) ^ window if pieces else Polygons()
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """Where handed-down support of a part may be.
+
+    sections: as high as it is of use; window: the places of the base plane that matter and that the axes reach; areas: of
+    the sections inside the box that matters; shut: where nothing may stand in the first layer; far_mm: how far from the origin
+    of the frame support reaches at most.
+    """
+
+    sections: Sections
+    window: Polygons
+    areas: ReachableAreas
+    shut: Polygons
+    far_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class HandedDown:
+    """Support that is printed with a part because no other can carry it; patches: what of it needs support below its base."""
+
+    room: Room
+    grown: Grown
+    patches: Sequence[Patch]
+
+
+def plan_supports(own: Sequence[Supports]) -> list[Supports]:
+    """The support of every part; own: of all parts in print order, each on its own."""
+    planned = list(own)
+    if all(supports.unsupported_mm2 == 0.0 for supports in own[1:]):
+        return planned
+    rooms = _rooms(own)
+    handed: dict[int, HandedDown] = {}
+    for k in sorted(rooms, reverse=True):
+        handed[k] = _hand_down(rooms[k], own[k], [handed[m] for m in sorted(handed)])
+    for k in sorted(handed):
+        planned[k] = _stand(handed[k], own[k], planned[:k])
+    return planned
+
+
+def _extents(own: Sequence[Supports]) -> list[tuple[Floats, float]]:
+    """For every part the box x0 y0 x1 y1 of its base plane that handed-down support may need, and up to which height."""
+    lean = tan(radians(max(supports.sections.process.support_branch_angle_deg for supports in own)))
+    boxes = [np.array([np.inf, np.inf, -np.inf, -np.inf]) for _ in own]
+    tops = [0.0] * len(own)
+
+    def take(k: int, low: Floats, high: Floats, top_mm: float) -> None:
+        aside = max(top_mm, 0.0) * lean + AROUND_MM
+        boxes[k] = np.concatenate([np.minimum(boxes[k][:2], low - aside), np.maximum(boxes[k][2:], high + aside)])
+        tops[k] = max(tops[k], top_mm)
+
+    for k in range(len(own) - 1, 0, -1):
+        for layer, area in enumerate(own[k].missed):
+            if not area.is_empty():
+                bounds = np.array(area.bounds())
+                take(k, bounds[:2], bounds[2:], float(own[k].sections.heights.tip_mm[layer]))
+        x0, y0, x1, y1 = boxes[k]
+        for m in range(k if x0 < x1 else 0):
+            turn, moved = frame_change(own[m].sections.part, own[k].sections.part)
+            corners = (np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]]) - moved) @ turn
+            top_mm = min(float(corners[:, 2].max()), _highest_mm(own, m))
+            if top_mm > 0.0:
+                take(m, corners[:, :2].min(axis=0), corners[:, :2].max(axis=0), top_mm)
+    return list(zip(boxes, tops, strict=True))
+
+
+def _highest_mm(own: Sequence[Supports], k: int) -> float:
+    """How high the parts from part k on reach along its direction."""
+    part = own[k].sections.part
+    return max(float((supports.sections.part.mesh.vertices @ part.direction).max()) for supports in own[k:]) - part.base.offset_mm
+
+
+def _rooms(own: Sequence[Supports]) -> dict[int, Room]:
+    """The room of every part with which support may be handed down, by its place in the print order."""
+    rooms: dict[int, Room] = {}
+    for k, ((x0, y0, x1, y1), top_mm) in enumerate(_extents(own)):
+        if x0 < x1 and own[k].sections.process.support != "none":
+            box = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
+            rooms[k] = _room(own[k].sections.up_to(top_mm), box, top_mm, list(rooms.values()))
+    return rooms
+
+
+def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[Room]) -> Room:
+    """Where support of a part may stand if that of earlier parts may."""
+    window = box ^ _within_axes(sections)
+    count = max(min(int(np.searchsorted(sections.heights.bottom_mm, top_mm)), len(sections.outlines)), 1)
+    low, far_mm = sections.heights[:count], _reach_mm(sections, box)
+    blocked = blocked_areas(sections, low, 0.0, far_mm)
+    if not sections.on_platform:
+        blocked = _united(blocked, near_table(sections, low, far_mm))
+    outside = offset(box, AROUND_MM) - window
+    blocked = [union([layer, outside]) for layer in blocked] if outside.area() > 4.0 * AROUND_MM**2 else blocked
+    near = replace(
+        sections,
+        outlines=[outline if outline.is_empty() else outline ^ box for outline in sections.outlines],
+        plastic_below=None if sections.plastic_below is None else sections.plastic_below ^ box,
+        plate=sections.plate ^ window,
+    )
+    handed = union([_reached(room, sections, window) for room in earlier])
+    return Room(sections, window, reachable_areas(near, blocked, handed), blocked[0], far_mm)
+
+
+def _within_axes(sections: Sections) -> Polygons:
+    """The places of a part's frame that the axes reach."""
+    machine = sections.profile.machine
+    moved = shift(machine, sections.part.pose)
+    x, y = (np.array(axis.limits_mm) - moved[k] for k, axis in enumerate((machine.x, machine.y)))
+    return Polygons.square((x[1] - x[0], y[1] - y[0])).translate((x[0], y[0]))
+
+
+def _reach_mm(sections: Sections, box: Polygons) -> float:
+    """A distance from the origin that no support of a part ever reaches, be it handed down."""
+    x0, y0, x1, y1 = box.bounds()
+    return max(support_reach_mm(sections), 2.0 * hypot(max(abs(x0), abs(x1)), max(abs(y0), abs(y1))) + AROUND_MM)
+
+
+def _reached(room: Room, later: Sections, window: Polygons) -> Polygons:
+    """The places on a later part's base plane that support of a part can come up to."""
+    return upper_side(room.areas.reachable, BasePlane.seen_from(room.sections, later, room.far_mm), window, SHALLOW_MM)
+
+
+def _hand_down(room: Room, own: Supports, later: Sequence[HandedDown]) -> HandedDown:
+    """The support that a part's own misses, and that later parts ask for."""
+    sections, areas = room.sections, room.areas
+    planes = [BasePlane.seen_from(sections, upper.room.sections, room.far_mm) for upper in later]
+    begins: dict[int, list[Polygons]] = {}
+    for plane, upper in zip(planes, later, strict=True):
+        for patch in upper.patches:
+            for layer, area in patch.begins(plane, len(areas.reachable)).items():
+                begins.setdefault(layer, []).append(area)
+    wanted = [Polygons()] * len(own.missed) if sections.on_platform else own.missed
+    grown = grow(wanted, {layer: union(places) for layer, places in begins.items()}, areas)
+    bodies = grown.bodies
+    for plane, upper in zip(planes, later, strict=True):
+        bodies = keep_off(bodies, upper.patches, plane, sections.process.support_distance_mm)
+    grown = replace(grown, bodies=bodies)
+    return HandedDown(room, grown, () if sections.on_platform else _patches(room, bodies, wanted))
+
+
+def _patches(room: Room, bodies: Sequence[Polygons], wanted: Sequence[Polygons]) -> list[Patch]:
+    """What of a part and of its support hangs over its base plane."""
+    patches = [Patch(area, _gap_mm(room.areas, layer)) for layer, area in _hanging_low(room.areas, wanted)]
+    if bodies and not bodies[0].is_empty():
+        patches.append(Patch(bodies[0] - _own_placeable(room), 0.0))
+    return [patch for patch in patches if patch.places.area() >= LEAST_MM2]
+
+
+def _hanging_low(areas: ReachableAreas, wanted: Sequence[Polygons]) -> list[tuple[int, Polygons]]:
+    """The hanging places that support above the base plane has no room under, with their layers."""
+    low = enumerate(wanted[: int(np.searchsorted(areas.bottom_mm, areas.process.support_gap_mm + 1.0))])
+    return [(k, area) for k, area in low if not area.is_empty() and not len(areas.carrying_layers(k))]
+
+
+def _gap_mm(areas: ReachableAreas, layer: int) -> float:
+    """How far below the base plane support under a layer ends."""
+    return max(areas.process.support_gap_mm - max(float(areas.bottom_mm[layer]), 0.0), 0.0)
+
+
+def _own_placeable(room: Room) -> Polygons:
+    """Where support stands on plastic without a gap."""
+    process, below = room.areas.process, room.sections.plastic_below
+    return Polygons() if below is None or process.support_bottom_gap_mm > 0.0 else offset(below, process.line_width_mm)
+
+
+def _stand(handed: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supports:
+    """A part's support with what of the handed-down one stands; earlier: what was built before it."""
+    room, sections = handed.room, handed.room.sections
+    areas, process, whole = room.areas, room.areas.process, replace(room.areas, sections=sections)
+    if not sections.on_platform:
+        held = offset(_held(room, earlier, 0.0), 0.5 * areas.radius_mm)
+        areas = replace(areas, placeable=(union([held, _own_placeable(room)]), *areas.placeable[1:]))
+    count = len(sections.outlines)
+    printed, dense = (_padded(places, count) for places in stand(handed.grown, areas))
+    wanted, missed, unwanted = (_padded(places, count) for places in (own.wanted, own.missed, own.unwanted))
+    both = _united(printed, _padded(own.areas, count))
+    if sections.on_platform:
+        foot = widen_foot(printed[0], whole, (room.window ^ sections.plate) - room.shut)
+        both[0] = union([both[0], foot])
+    else:
+        low = _hanging_low(areas, missed)
+        missed = find_missed(missed, both, whole)
+        for layer, _ in low:
+            held = _held(room, earlier, _gap_mm(areas, layer))
+            missed[layer] = missed[layer] - offset(held, 0.5 * process.line_width_mm)
+    return Supports(sections, both, _united(dense, _padded(own.dense, count)), wanted, missed, unwanted)
+
+
+def _padded(places: Sequence[Polygons], count: int) -> list[Polygons]:
+    """Places of the lowest layers as those of so many layers."""
+    return [*places, *[Polygons()] * (count - len(places))]
+
+
+def _united(places: Sequence[Polygons], others: Sequence[Polygons]) -> list[Polygons]:
+    return [union(pair) for pair in zip(places, others, strict=True)]
+
+
+def _held(room: Room, earlier: Sequence[Supports], gap_mm: float) -> Polygons:
+    """The places on a part's base plane that have support of earlier parts gap_mm beneath them."""
+    planes = [BasePlane.seen_from(supports.sections, room.sections, room.far_mm) for supports in earlier]
+    pairs = zip(earlier, planes, strict=True)
+    return union([upper_side(supports.areas, plane, room.window, gap_mm + NEAR_MM) for supports, plane in pairs])

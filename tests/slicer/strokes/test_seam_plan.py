@@ -1,0 +1,106 @@
+"""The plan of seams: hidden places are found, the line over the layers is the cheapest there is, joints are left alone."""
+
+from itertools import product
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from slicer.geometry.polygons import contours
+from slicer.sectioning import section_part
+from slicer.sections import Sections
+from slicer.slice import slice_part
+from slicer.strokes.seam import seam_limits
+from slicer.strokes.seam_plan import JUMP, SHIFT, _choose, _Places, plan_seams
+from slicer.strokes.visibility import Outside, Visibility
+from tests.shapes import standing
+from tests.slicer.hand import BARE, cut, profile, whole
+from tests.slicer.strokes.test_seam import distance_mm, outer_seams
+
+SETTINGS = profile(*BARE, "process.elephant_foot_mm=0")
+NO_EDGES = np.zeros((0, 6))
+GROOVED = m3.Manifold.cube((20, 20, 16), True) - m3.Manifold.cube((6, 4, 16), True).translate((10, 0, 0))
+
+
+def sections(part: Part, *others: Part) -> Sections:
+    return section_part(part, SETTINGS, [p for p in others if p.index < part.index], [p for p in others if p.index > part.index])
+
+
+def planned(part: Part, *others: Part) -> list[Floats]:
+    of = sections(part, *others)
+    return plan_seams(of, [seam_limits(NO_EDGES, NO_EDGES, z_mm, SETTINGS.process) for z_mm in of.heights.cut_mm])
+
+
+def test_the_seam_of_a_box_with_a_groove_lies_in_the_groove_s_corner() -> None:
+    places = np.concatenate(planned(whole(standing(GROOVED))))
+    assert np.abs(np.abs(places) - [7, 2]).max() < 0.05
+    assert np.abs(np.diff(places, axis=0)).max() < 0.05  # in one of the two
+    assert np.abs(np.abs(outer_seams(slice_part(whole(standing(GROOVED)), SETTINGS))) - [7, 2]).max() < 0.4
+
+
+def test_a_box_without_a_groove_begins_at_a_corner_of_the_rear() -> None:
+    places = np.concatenate(planned(whole(standing(m3.Manifold.cube((20, 20, 6), True)))))
+    assert np.abs(places[:, 0]) == pytest.approx(10.0, abs=0.01)
+    assert places[:, 1] == pytest.approx(10.0, abs=0.01)
+    assert np.abs(np.diff(places, axis=0)).max() < 0.01
+
+
+def test_the_seam_of_a_cylinder_lies_where_it_faces_a_wall() -> None:
+    wall = m3.Manifold.cube((2, 60, 20), True).translate((11, 0, 0))
+    mesh = standing(m3.Manifold.cylinder(20, 8, 8, 90, True) + wall)  # the middle of the cylinder is moved to x = -2
+    for of_layer in planned(whole(mesh)):
+        (of_cylinder,) = of_layer[of_layer[:, 0] < 7.0]
+        assert of_cylinder[0] > 5.0
+
+
+def test_seams_beside_a_joint_keep_clear_of_its_edge_and_lie_in_the_groove_that_both_parts_have() -> None:
+    base, top = cut(standing(GROOVED), ((0, 0, 1), 8.0))
+    (loop,) = contours(sections(top, base).outlines[1])
+    rim = np.insert(np.hstack([loop, np.roll(loop, -1, axis=0)]), [2, 4], 8.0, axis=1)
+    of = sections(base, top)
+    limits = [seam_limits(rim, NO_EDGES, z_mm, SETTINGS.process) for z_mm in of.heights.cut_mm]
+    for z_mm, (seam,) in list(zip(of.heights.cut_mm, plan_seams(of, limits), strict=True))[:-6]:
+        assert np.abs(seam) == pytest.approx([7, 2], abs=0.05)
+        assert distance_mm(seam, z_mm, rim) > 1.0
+    assert np.abs(np.abs(np.concatenate(planned(top, base))) - [7, 2]).max() < 0.05
+
+
+def test_another_part_keeps_the_light_from_a_wall_that_it_stands_before() -> None:
+    post, shade = m3.Manifold.cube((10, 10, 30), True), m3.Manifold.cube((4, 60, 30), True).translate((9, 0, 0))
+    joined = post + shade + m3.Manifold.cube((30, 60, 4), True).translate((3, 0, -17))
+    base, top = cut(standing(joined), ((0, 0, 1), 20.0))
+    alone, beside = (Visibility(of, [contours(area) for area in of.outlines]) for of in (sections(base), sections(base, top)))
+    facing = Outside(np.array([[5.0, 0.0]]), np.array([[1.0, 0.0]]))
+    last = len(sections(base).outlines) - 2
+    assert beside.at(last, facing)[0] < alone.at(last, facing)[0] - 0.15
+
+
+def test_a_flat_wall_gets_all_light_and_one_beside_an_inner_corner_half_of_it() -> None:
+    """A wall of no end square to another one takes half of the light from what is near the corner (its view factor)."""
+    ell = m3.Manifold.cube((100, 100, 100)) - m3.Manifold.cube((50, 50, 100)).translate((50, 50, 0))
+    of = sections(whole(standing(ell)))
+    (loop,) = contours(of.outlines[250])
+    visibility = Visibility(of, [contours(area) for area in of.outlines])
+    corner = 0.5 * (loop.max(axis=0) + loop.min(axis=0))
+    asked = Outside(np.array([[corner[0] + 0.5, corner[1]], [loop[:, 0].min(), corner[1]]]), np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    assert visibility.at(250, asked) == pytest.approx([0.5, 1.0], abs=0.06)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_other_choice_of_places_costs_less(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    layer, below, count = np.array([0, 1, 1, 2, 2]), [None, 0, 0, 1, 2], 4
+    middles = np.array([[0, 0], [-2, 0], [2, 0], [-2.5, 0], [2.5, 0]], dtype=float)
+    xy = (middles[:, None] + random.uniform(-0.8, 0.8, (5, count, 2))).reshape(-1, 2)
+    cost = random.uniform(0.0, 0.5, 5 * count)
+
+    def costs(choice: tuple[int, ...]) -> float:
+        at = [count * k + place for k, place in enumerate(choice)]
+        ways = [np.hypot(*(xy[at[k]] - xy[at[j]])) for k, j in enumerate(below) if j is not None]
+        return float(cost[at].sum() + np.minimum(SHIFT * np.array(ways), JUMP).sum())
+
+    chosen = _choose(_Places(xy, cost, np.arange(0, 5 * count + 1, count), layer))
+    taken = tuple(int(np.hypot(*(xy[count * k : count * (k + 1)] - place).T).argmin()) for k, place in enumerate(chosen))
+    assert costs(taken) == pytest.approx(min(costs(choice) for choice in product(range(count), repeat=5)))

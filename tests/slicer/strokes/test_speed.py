@@ -1,0 +1,74 @@
+"""Fan, layer time and the speeds that depend on the bead."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from profiles.profile import load
+from slicer.paths import Kind
+from slicer.slice import slice_part
+from slicer.strokes.speed import fan_share
+from tests.shapes import box, from_manifold
+from tests.slicer.hand import cut, of_kind, profile, whole
+
+FANS = ("material.fan=1", "material.fan_least=0.4", "process.least_layer_time_s=10", "material.fan_layer_time_s=40")
+
+
+@pytest.mark.parametrize(("time_s", "fan"), [(3, 1.0), (10, 1.0), (25, 0.7), (40, 0.4), (500, 0.4)])
+def test_the_fan_falls_evenly_with_the_layer_time(time_s: float, fan: float) -> None:
+    chosen = load(settings=FANS)
+    assert fan_share(chosen.material, chosen.process, time_s) == pytest.approx(fan)
+
+
+def test_a_material_without_a_fan_never_gets_one() -> None:
+    chosen = load(settings=["material.fan=0"])
+    assert fan_share(chosen.material, chosen.process, 1.0) == 0.0
+
+
+def test_small_layers_are_blown_on_harder_than_large_ones() -> None:
+    small, large = (slice_part(whole(box(size, size, 3)), profile()).layers[8].fan for size in (6, 60))
+    assert small == 1.0
+    assert profile().material.fan_least <= large < 0.8
+
+
+def test_the_first_layers_on_the_platform_get_no_fan_and_of_those_on_plastic_only_the_first_one() -> None:
+    chosen = profile("material.fan_off_layers=3")
+    base, top = (slice_part(part, chosen) for part in cut(box(10, 10, 6), ((0.0, 0.0, 1.0), 3.0)))
+    assert [layer.fan > 0 for layer in base.layers[:5]] == [False, False, False, True, True]
+    assert [layer.fan > 0 for layer in top.layers[:4]] == [False, True, True, True]
+
+
+def test_the_fan_rises_evenly_to_its_full_layer() -> None:
+    chosen = profile("material.fan_off_layers=1", "material.fan_full_layer=4", "material.fan_least=1")
+    base, top = (slice_part(part, chosen) for part in cut(box(10, 10, 6), ((0.0, 0.0, 1.0), 3.0)))
+    assert [layer.fan for layer in base.layers[:6]] == pytest.approx([0, 1 / 3, 2 / 3, 1, 1, 1], abs=0.026)
+    assert {layer.fan for layer in top.layers[3:]} == {1.0}
+
+
+def test_bridges_get_a_fan_of_their_own() -> None:
+    wall, roof = m3.Manifold.cube((5, 8, 6)), m3.Manifold.cube((20, 8, 4)).translate((0, 0, 6))
+    arch = from_manifold(wall + wall.translate((15, 0, 0)) + roof)
+    sliced = slice_part(whole(arch), profile("process.support=none", "material.fan_bridge=0.9", "material.fan_least=0.2"))
+    bridges = of_kind(sliced, Kind.BRIDGE)
+    assert bridges
+    assert {path.fan for path in bridges} == {0.9}
+    assert {path.fan for path in of_kind(sliced, Kind.INFILL)} == {None}
+
+
+def test_small_holes_are_printed_slowly_and_large_outlines_are_not() -> None:
+    walls = {}
+    for size in (4, 30):
+        sliced = slice_part(whole(box(size, size, 2)), profile("process.least_layer_time_s=0"))
+        walls[size] = {path.speed_mm_s for path in sliced.layers[5].paths if path.kind is Kind.INNER_WALL}
+    chosen = profile().process
+    assert walls[4] == {chosen.small_wall_speed_mm_s}
+    assert walls[30] == {chosen.inner_wall_speed_mm_s}
+
+
+@pytest.mark.parametrize("size", [3, 8, 15, 40])
+def test_a_layer_takes_its_least_time_unless_all_is_at_the_least_speed(size: float) -> None:
+    chosen = profile("process.least_layer_time_s=8", "process.travel_speed_mm_s=2000")
+    for layer in slice_part(whole(box(size, size, 2)), chosen).layers[1:]:
+        time_s = sum(path.length_mm / path.speed_mm_s for path in layer.paths)
+        slowest = np.allclose([path.speed_mm_s for path in layer.paths], chosen.process.least_speed_mm_s)
+        assert time_s >= 0.97 * 8 or slowest
