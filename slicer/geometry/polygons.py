@@ -147,16 +147,6 @@ def close_loop(loop: Floats) -> Floats:
     return np.concatenate([loop, loop[:1]])
 
 
-def resample(loop: Floats, step_mm: float) -> Floats:
-    """The loop (n, 2) with points added so that no edge is longer than the step."""
-    steps = start_at(loop, 1) - loop
-    counts = np.maximum(np.ceil(np.hypot(*steps.T) / step_mm), 1).astype(np.int64)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    share = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
-    resampled: Floats = np.repeat(loop, counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
-    return resampled
-
-
 def edges(polygons: Polygons) -> Floats:
     """(n, 4) edges of all contours, x0 y0 x1 y1."""
     return edges_of(contours(polygons))

@@ -7,7 +7,7 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import flags, longs
+from mdp.kernels.arrays import flags, ints, longs
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import opposites
@@ -29,16 +29,71 @@ class Triangulation(NamedTuple):
     across: Ints
 
 
-def triangulate(loops: Sequence[Floats]) -> Triangulation | None:
-    """The Delaunay triangulation of polygons given by their contours (k, 2); None where they have no area."""
+def triangulate(loops: Sequence[Floats], step_mm: float = np.inf) -> Triangulation | None:
+    """The Delaunay triangulation of polygons given by their contours (k, 2); None where they have no area.
+
+    step_mm: sides get points so that none is longer. They are put in after the polygons have been triangulated without them,
+    which takes a fraction of the time; flips make any triangulation that of Delaunay.
+    """
     if not loops:
         return None
     triangles = np.asarray(manifold3d.triangulate(list(loops)), dtype=np.int32).reshape(-1, 3)
     if not len(triangles):
         return None
-    triangulation = Triangulation(np.concatenate(loops), triangles.ravel().copy(), opposites(triangles))
+    sampled = [resample(loop, step_mm) for loop in loops]
+    points, ends = np.concatenate([points for points, _ in sampled]), np.cumsum([0, *(len(points) for points, _ in sampled)])
+    first = np.concatenate([start + at for start, (_, at) in zip(ends.tolist(), sampled, strict=False)])
+    between = np.concatenate([np.diff(at, append=len(points)) - 1 for points, at in sampled])
+    tails, across = _with_samples(triangles.ravel(), opposites(triangles), first, between)
+    triangulation = Triangulation(points, tails, across)
     _flip(triangulation)
     return triangulation
+
+
+def resample(loop: Floats, step_mm: float) -> tuple[Floats, Indices]:
+    """The loop (k, 2) with points added so that no side is longer than the step, and (k,) where its own points are among them."""
+    steps = np.roll(loop, -1, axis=0) - loop
+    counts = np.maximum(np.ceil(np.hypot(steps[:, 0], steps[:, 1]) / step_mm), 1).astype(np.int64)
+    first = np.cumsum(counts) - counts
+    share = (np.arange(counts.sum()) - np.repeat(first, counts)) / np.repeat(counts, counts)
+    return np.repeat(loop, counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0), first
+
+
+@kernel
+def _with_samples(corners: Ints, across: Ints, first: Indices, between: Indices) -> tuple[Ints, Ints]:
+    """Tails and opposites of triangles whose sides on the boundary are split at samples.
+
+    corners, across: (3 m,) of the triangles of the polygon's own points; first: number of each of these among all points;
+    between: how many samples follow it. A sample splits the triangle on its side in two, as seen from the opposite corner.
+    """
+    size = len(corners)
+    tails, twins = ints(size + 3 * int(between.sum()), -1), ints(size + 3 * int(between.sum()), -1)
+    on_side = longs(len(first), -1)  # the half-edge on the boundary that begins at each of the polygon's own points
+    for h in range(size):
+        tails[h], twins[h] = first[corners[h]], across[h]
+        if across[h] < 0:
+            on_side[corners[h]] = h
+    own = longs(len(tails), -1)  # the polygon's point at which a half-edge on the boundary begins
+    for point in range(len(first)):
+        if on_side[point] >= 0:
+            own[on_side[point]] = point
+    for point in range(len(first)):
+        h = on_side[point]
+        for k in range(between[point] if h >= 0 else 0):
+            onward = h - 2 if h % 3 == 2 else h + 1
+            back = h + 2 if h % 3 == 0 else h - 1
+            tails[size], tails[size + 1], tails[size + 2] = first[point] + 1 + k, tails[onward], tails[back]
+            twins[size + 1], twins[size + 2] = twins[onward], onward
+            if twins[onward] >= 0:
+                twins[twins[onward]] = size + 1
+            elif own[onward] >= 0:
+                own[size + 1] = own[onward]
+                on_side[own[onward]] = size + 1
+                own[onward] = -1
+            tails[onward], twins[onward] = first[point] + 1 + k, size + 2
+            h = size
+            size += 3
+    return tails, twins
 
 
 @borrower

@@ -21,6 +21,10 @@ def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> F
         for k in range(n):
             out[k] = values[k]
         return out
+    steps = floats(n, 0.0)  # from each point to the next
+    for k in range(n):
+        after = (k + 1) % n
+        steps[k] = np.hypot(points[after, 0] - points[k, 0], points[after, 1] - points[k, 1])
     for k in range(n):
         total, weight = 0.0, 0.0
         for sense in (-1, 1):
@@ -31,7 +35,7 @@ def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> F
                     if not closed:
                         break
                     j = (j + n) % n
-                step = np.hypot(points[j, 0] - points[i, 0], points[j, 1] - points[i, 1])
+                step = steps[i] if sense > 0 else steps[j]
                 part = min(step, left)
                 share = part / step if step > 0.0 else 0.0
                 total += part * (values[i] + 0.5 * share * (values[j] - values[i]))

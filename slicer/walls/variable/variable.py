@@ -27,7 +27,7 @@ import numpy as np
 from mdp.mesh import Floats
 from slicer.bead import Course
 from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, close_loop, contours, edges, resample
+from slicer.geometry.polygons import Polygons, close_loop, contours, edges
 from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm
 from slicer.geometry.triangulation import Triangulation, triangulate
 from slicer.walls.variable.counts import Counts, count_beads
@@ -72,7 +72,7 @@ class Wall:
 
 def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
     """All walls of polygons."""
-    triangulation = triangulate([resample(loop, STEP * rule.inner) for loop in contours(polygons)])
+    triangulation = triangulate(contours(polygons), STEP * rule.inner)
     if triangulation is None:
         return []
     skeleton = skeleton_of(triangulation)

@@ -52,7 +52,7 @@ def test_the_sources_of_a_kernel_are_its_file_and_what_its_parts_and_constants_c
     travel = cache.PACKAGES / "slicer" / "travel"
     sources = cache.sources(travel / "path_order.py")
     assert {file.relative_to(cache.PACKAGES).as_posix() for file in sources} == {
-        "slicer/travel/path_order.py",
+        "slicer/strokes/path_order.py",
         "mdp/kernels/arrays.py",
         "mdp/kernels/kernel.py",
         "mdp/mesh.py",

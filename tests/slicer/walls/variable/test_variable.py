@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from slicer.bead import ROUND_SIDES, Bead
 from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, close_loop, edges, resample
+from slicer.geometry.polygons import Polygons, close_loop, edges
 from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
@@ -248,7 +248,7 @@ def test_walls_stay_inside_a_plate_that_a_notch_all_but_cuts_through(neck: float
 @given(st.floats(1.0, 9.0), st.floats(-1e-8, 1e-8), st.floats(-1e-10, 1e-10))
 def test_two_corners_that_all_but_meet_throw_no_wall_out_of_a_plate(x: float, aside: float, away: float) -> None:
     corners = np.array([(0, 0), (x, -1e-3), (x + aside, -1e-3 + away), (10, 0), (10, 5), (0, 5)])
-    triangulation = triangulate([resample(corners, STEP * RULE.inner)])
+    triangulation = triangulate([corners], STEP * RULE.inner)
     assert triangulation is not None
     skeleton = skeleton_of(triangulation)
     ribs = trace_loops(triangulation, skeleton, count_beads(triangulation.across, skeleton, RULE), RULE, 0)
