@@ -26,6 +26,8 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
     if below is None or process.overhang_share <= 0.0:
         return strokes
     shortest_mm = SHORTEST * process.line_width_mm
+    if hanging_area(section, below, 0.5, process.line_width_mm).area() < shortest_mm * NOISE_MM:
+        return strokes  # the section hardly reaches beyond what it lies on, its centrelines do not by far
     for share in sorted({*STEPS, process.overhang_share}, reverse=True):
         hanging = hanging_area(section, below, share, process.line_width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:
