@@ -1,7 +1,8 @@
 """Plain moves: a run of usual G0 and G1 lines read at once by a kernel, as `Modes.move` and `straight` would one by one.
 
-They are 98 lines in a hundred of a program. What is not usual ends the run, and the reader takes that line: other letters than
-the machine's axes and F, a feed that is not above 0, a number of more digits than one division reads exactly, comments.
+With the comments between them that tell a stroke's width, or a kind that has been told before, they are 99 lines in a hundred of
+a program. What is not usual ends the run, and the reader takes that line: other letters than the machine's axes and F, a feed
+that is not above 0, a number of more digits than one division reads exactly, other comments.
 """
 
 from math import inf
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.gcode.modes import E_AXIS
-from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, LINE, ROW, Reader
+from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, LINE, ROW, TYPE, WIDTH, Reader
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 
@@ -21,6 +22,8 @@ LONGEST = 200
 MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
 NONE, F = -1, 6  # what a letter stands for, besides the axes 0 to 5
 MOST_AT_ONCE = 4096  # lines
+WIDTH_IS, TYPE_IS = (np.frombuffer(key, dtype=np.uint8) for key in (b";WIDTH:", b";TYPE:"))
+WHOLE_DIGITS, DECIMALS = 9, 12  # of a width, as machine.reader.remarks reads it
 
 
 class Text(NamedTuple):
@@ -31,12 +34,13 @@ class Text(NamedTuple):
 
 
 class Meaning(NamedTuple):
-    """What words mean during a run. letters: (256,) axis, F or NONE of each byte.
+    """What words mean during a run. letters: (256,) axis, F or NONE of each byte; types: the kinds that are known, by number.
 
     units, steps, offset: (6,) as those of Modes; row: (ROW,) a row with what the comments said. rapid: G0 is as fast as can be.
     """
 
     letters: NDArray[np.int8]
+    types: Text
     units: Floats
     steps: NDArray[np.bool_]
     offset: Floats
@@ -65,27 +69,42 @@ def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], firs
         return first
     row = np.array([0.0, *reader.at, *reader.at, 0.0, *reader.remarks(reader.printing)])
     meaning = Meaning(
-        letters, np.array(modes.units), np.array(modes.steps), np.array(modes.offset), row,
+        letters, _types(reader), np.array(modes.units), np.array(modes.steps), np.array(modes.offset), row,
         reader.feed_share, bool(reader.dialect.rapid), reader.travelling,
     )  # fmt: skip
     rows = np.empty((min(MOST_AT_ONCE, len(text.start) - 1 - first), ROW))
     state = np.array([*reader.at, modes.feed])
-    last, count = _read_run(text, meaning, first, state, rows)
+    last, count, move = _read_run(text, meaning, first, state, rows)
     if last > first:
-        begin = int(text.start[last - 1])
+        begin = int(text.start[move])
+        reader.type, reader.width = int(row[TYPE]), float(row[WIDTH])
         reader.number, reader.motion = last, text.text[begin : begin + 2].tobytes().decode("ascii")
         reader.at[:], modes.feed = state[:6].tolist(), float(state[6])
         reader.rows.frombytes(rows[:count].tobytes())
     return last
 
 
+def _types(reader: Reader) -> Text:
+    """The kinds of line that the program has told so far."""
+    kinds = [kind.encode("utf-8", "surrogatepass") for kind in reader.types]
+    return Text(np.frombuffer(b"".join(kinds) or b" ", dtype=np.uint8), np.cumsum([0, *map(len, kinds)]))
+
+
 @kernel
-def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Floats) -> tuple[int, int]:
-    """The line after the run and how many rows it has; state: (7,) axes and feed, which it leaves as they are then."""
+def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Floats) -> tuple[int, int, int]:
+    """The line after the run, how many rows it has, and the line of its last move.
+
+    state: (7,) axes and feed, which it leaves as they are then, as it does what comments say in meaning.row.
+    """
     words = np.empty((32, 2))
-    count, line = 0, first
+    count, line, move = 0, first, first
     while line < len(text.start) - 1 and line - first < len(rows):
         begin, end = text.start[line], text.start[line + 1]
+        if text.text[begin] == 59:
+            if not _read_remark(text.text, begin, end, meaning):
+                break
+            line += 1
+            continue
         word_count = _read_words(text.text, begin, end, meaning.letters, words)
         if word_count < 0:
             break
@@ -111,8 +130,53 @@ def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Flo
             if rows[count, BEFORE + E_AXIS] == rows[count, AFTER + E_AXIS]:
                 rows[count, ACCELERATION] = meaning.travelling
             count += 1
+        move = line
         line += 1
-    return line, count
+    return line, count, move
+
+
+@borrower
+def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning) -> bool:
+    """Whether a comment tells a width, or a kind that is known; it goes into the row then."""
+    while end > begin and (text[end - 1] == 32 or 9 <= text[end - 1] <= 13):
+        end -= 1
+    if _begins(text, begin, end, WIDTH_IS):
+        at, whole, digits, behind = begin + len(WIDTH_IS), 0, 0, -1
+        while at < end:
+            if text[at] == 46 and behind < 0 and digits > 0:
+                behind = 0
+            elif 48 <= text[at] <= 57:
+                whole, digits = 10 * whole + (text[at] - 48), digits + 1
+                behind += behind >= 0
+            else:
+                return False
+            at += 1
+        decimals = max(behind, 0)
+        if digits == 0 or behind == 0 or digits > MOST_DIGITS or digits - decimals > WHOLE_DIGITS or decimals > DECIMALS:
+            return False
+        divisor = 1.0
+        for _ in range(decimals):
+            divisor *= 10.0
+        meaning.row[WIDTH] = whole / divisor
+        return True
+    if not _begins(text, begin, end, TYPE_IS):
+        return False
+    begin += len(TYPE_IS)
+    for kind in range(len(meaning.types.start) - 1):
+        known = meaning.types.text[meaning.types.start[kind] : meaning.types.start[kind + 1]]
+        if end - begin == len(known) and _begins(text, begin, end, known):
+            meaning.row[TYPE] = kind
+            return True
+    return False
+
+
+@borrower
+def _begins(text: Bytes, begin: int, end: int, word: Bytes) -> bool:
+    """Whether a line begins with a word."""
+    alike = end - begin >= len(word)
+    for k in range(len(word) if alike else 0):
+        alike = alike and text[begin + k] == word[k]
+    return alike
 
 
 @borrower

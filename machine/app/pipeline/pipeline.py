@@ -13,7 +13,7 @@ from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
 from machine.app.pipeline.given_plan import as_turned, check_parts_named, lays_down, read_given_plan, with_plan_settings
-from machine.app.pipeline.memory import return_unused
+from machine.app.pipeline.memory import keep_modules, return_unused
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
@@ -67,6 +67,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     to_build: `build` comes next, the first run may compile what it needs meanwhile, and the rows of the front that need not be
     chosen from get no time.
     """
+    keep_modules()
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
     check_copies(request.copies)
     record_file, given = request.outputs.record, read_given_plan(request)

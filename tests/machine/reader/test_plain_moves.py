@@ -25,7 +25,9 @@ MOVES = st.tuples(st.sampled_from(["G0", "G1"]), st.lists(WORDS, min_size=1, max
 )
 OTHERS = st.sampled_from(
     ["G90", "G91", "M82", "M83", "G20", "G21", "G92 X3 E0", "M220 S50", "M221 S90", "M221 S100", "M204 P900 T300",
-     ";TYPE:Skirt", ";WIDTH:0.5", ";LAYER_CHANGE", "G1 F600", "g1 x4 y5", "G01 X1", "G1 X1.5Y2", "G1 X1 \t", "M106 S255"]
+     ";TYPE:Skirt", ";TYPE:Fill", ";TYPE: Skirt", ";TYPE:", ";WIDTH:0.5", ";WIDTH:1", ";WIDTH:.5", ";WIDTH:5.", ";WIDTH:0.12 ",
+     ";WIDTH:0.1234567890123456", ";WIDTH:x", ";LAYER_CHANGE", "G1 F600", "g1 x4 y5", "G01 X1",
+     "G1 X1.5Y2", "G1 X1 \t", "M106 S255"]
 )  # fmt: skip
 
 
