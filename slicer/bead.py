@@ -6,6 +6,7 @@ from math import pi
 
 import numpy as np
 
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.process import WIDTHS, Process
 from slicer.geometry.polyline import length_mm, simplify
@@ -30,13 +31,21 @@ class Course:
     @property
     def width_mm(self) -> float:
         """Mean width."""
-        means = 0.5 * (self.widths[1:] + self.widths[:-1])
-        return float(np.average(means, weights=np.hypot(*np.diff(self.points, axis=0).T)))
+        return float(_mean_width(self.points, self.widths))
 
     @property
     def varies(self) -> bool:
         """Whether its widths differ by more than EVEN_MM."""
         return float(np.ptp(self.widths)) > EVEN_MM
+
+
+@kernel
+def _mean_width(points: Floats, widths: Floats) -> float:
+    more = length = 0.0  # more than the first, so that the mean of equal widths is exactly theirs
+    for k in range(len(points) - 1):
+        step = np.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
+        more, length = more + (0.5 * (widths[k] + widths[k + 1]) - widths[0]) * step, length + step
+    return widths[0] + more / length
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdp.kernels.arrays import flags, floats
-from mdp.kernels.kernel import kernel
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.geometry.segments import Segment, squared_distance
@@ -13,7 +13,12 @@ PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSl
 
 def length_mm(points: Floats) -> float:
     """Length of a polyline (n, 2 or more) seen from above."""
-    return float(lengths_mm(points, np.array([0, len(points)]))[0])
+    return float(_length(points))
+
+
+@kernel
+def _length(points: Floats) -> float:
+    return _between(points, 0, len(points))
 
 
 @kernel
@@ -21,9 +26,17 @@ def lengths_mm(points: Floats, starts: Indices) -> Floats:
     """(k,) lengths, seen from above, of polylines one after the other; points: (n, 2 or more); starts: (k + 1,)."""
     out: Floats = floats(len(starts) - 1, 0.0)
     for k in range(len(out)):
-        for i in range(starts[k] + 1, starts[k + 1]):
-            out[k] += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+        out[k] = _between(points, starts[k], starts[k + 1])
     return out
+
+
+@borrower
+def _between(points: Floats, first: int, end: int) -> float:
+    """Length of the polyline of some of the points."""
+    total = 0.0
+    for i in range(first + 1, end):
+        total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+    return total
 
 
 def simplify(points: Floats) -> Floats:

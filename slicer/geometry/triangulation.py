@@ -7,7 +7,7 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import flags, ints, longs
+from mdp.kernels.arrays import flags, ints, longs, table
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import opposites
@@ -40,23 +40,37 @@ def triangulate(loops: Sequence[Floats], step_mm: float = np.inf) -> Triangulati
     triangles = np.asarray(manifold3d.triangulate(list(loops)), dtype=np.int32).reshape(-1, 3)
     if not len(triangles):
         return None
-    sampled = [resample(loop, step_mm) for loop in loops]
-    points, ends = np.concatenate([points for points, _ in sampled]), np.cumsum([0, *(len(points) for points, _ in sampled)])
-    first = np.concatenate([start + at for start, (_, at) in zip(ends.tolist(), sampled, strict=False)])
-    between = np.concatenate([np.diff(at, append=len(points)) - 1 for points, at in sampled])
+    points, first, between = resample(np.concatenate(loops), np.cumsum([0, *map(len, loops)]), step_mm)
     tails, across = _with_samples(triangles.ravel(), opposites(triangles), first, between)
     triangulation = Triangulation(points, tails, across)
     _flip(triangulation)
     return triangulation
 
 
-def resample(loop: Floats, step_mm: float) -> tuple[Floats, Indices]:
-    """The loop (k, 2) with points added so that no side is longer than the step, and (k,) where its own points are among them."""
-    steps = np.roll(loop, -1, axis=0) - loop
-    counts = np.maximum(np.ceil(np.hypot(steps[:, 0], steps[:, 1]) / step_mm), 1).astype(np.int64)
-    first = np.cumsum(counts) - counts
-    share = (np.arange(counts.sum()) - np.repeat(first, counts)) / np.repeat(counts, counts)
-    return np.repeat(loop, counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0), first
+@kernel
+def resample(points: Floats, starts: Indices, step_mm: float) -> tuple[Floats, Indices, Indices]:
+    """The points of loops one after the other with samples added so that no side is longer than the step.
+
+    points: (n, 2); starts: (k + 1,). Returns all points (m, 2), the number of each of the loops' own points among them, and how
+    many samples follow each.
+    """
+    first, between = longs(len(points), 0), longs(len(points), 0)
+    size = 0
+    for loop in range(len(starts) - 1):
+        for k in range(starts[loop], starts[loop + 1]):
+            after = k + 1 if k + 1 < starts[loop + 1] else starts[loop]
+            length = np.hypot(points[after, 0] - points[k, 0], points[after, 1] - points[k, 1])
+            first[k], between[k] = size, max(int(np.ceil(length / step_mm)), 1) - 1
+            size += between[k] + 1
+    out = table(size, 2)
+    for loop in range(len(starts) - 1):
+        for k in range(starts[loop], starts[loop + 1]):
+            after = k + 1 if k + 1 < starts[loop + 1] else starts[loop]
+            for s in range(between[k] + 1):
+                share = s / (between[k] + 1)
+                for axis in range(2):
+                    out[first[k] + s, axis] = points[k, axis] + share * (points[after, axis] - points[k, axis])
+    return out, first, between
 
 
 @kernel

@@ -155,7 +155,7 @@ def test_strips_are_segments_with_square_ends(points: list[tuple[float, float]],
 @given(seeds, st.floats(0.2, 5.0))
 def test_a_sampled_loop_keeps_its_corners_and_has_no_longer_edge_than_asked(seed: int, step_mm: float) -> None:
     for loop in contours(ragged(seed)):
-        sampled, _ = resample(loop, step_mm)
+        sampled, _, _ = resample(loop, np.array([0, len(loop)]), step_mm)
         assert np.hypot(*np.diff(close_loop(sampled), axis=0).T).max() <= step_mm + 1e-9
         assert {tuple(point) for point in loop.tolist()} <= {tuple(point) for point in sampled.tolist()}
         assert area_mm2(sampled) == pytest.approx(area_mm2(loop))
