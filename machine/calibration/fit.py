@@ -12,7 +12,7 @@ from math import acos, atan2, cos, degrees, radians, sin
 
 import numpy as np
 
-from machine.kinematics.table import turned_back, workpiece_path
+from machine.kinematics.table import workpiece_path
 from mdp.directions.frame import frame_across
 from mdp.mesh import Floats
 from mdp.pose import Pose, unit
@@ -139,7 +139,7 @@ class _Guess:
         tip = here[:, :3] - np.array(machine.tool_mm) - tilt_point
         tilt = np.radians(self.signs[0] * (here[:, 3] - zero_deg))
         turn = np.radians(self.signs[1] * (here[:, 4] - machine.turn.zero_deg))
-        seen = turned_back(turn_axis, turn, turned_back(tilt_axis, tilt, tip) + tilt_point - turn_point)
+        seen = _turned_back(turn_axis, turn, _turned_back(tilt_axis, tilt, tip) + tilt_point - turn_point)
         mark = np.append(numbers[..., 6:8], np.full((*numbers.shape[:-1], 1), self.height_mm), axis=-1)
         off = seen - mark[..., None, :]
         off[..., [touch.on_plate for touch in self.touches], 2] += self.height_mm
@@ -314,3 +314,11 @@ def _units(vectors: Floats) -> Floats:
 def _positions(touches: Sequence[Touch]) -> Floats:
     """(n, 5) X Y Z tilt turn of the touches."""
     return np.array([[*touch.at_mm, touch.pose.tilt_deg, touch.pose.turn_deg] for touch in touches])
+
+
+def _turned_back(unit_axis: Floats, angles: Floats, points: Floats) -> Floats:
+    """(..., 3) points turned about (..., 3) unit axes by (...) angles in radians (Rodrigues), each by its own."""
+    cosine, sine = np.cos(angles)[..., None], np.sin(angles)[..., None]
+    along = (points * unit_axis).sum(axis=-1, keepdims=True)
+    turned: Floats = points * cosine + np.cross(unit_axis, points) * sine + unit_axis * along * (1.0 - cosine)
+    return turned

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_row
+from machine.gcode.lines import Lines
 from machine.gcode.part_totals import PartTotals
 from machine.gcode.settings import CONFIG_BEGIN, CONFIG_END, comment, flat
 from machine.reader.parsed import MoveKind, ParsedProgram
@@ -68,8 +69,8 @@ def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> It
     """Parts of which beads are laid at another pose than their ;POSE: comment tells."""
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
     rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
-    for number in [k for k, line in enumerate(lines, start=1) if line[:6] == ";POSE:"]:
-        comment_pose = POSE.match(lines[number - 1])
+    for place in Lines.of(lines).beginning_with(";POSE:"):
+        number, comment_pose = place + 1, POSE.match(lines[place])
         if comment_pose is None or (comment_pose[1], comment_pose[3]) != letters:
             continue
         after = int(np.searchsorted(program.line[rows], number))

@@ -45,6 +45,13 @@ class Lines(Sequence[str]):
             ends.append(np.array([len(content)]))
         return cls(_exact(content), np.concatenate(ends))
 
+    def beginning_with(self, word: str) -> list[int]:
+        """The places of the lines that begin with a word."""
+        begins = np.flatnonzero(np.diff(self.start) > len(_bytes(word)))
+        for k, letter in enumerate(_bytes(word)):
+            begins = begins[self.content[self.start[begins] + k] == letter]
+        return begins.tolist()
+
     def __add__(self, other: "Lines") -> "Lines":
         if not isinstance(other, Lines):
             return NotImplemented

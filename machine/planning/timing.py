@@ -49,11 +49,23 @@ def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
 
     The rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament.
     """
-    travel = np.sqrt((deltas[:, :3] ** 2).sum(axis=1))
-    turned = np.hypot(deltas[:, 3], deltas[:, 4])
-    pushed = np.abs(deltas[:, 5])
-    measure = np.select([travel > TINY, turned > TINY, pushed > TINY], [0, 1, 2], 3).astype(np.int8)
-    length: Floats = np.choose(measure, [travel, turned, pushed, np.zeros_like(travel)])
+    return _lengths(np.ascontiguousarray(deltas))
+
+
+@kernel
+def _lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
+    length, measure = floats(len(deltas), 0.0), np.empty(len(deltas), np.int8)
+    for k in range(len(deltas)):
+        travel = np.sqrt(deltas[k, 0] ** 2 + deltas[k, 1] ** 2 + deltas[k, 2] ** 2)
+        turned, pushed = np.hypot(deltas[k, 3], deltas[k, 4]), abs(deltas[k, 5])
+        if travel > TINY:
+            length[k], measure[k] = travel, 0
+        elif turned > TINY:
+            length[k], measure[k] = turned, 1
+        elif pushed > TINY:
+            length[k], measure[k] = pushed, 2
+        else:
+            measure[k] = 3
     return length, measure
 
 
@@ -77,16 +89,31 @@ def blocks_of(
 ) -> tuple[Blocks, NDArray[np.bool_]]:
     """The blocks of the moves that move anything, and (n,) which they are."""
     length, measure = lengths(deltas)
-    share = np.abs(deltas) / np.maximum(length, TINY)[:, None]
-    with np.errstate(divide="ignore"):
-        cruise = np.minimum(speed, (axis_speeds(machine) / share).min(axis=1))
-        acceleration = (axis_accelerations(machine) / share).min(axis=1)
+    cruise, acceleration = _allowed(
+        np.ascontiguousarray(deltas), length, speed, axis_speeds(machine), axis_accelerations(machine)
+    )
     if most_mm_s2 is not None:
         acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
     moving = measure < 3
     halts = np.diff(np.cumsum(stop)[moving], prepend=0) > 0
     direction = deltas[moving] / length[moving][:, None]
     return Blocks(direction, length[moving], cruise[moving], acceleration[moving], measure[moving], halts), moving
+
+
+@kernel
+def _allowed(
+    deltas: Floats, length: Floats, speed: Floats, most_speed: Floats, most_acceleration: Floats
+) -> tuple[Floats, Floats]:
+    """(n,) speed and acceleration along each move at which no axis has more than its most."""
+    cruise, acceleration = floats(len(deltas), 0.0), floats(len(deltas), np.inf)
+    for k in range(len(deltas)):
+        cruise[k] = speed[k]
+        for axis in range(6):
+            share = abs(deltas[k, axis]) / max(length[k], TINY)
+            if share > 0.0:
+                cruise[k] = min(cruise[k], most_speed[axis] / share)
+                acceleration[k] = min(acceleration[k], most_acceleration[axis] / share)
+    return cruise, acceleration
 
 
 @borrower

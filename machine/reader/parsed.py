@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -89,7 +90,7 @@ class ParsedProgram:
     announced: int
     part_totals: tuple[PartTotals, ...]
 
-    @property
+    @cached_property
     def part(self) -> Indices32:
         """(n,) from ;PART: comments, 0 before the first."""
         return self.remarks.part[self.remark]

@@ -37,3 +37,10 @@ def test_a_text_in_pieces_has_the_lines_of_the_whole(pieces: list[str]) -> None:
 def test_other_lines_are_not_equal() -> None:
     assert Lines.of(["a"]) != ["b"]
     assert Lines.of(["a"]) != ["a", "b"]
+
+
+@given(
+    st.lists(st.sampled_from(["", ";", ";P", ";POSE:A1", ";POSE", "G1 ;POSE:", "é"])), st.sampled_from(["", ";", ";POSE:", "é"])
+)
+def test_lines_that_begin_with_a_word_are_found(lines: list[str], word: str) -> None:
+    assert Lines.of(lines).beginning_with(word) == [k for k, line in enumerate(lines) if line.startswith(word)]
