@@ -62,6 +62,8 @@ def travel_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, machi
 
 def travel_speed(points_mm: Floats, speed_mm_s: float, machine: Machine) -> float:
     """The speed along (n, 3) machine points lowered to what X, Y and Z allow."""
+    if speed_mm_s <= min(machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s):
+        return speed_mm_s
     return float(travel_speeds(points_mm, np.array([0, len(points_mm)]), np.array([speed_mm_s]), machine)[0])
 
 

@@ -22,7 +22,7 @@ from mdp.pose import Pose, level
 from profiles.profile import Profile
 from slicer.paths import KINDS, Kind, Layer, Path, SlicedPart, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
-from slicer.strokes.wiping import wipe_trail
+from slicer.strokes.wiping import STANDING_MM, wipe_trail
 
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 
@@ -158,9 +158,12 @@ def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate:
     points = np.column_stack([layer.points, layer.points_z_mm]) + shift
     starts, approach, passed = layer.starts.tolist(), layer.approach + shift[:2], layer.approach_starts.tolist()
     strokes = _strokes(layer, points, profile, stroke_accelerations(profile, on_plate))
+    steps = points[layer.starts[1:-1]] - points[layer.starts[1:-1] - 1]
+    apart = [True, *(np.linalg.norm(steps, axis=1) > STANDING_MM).tolist()]  # a stroke may begin where the one before it ends
     for k, (stroke, retracts) in enumerate(zip(strokes, layer.retract.tolist(), strict=True)):
-        yield from to_path(tip, stroke.points_mm[0], approach[passed[k] : passed[k + 1]], retracts, shift, profile)
-        yield from prime(tip, profile)
+        if apart[k]:
+            yield from to_path(tip, stroke.points_mm[0], approach[passed[k] : passed[k + 1]], retracts, shift, profile)
+            yield from prime(tip, profile)
         yield run_in(stroke, layer, tip, profile) if tip.run_in_mm > 0.0 else stroke
         tip.printed.append((points[starts[k] : starts[k + 1]], layer, k, shift))
         tip.at_mm = stroke.points_mm[-1]
@@ -249,4 +252,5 @@ def _printed(piece: SlicedPart, part: Part, shift: Floats, profile: Profile) -> 
     points = np.concatenate([layer.points for layer in piece.layers])
     z_mm = np.repeat([layer.z_mm for layer in piece.layers], [len(layer.points) for layer in piece.layers])
     widest = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
-    return hull(workpiece_points(profile.machine, part.pose, np.column_stack([points, z_mm]) + shift), 0.5 * widest)
+    corners = hull(np.column_stack([points, z_mm]), 0.0).points_mm
+    return hull(workpiece_points(profile.machine, part.pose, corners + shift), 0.5 * widest)
