@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from manifold3d import CrossSection, JoinType
+from manifold3d import CrossSection, FillRule, JoinType
 
-from mdp.cut import Solid, solid_of
 from mdp.directions.orientation import LEAN_DEG, centre_of_mass, diameter_mm, tipping_angle_deg
-from mdp.mesh import Floats, Mesh, dot
+from mdp.kernels.arrays import longs, table
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats, Indices, Ints, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
+from mdp.topology.linked_faces import opposites
 from profiles.profile import Profile
 
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
@@ -82,11 +84,11 @@ class Footing:
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """The plate under a model: its mesh and solid, its centre of mass and diameter, the width of the brim that a small base gets,
-    and the density, as if it were printed solid."""
+    """The plate under a model: its mesh, (3 m,) the half-edge across each half-edge, its centre of mass and diameter, the width
+    of the brim that a small base gets, and the density, as if it were printed solid."""
 
     mesh: Mesh
-    solid: Solid
+    across: Ints
     centre: Floats
     diameter_mm: float
     brim_mm: float
@@ -97,18 +99,20 @@ class Plate:
         """The plate under a mesh, by a profile. A pedestal holds no more than a plate; a brim goes round the pedestal."""
         process, on_pedestal = profile.process, profile.search.pedestal_mm > 0.0
         brim_mm = 0.0 if on_pedestal else process.brim_mm or process.small_base_brim_mm
-        return cls(mesh, solid_of(mesh), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, profile.material.density_g_cm3)
+        return cls(mesh, opposites(mesh.faces), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, profile.material.density_g_cm3)
 
     @cached_property
     def weight_n(self) -> float:
         """The weight of the model."""
-        return 1e-3 * self.density_g_cm3 * float(self.solid.volume()) * NEWTON_PER_G
+        return 1e-3 * self.density_g_cm3 * self.mesh.volume_mm3 * NEWTON_PER_G
 
     def footing(self, rotation: Floats) -> Footing:
         """How the model stands when it is turned by a rotation (3, 3)."""
-        heights, centre = self.mesh.vertices @ rotation[2], rotation @ self.centre
+        heights, centre = dot(self.mesh.vertices, rotation[2]), rotation @ self.centre
         low, high = float(heights.min()), float(heights.max())
-        touching, blunt = self._sections(rotation, low, high)
+        half_mm = 0.5 * (high - low)
+        above_mm = (min(0.5 * PLATFORM_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm))
+        touching, blunt = (self._section(rotation, heights, low + above) for above in above_mm)
         base = max(touching, blunt, key=CrossSection.area)
         brim = base.offset(self.brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS) if self.brim_mm > 0.0 else base
         tensions = [_tension_mpa(section_edges(area), high - low, self.weight_n, centre[:2]) for area in (base, brim)]
@@ -117,16 +121,51 @@ class Plate:
         shadow_mm2 = self._shadow_mm2(rotation)
         return Footing(base.area() / shadow_mm2, touching.area() / shadow_mm2, lean_deg, *tensions)
 
-    def _sections(self, rotation: Floats, low: float, high: float) -> tuple[CrossSection, CrossSection]:
-        """The sections where the model touches the plate, and a little above."""
-        turned = self.solid.transform(np.column_stack([rotation, np.zeros(3)]))
-        touching_mm, blunt_mm = 0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm
-        half_mm = 0.5 * (high - low)
-        return turned.slice(low + min(touching_mm, half_mm)), turned.slice(low + min(blunt_mm, half_mm))
+    def _section(self, rotation: Floats, heights: Floats, z_mm: float) -> CrossSection:
+        """The section of the turned model at a height; heights: (n,) of its vertices."""
+        points, starts = _section_loops(self.mesh.vertices, self.mesh.faces, self.across, rotation, heights, z_mm)
+        return CrossSection(np.split(points, starts[1:-1]), FillRule.Positive) if len(points) else CrossSection()
 
     def _shadow_mm2(self, rotation: Floats) -> float:
         """The area of the model's shadow, overlapping surfaces each counted."""
-        return 0.5 * float(np.abs(dot(self.mesh.normals, rotation[2])) @ self.mesh.areas_mm2)
+        return 0.5 * float((np.abs(dot(self.mesh.normals, rotation[2])) * self.mesh.areas_mm2).sum())
+
+
+@kernel
+def _section_loops(
+    vertices: Floats, faces: Ints, across: Ints, rotation: Floats, heights: Floats, z_mm: float
+) -> tuple[Floats, Indices]:
+    """The outlines, (n, 2) points and (k + 1,) where each begins, of a closed surface that is turned and cut at a height.
+
+    Walks from face to face over the edges that the plane crosses, the inside on the left. across: (3 m,) the half-edge on the
+    face across each; heights: (v,) of the turned vertices, those at z_mm count as above.
+    """
+    upward = longs(len(faces), -1)  # the half-edge over which the plane leaves each face that it crosses
+    count = 0
+    for face in range(len(faces)):
+        for k in range(3):
+            if heights[faces[face, k]] < z_mm <= heights[faces[face, (k + 1) % 3]]:
+                upward[face] = 3 * face + k
+                count += 1
+    points, starts, n, loops = table(count, 2), longs(count + 1, 0), 0, 0
+    for face in range(len(faces)):
+        if upward[face] < 0:
+            continue
+        at = face
+        while at >= 0 and upward[at] >= 0:
+            h = upward[at]
+            upward[at] = -1
+            low, high = faces[at, h % 3], faces[at, (h % 3 + 1) % 3]
+            share = (z_mm - heights[low]) / (heights[high] - heights[low])
+            for axis in range(2):
+                for k in range(3):
+                    place = vertices[low, k] + share * (vertices[high, k] - vertices[low, k])
+                    points[n, axis] += rotation[axis, k] * place
+            n += 1
+            at = across[h] // 3 if across[h] >= 0 else -1
+        loops += 1
+        starts[loops] = n
+    return points, starts[: loops + 1]
 
 
 def tips_over(base: CrossSection, height_mm: float) -> bool:

@@ -5,10 +5,13 @@ from dataclasses import replace
 import manifold3d as m3
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from mdp.cost.footing import Footing, Plate
+from mdp.cost.footing import BLUNT, Footing, Plate
 from mdp.cut import mesh_of
 from mdp.mesh import Floats
+from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.profile import load
 
 UPRIGHT = np.eye(3)
@@ -121,3 +124,18 @@ def test_a_rounded_end_is_as_wide_as_a_hundredth_of_the_model_above_the_plate() 
 
 def test_a_point_is_no_base_and_the_file_is_believed_no_further_than_it_stands() -> None:
     assert not standing(m3.Manifold.cylinder(40.0, 0.01, 20.0, 64)).held(of_file=True)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6))
+def test_bases_are_the_sections_that_manifold3d_cuts(seed: int) -> None:
+    ring = rod(20.0, 6.0) - rod(12.0, 6.0) + m3.Manifold.cube((8.0, 8.0, 30.0)).translate((15.0, 0.0, 3.0))
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    mesh, turned = mesh_of(ring), ring.transform(np.column_stack([turn, np.zeros(3)]))
+    low, shadow_mm2 = turned.bounding_box()[2], 0.5 * np.abs(mesh.normals @ turn[2]) @ mesh.areas_mm2
+    heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * Plate.under(mesh, load()).diameter_mm)
+    touching_mm2, base_mm2 = (turned.slice(low + above_mm).area() for above_mm in heights_mm)
+    footing = footing_of(ring, turn)
+    assert footing.touching_share * shadow_mm2 == pytest.approx(touching_mm2, abs=1e-6)
+    assert footing.base_share * shadow_mm2 == pytest.approx(max(touching_mm2, base_mm2), abs=1e-6)
