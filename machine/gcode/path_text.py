@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Indices
 
 Bytes = NDArray[np.uint8]
@@ -105,7 +105,7 @@ def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_
     return _copy(texts.content, texts.starts[len(paths.starts) - 1], texts.starts[len(paths.starts)], text, at)
 
 
-@borrower
+@part
 def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tuple[float, float]:
     """What the filament of each step, in proportion to its length as written, is multiplied by so that the sum stays, and how
     much slower the path must go for that; 0: the sum is nothing.

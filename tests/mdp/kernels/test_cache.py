@@ -49,15 +49,15 @@ def test_a_kernel_is_compiled_once_and_again_when_a_part_or_a_constant_in_anothe
 
 
 def test_the_sources_of_a_kernel_are_its_file_and_what_its_parts_and_constants_come_from() -> None:
-    travel = cache.PACKAGES / "slicer" / "travel"
-    sources = cache.sources(travel / "path_order.py")
+    strokes = cache.PACKAGES / "slicer" / "strokes"
+    sources = cache.sources(strokes / "path_order.py")
     assert {file.relative_to(cache.PACKAGES).as_posix() for file in sources} == {
         "slicer/strokes/path_order.py",
         "mdp/kernels/arrays.py",
         "mdp/kernels/kernel.py",
         "mdp/mesh.py",
     }
-    assert cache.PACKAGES / "slicer" / "geometry" / "cells.py" in cache.sources(travel / "combing.py")
+    assert cache.PACKAGES / "slicer" / "geometry" / "cells.py" in cache.sources(strokes / "travels.py")
 
 
 def test_the_folder_is_the_one_named_or_the_user_s_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
