@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
 NUMBERS = {"None", "int", "float", "bool", "Segment"}
-NUMERIC = ("abs", "arccos", "arctan2", "ceil", "cos", "degrees", "floor", "hypot", "radians", "sin", "sqrt")
+NUMERIC = ("abs", "arccos", "arctan2", "ceil", "cos", "degrees", "floor", "hypot", "radians", "rint", "sin", "sqrt")
 
 
 def test_no_part_that_borrows_its_arrays_gives_one_back() -> None:
