@@ -45,7 +45,7 @@ def _mean_width(points: Floats, widths: Floats) -> float:
     for k in range(len(points) - 1):
         step = np.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
         more, length = more + (0.5 * (widths[k] + widths[k + 1]) - widths[0]) * step, length + step
-    return float(widths[0] + more / length)
+    return float(widths[0] + more / length) if length > 0.0 else float(widths[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -152,7 +152,7 @@ class Layer:
             a, b = self.starts[k], self.starts[k + 1]
             done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points[a:b], axis=0).T))])
             begin, end = self.below_mm[k]
-            heights[a:b] += -begin + (begin - end) * done / done[-1]
+            heights[a:b] += -begin + (begin - end) * done / max(float(done[-1]), 1e-12)
         return heights
 
     @property

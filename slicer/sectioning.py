@@ -15,7 +15,7 @@ from slicer.heights import layer_heights, limb_planes_mm
 from slicer.interface.compensation import compensate, compensate_elephant_foot
 from slicer.interface.interface import plastic_below
 from slicer.interface.interlock import cut_grooves
-from slicer.interface.model import surroundings_of
+from slicer.interface.model import neighbours_of
 from slicer.interface.pins import NONE, Pins, cut_pins
 from slicer.sections import Sections
 from slicer.strokes.vase import vase_profile
@@ -46,7 +46,7 @@ def section_part(
         outlines = lay_on_plate(
             outlines, int(np.searchsorted(heights.cut_mm, PLATFORM_TOLERANCE_MM)), base, process.line_width_mm
         )
-    around = surroundings_of(part, earlier, later, heights, process)
+    around = neighbours_of(part, earlier, later, heights, process)
     outlines = compensate(outlines, part, later, around.beside, heights.cut_mm, process)
     outlines = cut_pins(outlines, part, later, pins, heights.cut_mm, of_print)
     if on_platform:
@@ -64,7 +64,7 @@ def section_part(
         outlines=outlines,
         own=own,
         ungrooved=ungrooved,
-        surroundings=around,
+        neighbours=around,
         plastic_below=plastic_below(part, earlier, outlines[0]),
         plate=plate_outline(profile.machine.table),
         pedestal_layers=pedestal,

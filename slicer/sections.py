@@ -25,11 +25,11 @@ class Pin:
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
-    """Sections of the model's other parts in a part's frame, each taken once.
+class Neighbours:
+    """Sections of the model's other parts in a part's frame; no later stage cuts their meshes again.
 
-    beside: of later parts at the heights of the part's layers; above: of later parts over the last layer, as many as shells look;
-    below: of the model under the base plane, the nearest first; empty where the earlier parts are not known.
+    beside: of later parts at the height at which each layer of the part is cut; above: of later parts over the last layer, as
+    many as shells look; below: of the model under the base plane, the nearest first; empty where the earlier parts are not known.
     """
 
     beside: Sequence[Polygons]
@@ -56,7 +56,7 @@ class Sections:
     outlines: Sequence[Polygons]
     own: Sequence[Polygons]
     ungrooved: Sequence[Polygons]
-    surroundings: Surroundings
+    neighbours: Neighbours
     plastic_below: Polygons | None
     plate: Polygons
     pedestal_layers: int = 0
@@ -91,5 +91,8 @@ class Sections:
         tips_mm = tip_mm[-1] + height_mm * np.arange(1, count + 1)
         more = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
         outlines, own, ungrooved = ([*places, *[Polygons()] * count] for places in (self.outlines, self.own, self.ungrooved))
-        around = replace(self.surroundings, beside=[*self.surroundings.beside, *[Polygons()] * count])
-        return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved, surroundings=around)
+        around, known = self.neighbours, len(self.neighbours.above)
+        higher = [*around.beside, *around.above, *[Polygons()] * count]  # the added layers lie where those above were sectioned
+        end = len(around.beside) + count
+        around = replace(around, beside=higher[:end], above=higher[end : end + known])
+        return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved, neighbours=around)

@@ -69,7 +69,7 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     covers = cover(model, sections.own, walled)
     filled = regions([layer.walls.inside for layer in walled], covers, not sections.on_platform, process)
     bridges = bridges_of_layers(sections, overhangs, supports.areas)
-    around = sections.surroundings
+    around = sections.neighbours
     ironed = ironed_areas(filled, [*around.beside, *around.above[:1]], process)
     infill = with_line_width(process, process.infill_line_width_mm)
     return Shells(

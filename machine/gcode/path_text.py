@@ -12,7 +12,7 @@ from mdp.mesh import Floats, Indices
 Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int64]
 
-LONGEST = 112  # characters of a line: five words of 20 digits at most, the command beside them
+LONGEST = 128  # characters of a line: five words of 20 digits at most with sign and point, and the command
 SPACE, MINUS, POINT, ZERO, LINE_END, FEED = 32, 45, 46, 48, 10, 70
 COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point
 PUSHING, TRAVELLING, STANDING = range(3)  # what a path does: strokes and wipes, travels, retractions
@@ -107,8 +107,8 @@ def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_
 
 @part
 def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tuple[float, float]:
-    """What the filament of each step, in proportion to its length as written, is multiplied by so that the sum stays, and how
-    much slower the path must go for that; 0: the sum is nothing.
+    """Factor that scales the filament of each step, in proportion to its written length, so that the sum stays; and the factor by
+    which the path is slowed. A factor of 0: nothing is redistributed.
 
     Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed.
     """

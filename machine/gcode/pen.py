@@ -17,7 +17,7 @@ UNKNOWN = -(10**12)
 @dataclass
 class Pen:
     """pose: where the table stands; known: (5,) X Y Z, filament and F, pushed_mm: (1,) filament, as in path_text; kind: number of
-    the last stroke's, -1: none."""
+    the last stroke's kind, -1: none."""
 
     dialect: Dialect
     machine: Machine

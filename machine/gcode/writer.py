@@ -258,7 +258,7 @@ def _progress(seconds: float, total: float, pen: Pen) -> Iterator[str]:
 
 def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int], profile: Profile, pen: Pen) -> Iterator[str]:
     """The text of the moves in rows first to end, among which there is no mark."""
-    if first < end and pen.known[Z] == UNKNOWN and program.what[first] == TRAVEL:
+    if first < end and pen.known[Z] == UNKNOWN and program.what[first] == TRAVEL:  # plan() begins with travels
         yield _first_travel(program, first, pen)
         first += 1
     if first == end:

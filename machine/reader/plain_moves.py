@@ -1,6 +1,6 @@
 """Plain moves: a run of usual G0 and G1 lines read at once by a kernel, as `Modes.move` and `straight` would one by one.
 
-With the comments between them that tell a stroke's width, or a kind that has been told before, they are 99 lines in a hundred of
+With the comments between them that tell a stroke's width, or a kind that has already occurred, they are 99 lines in a hundred of
 a program. What is not usual ends the run, and the reader takes that line: other letters than the machine's axes and F, a feed
 that is not above 0, a number of more digits than one division reads exactly, other comments.
 """
@@ -85,7 +85,7 @@ def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], firs
 
 
 def _types(reader: Reader) -> Text:
-    """The kinds of line that the program has told so far."""
+    """The kinds of line seen so far, in the order of their numbers."""
     kinds = [kind.encode("utf-8", "surrogatepass") for kind in reader.types]
     return Text(np.frombuffer(b"".join(kinds) or b" ", dtype=np.uint8), np.cumsum([0, *map(len, kinds)]))
 
@@ -94,7 +94,7 @@ def _types(reader: Reader) -> Text:
 def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Floats) -> tuple[int, int, int]:
     """The line after the run, how many rows it has, and the line of its last move.
 
-    state: (7,) axes and feed, which it leaves as they are then, as it does what comments say in meaning.row.
+    state: (7,) axes and feed; updated in place, as are the kind and the width in meaning.row.
     """
     words = np.empty((32, 2))
     count, line, move = 0, first, first

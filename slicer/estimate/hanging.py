@@ -15,7 +15,7 @@ from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, offset
 from slicer.heights import Heights
 from slicer.overhangs import find_overhangs
-from slicer.sections import Sections, Surroundings
+from slicer.sections import Neighbours, Sections
 from slicer.support.support import own_supports
 
 LAYERS = 50  # thick layers at most, and one above what hangs: on thin limbs 40 lost up to 0.3 of the support that 60 find
@@ -63,7 +63,7 @@ def thick_support(part: Part, heights: Heights, profile: Profile, plate: Polygon
         outlines=outlines,
         own=outlines,
         ungrooved=outlines,
-        surroundings=Surroundings([Polygons()] * len(outlines)),
+        neighbours=Neighbours([Polygons()] * len(outlines)),
         plastic_below=None if on_platform else outlines[0],
         plate=plate,
     )

@@ -29,8 +29,8 @@ FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3} 
 SAMPLES = 6  # layers from which the plastic of anchors is judged
 MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border
 # Of the lines in a period squared, in periods, mean over all heights, chords instead of arcs: integrated numerically.
-LENGTH = 2.454
-STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
+GYROID_LENGTH = 2.454
+GYROID_STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
 TURN_DEG = 60.0  # a third of the half turn after which lines are themselves again
 
 
@@ -67,7 +67,7 @@ def _rows(box: Box, side: float, spacing_mm: float) -> Lines:
 
 def gyroid(layer: PatternLayer) -> LinePattern:
     """Waves whose plastic is the density on average over the layers."""
-    period = LENGTH * layer.spacing_mm / layer.density
+    period = GYROID_LENGTH * layer.spacing_mm / layer.density
     height = 2.0 * pi * layer.z_mm / period
     along_x = abs(cos(height)) > abs(sin(height))
     return LinePattern(layer.angle_deg + (0.0 if along_x else 90.0), lambda box: _waves(box, period, height, along_x))
@@ -76,8 +76,8 @@ def gyroid(layer: PatternLayer) -> LinePattern:
 def _waves(box: Box, period: float, height: float, along_x: bool) -> Lines:
     """Two waves a period; in the frame turned by 90 degrees x is the gyroid's y and y its -x."""
     unit = period / (2.0 * pi)
-    low, high = np.floor(box[0] / period * STEPS) - 1, np.ceil(box[2] / period * STEPS) + 1
-    run = np.arange(low, high + 1) * (2.0 * pi / STEPS)
+    low, high = np.floor(box[0] / period * GYROID_STEPS) - 1, np.ceil(box[2] / period * GYROID_STEPS) + 1
+    run = np.arange(low, high + 1) * (2.0 * pi / GYROID_STEPS)
     rising, falling = _graphs(run, height) if along_x else _graphs_of_x(run, height)
     first, last = np.floor(box[1] / period) - 2, np.ceil(box[3] / period) + 2
     lines = [graph + 2.0 * pi * k for k in np.arange(first, last + 1) for graph in (rising, falling)]
@@ -136,7 +136,7 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     spacing = spacing_mm(process.line_width_mm, height_mm)
     drawn = asked
     for _ in range(2):
-        step = 0.25 * LENGTH * spacing / drawn / len(chosen)  # a gyroid's layers differ over a quarter of its period
+        step = 0.25 * GYROID_LENGTH * spacing / drawn / len(chosen)  # a gyroid's layers differ over a quarter of its period
         samples = [
             infill_beads(areas[i], process, density=drawn, layer=i, z_mm=(k + 0.5) * step, height_mm=height_mm)
             for k, i in enumerate(chosen)

@@ -33,7 +33,7 @@ def triangulate(loops: Sequence[Floats], step_mm: float = np.inf) -> Triangulati
     """The Delaunay triangulation of polygons given by their contours (k, 2); None where they have no area.
 
     step_mm: sides get points so that none is longer. They are put in after the polygons have been triangulated without them,
-    which takes a fraction of the time; flips make any triangulation that of Delaunay.
+    which takes a fraction of the time. The result is a Delaunay triangulation; where four points lie on a circle there are two.
     """
     if not loops:
         return None

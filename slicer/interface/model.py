@@ -1,4 +1,4 @@
-"""Model: what of the whole model lies around each layer of a part, so that its surface is told from the faces of cuts."""
+"""Model: the parts of the whole model around each layer, so that its surface is distinguished from the faces of cuts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from slicer.geometry.polygons import CLOSING_MM, Polygons, closing, islands, uni
 from slicer.heights import Heights
 from slicer.interface.compensation import reach_mm
 from slicer.interface.interface import sections_of, touching
-from slicer.sections import Sections, Surroundings
+from slicer.sections import Neighbours, Sections
 
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 
@@ -37,10 +37,8 @@ class Model:
         return any(not area.is_empty() for area in self.others)
 
 
-def surroundings_of(
-    part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process
-) -> Surroundings:
-    """What of other parts lies around the layers of a part, as far as its shells look."""
+def neighbours_of(part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process) -> Neighbours:
+    """Sections of the other parts around the layers of a part, as far as its shells look."""
     top, bottom = shell_layers(process)
     step = process.layer_height_mm
     over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
@@ -52,7 +50,7 @@ def surroundings_of(
         deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
         below = [closing(model, CLOSING_MM) for model in sections_of([*before, *after], part, deep)[::-1]]
     count = len(heights.cut_mm)
-    return Surroundings(others[:count], others[count:], below)
+    return Neighbours(others[:count], others[count:], below)
 
 
 def model_around(sections: Sections) -> Model:
@@ -60,7 +58,7 @@ def model_around(sections: Sections) -> Model:
 
     Earlier parts that are not known are taken to fill the first section; under the platform is nothing.
     """
-    own, around = sections.own, sections.surroundings
+    own, around = sections.own, sections.neighbours
     top, bottom = shell_layers(sections.process)
     whole = [joined(*three) for three in zip(sections.ungrooved, own, around.beside, strict=True)]
     beside = [model - mine if model is not None else Polygons() for model, mine in zip(whole, own, strict=True)]

@@ -27,7 +27,7 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
         return strokes
     shortest_mm = SHORTEST * process.line_width_mm
     if hanging_area(section, below, 0.5, process.line_width_mm).area() < shortest_mm * NOISE_MM:
-        return strokes  # the section hardly reaches beyond what it lies on, its centrelines do not by far
+        return strokes  # the section barely overhangs: no centreline, half a line inside it, can
     for share in sorted({*STEPS, process.overhang_share}, reverse=True):
         hanging = hanging_area(section, below, share, process.line_width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:

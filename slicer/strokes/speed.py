@@ -19,7 +19,7 @@ from slicer.strokes.strokes import RINGS, Strokes
 KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
-STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
+FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
 
 
 def speeds_mm_s(
@@ -108,7 +108,7 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
     quick, slow = process.least_layer_time_s, material.fan_layer_time_s
     falling = max(0.0, (slow - time_s) / (slow - quick)) if slow > quick else 0.0
     share = 1.0 if time_s <= quick else falling
-    return round((least + share * (material.fan - least)) / STEP) * STEP
+    return round((least + share * (material.fan - least)) / FAN_STEP) * FAN_STEP
 
 
 def rising_fan(material: Material, layer: int) -> float:
@@ -123,7 +123,7 @@ def own_fans(strokes: Strokes, material: Material, factor: float, layer_fan: flo
     hanging = factor * (material.fan if material.fan_bridge is None else material.fan_bridge)
     over_infill = hanging if material.fan_infill_bridge is None else factor * material.fan_infill_bridge
     own = np.where(strokes.over_infill, over_infill, hanging)
-    leaning = np.where(strokes.overhang > 0, np.round(0.5 * (layer_fan + own) / STEP) * STEP, np.nan)
+    leaning = np.where(strokes.overhang > 0, np.round(0.5 * (layer_fan + own) / FAN_STEP) * FAN_STEP, np.nan)
     return np.where(strokes.is_of(*HANGING), own, leaning)
 
 

@@ -83,7 +83,7 @@ def _split(points: Floats, starts: Indices, wanted: Mask, sides: Sides, shortest
                 for axis in range(3):
                     out.points[n, axis] = points[i, axis]
                 n += 1
-            out.source[count], out.within[count], out.starts[count + 1] = k, size > 0 and within[0], n
+            out.source[count], out.within[count], out.starts[count + 1] = k, size > 1 and within[0], n
             count += 1
             continue
         begin = 0
@@ -101,9 +101,9 @@ def _split(points: Floats, starts: Indices, wanted: Mask, sides: Sides, shortest
 
 @part
 def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None:
-    """Runs of steps shorter than that take after their surroundings, those within last so that none is overlooked for a gap.
+    """Runs of steps shorter than that take after their neighbours, those within last so that none is overlooked for a gap.
 
-    points: of which `size` count; within: of as many steps less one. A line that is a single run has no surroundings.
+    points: of which `size` count; within: of as many steps less one. A line that is a single run has no neighbours.
     """
     for inner in range(2):
         a = 0

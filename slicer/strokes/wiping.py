@@ -1,4 +1,4 @@
-"""Wiping: over what the tip goes while the filament is pulled back: what it has just printed, so that the drop stays there."""
+"""Wiping: the way of the tip while filament is pulled back, over what it has just printed, so that the drop stays there."""
 
 import numpy as np
 

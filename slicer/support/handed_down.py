@@ -1,4 +1,4 @@
-"""Plan: the support of all parts together, so that what finds no ground above its base plane stands on support printed earlier.
+"""Handed down: support of all parts together: what finds no ground above its base plane stands on support printed earlier.
 
 Every place over the platform lies above the base plane of some part and below those of all later ones (that of a limb counts
 beside the limb alone): there is just one part with which support can be printed there. So what a part's own support misses is

@@ -54,7 +54,7 @@ def layer_walls(section: Polygons, count: int, process: Process, height_mm: floa
     narrow: list[Polygons] = []
     for island in islands(section):
         (thick if _is_thick(island, rule) else narrow).append(island)
-    even = walls(Polygons.compose(thick), count, process, height_mm, is_thick=True)
+    even = walls(Polygons.compose(thick), count, process, height_mm)
     if not narrow:
         return even
     varying = tuple(chain.from_iterable(variable_walls(island, rule) for island in narrow))

@@ -34,8 +34,8 @@ class Walls:
     varying: tuple[Wall, ...] = ()
 
 
-def walls(section: Polygons, count: int, process: Process, height_mm: float, *, is_thick: bool = False) -> Walls:
-    """Up to `count` walls of a section, of the widths of the process. is_thick: all of them fit everywhere."""
+def walls(section: Polygons, count: int, process: Process, height_mm: float) -> Walls:
+    """Up to `count` walls of a section, of the widths of the process."""
     outer, width = outer_wall_width_mm(process), process.line_width_mm
     spacing, least_mm = spacing_mm(width, height_mm), LEAST_REST * width
     area, levels = section, []
@@ -43,8 +43,7 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float, *, 
         half, behind = (0.5 * spacing, 0.5 * spacing) if level else (0.5 * outer, 0.5 * spacing_mm(outer, height_mm))
         line = offset(area, -half)
         core = offset(line, -behind)
-        backed = line if is_thick else _backed(area, line, core, half_mm=half, behind_mm=behind, least_mm=least_mm)
-        levels.append(tuple(contours(backed)))
+        levels.append(tuple(contours(_backed(area, line, core, half_mm=half, behind_mm=behind, least_mm=least_mm))))
         area = core.simplify(PATH_RESOLUTION_MM)
         if core.is_empty():
             break
