@@ -85,3 +85,19 @@ def test_a_path_of_which_nothing_is_written_leaves_the_speed_that_the_firmware_k
     three = Paths(points, np.zeros(6), np.array([0, 2, 4, 6]), np.array([1, 1, 1], np.int8), speed)
     lines = path_text(three, texts("", "", "", ""), words(), known(), np.zeros(1)).splitlines()
     assert lines == ["G0 X1.000 F1200", "G0 X2.000"]
+
+
+@pytest.mark.parametrize("relative", [True, False])
+@given(st.lists(st.floats(-0.4, 0.4), min_size=2, max_size=20))
+def test_filament_rounded_in_one_call_is_made_up_for_in_the_next(relative: bool, pushed: list[float]) -> None:
+    """However the paths are handed over, the sum of what is written is that of what was pushed, to the last digit."""
+    place, filament_mm, sums = known(), np.zeros(1), 0.0
+    for k, e in enumerate(pushed):
+        rows = [(float(k), 0.0, 0.0, 0.0), (float(k + 1), 0.0, 0.0, e)]
+        (line,) = path_text(path(rows, PUSHING), texts(*NO_TEXT), words("E", relative), place, filament_mm).splitlines()
+        written = float(line.split(" E")[1].split()[0])
+        sums = sums + written if relative else written
+        assert sums == pytest.approx(sum(pushed[: k + 1]), abs=0.6e-5)
+    assert place[:3].tolist() == [1000 * len(pushed), 0, 0]
+    assert place[3] == round(filament_mm[0] * 1e5)
+    assert place[4] == 1200

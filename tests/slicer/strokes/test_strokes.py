@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slicer.bead import Bead
+from slicer.bead import Bead, Course
 from slicer.geometry.polygons import Polygons
-from slicer.paths import Kind
+from slicer.paths import Kind, bead_area_mm2
 from slicer.sections import Neighbours
+from slicer.strokes.pieces import in_pieces
 from slicer.strokes.split import split
 from slicer.strokes.strokes import strokes_of
 from tests.shapes import box
@@ -36,3 +37,23 @@ def test_layers_added_on_top_have_the_neighbours_that_lie_above() -> None:
     higher = replace(sections, neighbours=Neighbours(beside, above)).up_to(0.8)
     assert [area.area() for area in higher.neighbours.beside] == pytest.approx([1.0, 4.0, 9.0, 16.0])
     assert [area.area() for area in higher.neighbours.above] == pytest.approx([25.0, 0.0, 0.0])
+
+
+def test_pieces_of_a_rich_stroke_hold_what_is_more_of_the_whole() -> None:
+    line, widths = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([0.3, 0.6])
+    bead = Bead(Kind.OUTER_WALL, line, 0.45, 0, flow=1.2, course=Course(line, widths))
+    strokes = strokes_of([(bead, line)], np.array([True]), {}, 0.0)
+    pieces = in_pieces(strokes, 0.2)
+    areas_mm2 = bead_area_mm2(pieces.width_mm, 0.2)
+    more_mm3 = float(((pieces.flow - 1.0) * areas_mm2 * pieces.lengths_mm).sum())
+    assert len(pieces) > 5
+    assert more_mm3 == pytest.approx(0.2 * bead_area_mm2(0.45, 0.2) * 10.0)
+
+
+def test_a_piece_of_a_small_wall_is_no_small_wall() -> None:
+    ring = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0], [0.0, 0.0]])
+    strokes = strokes_of([(Bead(Kind.OUTER_WALL, ring, 0.45, 0), ring)], np.array([True]), {}, 20.0)
+    pieces, _ = split(strokes, Polygons.square((10.0, 1.5)).translate((-1.0, -0.5)), np.array([True]), 0.5)
+    assert strokes.small.tolist() == [True]
+    assert len(pieces) == 3
+    assert not pieces.small.any()
