@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import Bead
-from slicer.fill.infill import LENGTH, PATTERNS, gyroid, honeycomb, infill_beads, pattern_density, side_mm
+from slicer.fill.infill import GYROID_LENGTH, PATTERNS, gyroid, honeycomb, infill_beads, pattern_density, side_mm
 from slicer.fill.pattern import PatternLayer, clip_pattern
 from slicer.geometry.clip import border_of, rotation_2d
 from slicer.geometry.polygons import Polygons, offset
@@ -86,7 +86,7 @@ def test_grid_lines_lie_on_each_other_in_all_layers() -> None:
 
 @pytest.mark.parametrize("height", [0.4, 3.0, 7.7, 12.1])
 def test_gyroid_lines_lie_on_the_minimal_surface(height: float) -> None:
-    unit = LENGTH * 0.4 / 0.2 / (2 * np.pi)
+    unit = GYROID_LENGTH * 0.4 / 0.2 / (2 * np.pi)
     pattern = gyroid(PatternLayer(0, height, 0.0, 0.4, 0.2))
     x, y = (pattern.draw((-20, -20, 20, 20))[0] @ rotation_2d(pattern.angle_deg).T / unit).T
     z = height / unit
