@@ -145,15 +145,15 @@ class Layer:
         )
 
     @property
-    def points_z_mm(self) -> Floats:
-        """(n,) heights of the points above the base plane; a stroke climbs evenly from one below_mm to the other."""
+    def points_mm(self) -> Floats:
+        """(n, 3) points in the part's frame; a stroke climbs evenly from one below_mm to the other."""
         heights = np.full(len(self.points), self.z_mm)
         for k in np.flatnonzero(self.below_mm.any(axis=1)).tolist():
             a, b = self.starts[k], self.starts[k + 1]
             done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points[a:b], axis=0).T))])
             begin, end = self.below_mm[k]
             heights[a:b] += -begin + (begin - end) * done / max(float(done[-1]), 1e-12)
-        return heights
+        return np.column_stack([self.points, heights])
 
     @property
     def volumes_mm3(self) -> Floats:
@@ -198,6 +198,11 @@ class SlicedPart:
     too_thin: int = 0
     too_thin_mm: float = 0.0
     pins: int = 0
+
+    @property
+    def points_mm(self) -> Floats:
+        """(n, 3) points of all strokes in the part's frame."""
+        return np.concatenate([layer.points_mm for layer in self.layers])
 
     @property
     def unsupported_mm2(self) -> float:

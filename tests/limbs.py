@@ -20,6 +20,7 @@ from mdp.search.problem import Problem
 from profiles.profile import Profile, load
 from slicer.parts import slice_parts
 from slicer.paths import SlicedPart
+from tests.machine.hand import moves_of
 from tests.shapes import from_manifold
 
 UP = (0.0, 0.0, 1.0)
@@ -96,7 +97,7 @@ def moved_part(program: MachineProgram, index: int) -> tuple[Floats, Floats]:
     """(n, 3) beginnings and ends of the straight moves from a part's first layer to the next part, or a turn of the table."""
     begun = False
     starts, ends = [np.zeros((0, 3))], [np.zeros((0, 3))]
-    for move in program.moves:
+    for move in moves_of(program):
         if isinstance(move, BeginLayer):
             begun = move.part == index
         elif isinstance(move, Reorient):

@@ -139,7 +139,7 @@ class _Guess:
         tip = here[:, :3] - np.array(machine.tool_mm) - tilt_point
         tilt = np.radians(self.signs[0] * (here[:, 3] - zero_deg))
         turn = np.radians(self.signs[1] * (here[:, 4] - machine.turn.zero_deg))
-        seen = _turned_back(turn_axis, turn, _turned_back(tilt_axis, tilt, tip) + tilt_point - turn_point)
+        seen = _turned_about(turn_axis, turn, _turned_about(tilt_axis, tilt, tip) + tilt_point - turn_point)
         mark = np.append(numbers[..., 6:8], np.full((*numbers.shape[:-1], 1), self.height_mm), axis=-1)
         off = seen - mark[..., None, :]
         off[..., [touch.on_plate for touch in self.touches], 2] += self.height_mm
@@ -316,8 +316,8 @@ def _positions(touches: Sequence[Touch]) -> Floats:
     return np.array([[*touch.at_mm, touch.pose.tilt_deg, touch.pose.turn_deg] for touch in touches])
 
 
-def _turned_back(unit_axis: Floats, angles: Floats, points: Floats) -> Floats:
-    """(..., 3) points turned about (..., 3) unit axes by (...) angles in radians (Rodrigues), each by its own."""
+def _turned_about(unit_axis: Floats, angles: Floats, points: Floats) -> Floats:
+    """(..., 3) points turned about (..., 3) unit axes by (...) angles in radians (Rodrigues 1840); all are broadcast."""
     cosine, sine = np.cos(angles)[..., None], np.sin(angles)[..., None]
     along = (points * unit_axis).sum(axis=-1, keepdims=True)
     turned: Floats = points * cosine + np.cross(unit_axis, points) * sine + unit_axis * along * (1.0 - cosine)

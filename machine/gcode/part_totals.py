@@ -27,7 +27,7 @@ class PartTotals:
 
 
 def totals_comment(points_mm: Floats, filament_mm: float, layers: int) -> str:
-    """The comment of a part with strokes through (n, 3) points in so many layers; empty where it has no strokes."""
+    """The comment that sums up a part, whose strokes pass through (n, 3) points; empty where it has no strokes."""
     if not len(points_mm):
         return ""
     low, high = points_mm.min(axis=0).tolist(), points_mm.max(axis=0).tolist()

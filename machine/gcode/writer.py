@@ -314,7 +314,7 @@ def _before_stroke(
 
 
 def _first_travel(program: MachineProgram, row: int, pen: Pen) -> str:
-    """Of the first travel after the start block only Z, so that the tip rises before it crosses."""
+    """The first travel after the start block, of which only Z is written: the tip rises before it crosses."""
     point = pen.file_coordinates(program.points_mm[program.starts[row] : program.starts[row] + 1])
     pen.known[Z] = round(float(point[0, 2]) * 1000.0)
     return f"{pen.dialect.travel} Z{pen.known[Z] / 1000:.3f}{pen.speed(float(program.speed[row]))}\n"

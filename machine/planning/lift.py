@@ -26,7 +26,7 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
     for part, piece in printed:
         turn, shift = frame_change(part, limb)
         for layer in piece.layers:
-            placed = np.column_stack([layer.points, layer.points_z_mm]) @ turn.T + shift
+            placed = layer.points_mm @ turn.T + shift
             for a, b, width_mm in zip(
                 layer.starts[:-1].tolist(), layer.starts[1:].tolist(), layer.width_mm.tolist(), strict=True
             ):

@@ -1,6 +1,6 @@
 """Moves: the machine program between the slicer and the G-code text, in machine coordinates, and its straight moves as arrays."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
@@ -187,29 +187,6 @@ class MachineProgram:
     def mark_rows(self) -> Indices:
         """Where the marks stand among the moves."""
         return np.flatnonzero(self.what >= REORIENT)
-
-    @property
-    def moves(self) -> tuple[Move, ...]:
-        """The rows one by one."""
-        return tuple(self._each())
-
-    def _each(self) -> Iterator[Move]:
-        marks = iter(self.marks)
-        for k, what in enumerate(self.what.tolist()):
-            points, speed = self.points_mm[self.starts[k] : self.starts[k + 1]], float(self.speed[k])
-            filament_mm = self.filament_mm[self.starts[k] + 1 : self.starts[k + 1]]
-            acceleration = None if np.isinf(self.acceleration_mm_s2[k]) else float(self.acceleration_mm_s2[k])
-            if what < len(KINDS):
-                fan = None if np.isnan(self.fan[k]) else float(self.fan[k])
-                yield Stroke(KINDS[what], points, filament_mm, speed, float(self.width_mm[k]), fan, acceleration)
-            elif what == TRAVEL:
-                yield Travel(points, speed, acceleration)
-            elif what == WIPE:
-                yield Wipe(points, -filament_mm, speed)
-            elif what == RETRACT:
-                yield Retract(-float(self.filament_mm[self.starts[k]]), speed)
-            else:
-                yield next(marks)
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,7 +155,7 @@ def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
 
 
 def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate: bool) -> Iterator[Move]:
-    points = np.column_stack([layer.points, layer.points_z_mm]) + shift
+    points = layer.points_mm + shift
     starts, approach, passed = layer.starts.tolist(), layer.approach + shift[:2], layer.approach_starts.tolist()
     strokes = _strokes(layer, points, profile, stroke_accelerations(profile, on_plate))
     steps = points[layer.starts[1:-1]] - points[layer.starts[1:-1] - 1]
@@ -249,8 +249,6 @@ def _first_point(piece: SlicedPart) -> Floats:
 
 def _printed(piece: SlicedPart, part: Part, shift: Floats, profile: Profile) -> Printed:
     """What a finished part covers, in the workpiece frame."""
-    points = np.concatenate([layer.points for layer in piece.layers])
-    z_mm = np.repeat([layer.z_mm for layer in piece.layers], [len(layer.points) for layer in piece.layers])
     widest = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
-    corners = hull(np.column_stack([points, z_mm]), 0.0).points_mm
+    corners = hull(piece.points_mm, 0.0).points_mm
     return hull(workpiece_points(profile.machine, part.pose, corners + shift), 0.5 * widest)

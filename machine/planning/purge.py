@@ -11,7 +11,6 @@ from machine.planning.moves import MachineProgram
 from machine.planning.reorient import is_way_clear
 from mdp.decomposition import Part
 from mdp.mesh import Floats
-from mdp.overhang import Mask
 from mdp.pose import level
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -59,22 +58,12 @@ def _low_strokes(parts: Sequence[Part], sliced: Sequence[SlicedPart], machine: M
     beads = [np.zeros((0, 2, 2))]
     for piece in sliced:
         part = next(part for part in parts if part.index == piece.index)
-        points, ends = _all_points(piece)
-        placed = workpiece_points(machine, part.pose, points + part_shift(machine, part.pose, part.base.offset_mm))
-        low = (np.minimum(placed[:-1, 2], placed[1:, 2]) < LOW_MM) & ~ends[:-1]
+        ends = np.cumsum(np.concatenate([np.diff(layer.starts) for layer in piece.layers])) - 1
+        placed = workpiece_points(machine, part.pose, piece.points_mm + part_shift(machine, part.pose, part.base.offset_mm))
+        low = np.minimum(placed[:-1, 2], placed[1:, 2]) < LOW_MM
+        low[ends[:-1]] = False  # nothing leads from a stroke's last point to the next stroke
         beads.append(np.stack([placed[:-1][low, :2], placed[1:][low, :2]], axis=1))
     return np.concatenate(beads)
-
-
-def _all_points(piece: SlicedPart) -> tuple[Floats, Mask]:
-    """(n, 3) points of all paths in the part's frame, one path after the other, and (n,) which of them end a path."""
-    counts = np.concatenate([np.diff(layer.starts) for layer in piece.layers])
-    flat = np.concatenate([layer.points for layer in piece.layers])
-    ends = np.zeros(len(flat), np.bool_)
-    ends[np.cumsum(counts) - 1] = True
-    return np.column_stack(
-        [flat, np.repeat([layer.z_mm for layer in piece.layers], [len(layer.points) for layer in piece.layers])]
-    ), ends
 
 
 def _lanes(machine: Machine, outward: Floats, count: int, length_mm: float, width_mm: float) -> Floats | None:

@@ -28,7 +28,7 @@ RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 SAMPLES = 6  # layers from which the plastic of anchors is judged
 MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border
-# Of the lines in a period squared, in periods, mean over all heights, chords instead of arcs: integrated numerically.
+# Length of the lines in a square period, in periods, averaged over all heights, chords in place of arcs; integrated numerically.
 GYROID_LENGTH = 2.454
 GYROID_STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
 TURN_DEG = 60.0  # a third of the half turn after which lines are themselves again

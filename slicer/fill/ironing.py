@@ -15,7 +15,7 @@ LEAST_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and sm
 
 
 def ironed_areas(regions: Sequence[Region], beside: Sequence[Polygons], process: Process) -> list[Polygons]:
-    """Of every layer the skin with nothing above it, a line's width away from where a later part will stand.
+    """The skin of each layer that has nothing above it, a line's width away from where a later part will stand.
 
     beside: what later parts have of each layer and of the one over the last.
     """

@@ -5,17 +5,15 @@ from typing import NamedTuple
 
 import manifold3d
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, ints, longs, table
 from mdp.kernels.kernel import borrower, kernel
-from mdp.mesh import Floats, Ints
+from mdp.mesh import Floats, Indices, Ints
 from mdp.topology.linked_faces import opposites
 from slicer.geometry.segments import Segment, orientation
 
-Indices = NDArray[np.int64]
 ROUNDING = 1e-14  # of the terms that are added up: ten times their error
-MOST_FLIPS = 200  # for every side; real polygons need fewer than ten, rounding must not make it endless
+MOST_FLIPS = 2000  # for every side; a straight strip of 2 m needs 500, most polygons one, rounding must not make it endless
 
 
 class Triangulation(NamedTuple):

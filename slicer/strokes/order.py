@@ -165,7 +165,7 @@ def _freedom(chain: Sequence[Bead]) -> int:
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
-    """What of an island is printed before what: by rank, but all walls at once, in families that stay together."""
+    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together."""
     leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
     walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
     phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)

@@ -25,11 +25,12 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
     """
     if below is None or process.overhang_share <= 0.0:
         return strokes
-    shortest_mm = SHORTEST * process.line_width_mm
-    if hanging_area(section, below, 0.5, process.line_width_mm).area() < shortest_mm * NOISE_MM:
+    width_mm, shortest_mm = process.line_width_mm, SHORTEST * process.line_width_mm
+    beyond = hanging_area(section, below, 0.5, width_mm)
+    if beyond.area() < shortest_mm * NOISE_MM:
         return strokes  # the section barely overhangs: no centreline, half a line inside it, can
     for share in sorted({*STEPS, process.overhang_share}, reverse=True):
-        hanging = hanging_area(section, below, share, process.line_width_mm)
+        hanging = beyond if share == 0.5 else hanging_area(section, below, share, width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:
             break
         kinds = SPLIT if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in

@@ -21,8 +21,8 @@ from slicer.geometry.distance import distances
 from slicer.geometry.polygons import edges_of, start_at
 from slicer.geometry.segments import Segment, near_height, nearest_share, squared_distance_in_space
 from slicer.paths import Kind
+from slicer.strokes.strokes import RINGS
 
-WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
 ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
 NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
@@ -167,7 +167,7 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
     """
     seams: dict[int, Floats] = {}
     out = list(beads)
-    for kind in WALLS:
+    for kind in RINGS:
         known = np.array(list(seams.values())).reshape(-1, 2)
         for k, bead in enumerate(beads):
             if bead.kind is kind and not bead.line:

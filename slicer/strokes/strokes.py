@@ -24,8 +24,8 @@ class Strokes:
 
     points: (n, 3) mm, x, y and the width of the bead there; starts: (k + 1,) where the points of each stroke begin.
     approach: (m, 2) points that the travels to strokes pass; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS;
-    width_mm: mean; flow, overhang, over_infill: as in Bead; small: a closed wall no longer than process.small_wall_mm, or a piece
-    of one; varies: the width changes along the stroke; retract: the travel to it pulls the filament back.
+    width_mm: mean; flow, overhang, over_infill: as in Bead; small: a closed wall no longer than process.small_wall_mm, also the
+    pieces of one whose width varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back.
     """
 
     points: Floats

@@ -40,7 +40,7 @@ class Patch:
     gap_mm: float
 
     def under(self, plane: BasePlane, layer: int, deep_mm: float) -> Polygons:
-        """What of a layer lies under the patch, from its gap to deep_mm below the plane."""
+        """The area of a layer under the patch, from its gap to deep_mm below the plane."""
         return plane.shadow(self.places, layer) ^ plane.band(layer, -deep_mm, -self.gap_mm)
 
     def begins(self, plane: BasePlane, count: int) -> dict[int, Polygons]:
@@ -66,7 +66,7 @@ def keep_off(bodies: Sequence[Polygons], patches: Sequence[Patch], plane: BasePl
 
 
 def upper_side(areas: Sequence[Polygons], plane: BasePlane, window: Polygons, deep_mm: float) -> Polygons:
-    """What of the areas of an earlier part's layers ends less than deep_mm below the plane, carried onto a window of it."""
+    """The areas of an earlier part's layers that end less than deep_mm below the plane, carried onto a window of it."""
     pieces = []
     for layer in plane.layers_near(window, deep_mm):
         if layer < len(areas) and not areas[layer].is_empty():
@@ -215,7 +215,7 @@ def _hand_down(room: Room, own: Supports, later: Sequence[HandedDown]) -> Handed
 
 
 def _patches(room: Room, bodies: Sequence[Polygons], wanted: Sequence[Polygons]) -> list[Patch]:
-    """What of a part and of its support hangs over its base plane."""
+    """The area by which a part and its support hang over its base plane."""
     patches = [Patch(area, _gap_mm(room.areas, layer)) for layer, area in _hanging_low(room.areas, wanted)]
     if bodies and not bodies[0].is_empty():
         patches.append(Patch(bodies[0] - _own_placeable(room), 0.0))

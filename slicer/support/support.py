@@ -53,7 +53,7 @@ def add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygon
 
 
 def _loose_ends(bodies: Sequence[Polygons], areas: ReachableAreas, m: int) -> Polygons:
-    """What of a layer's support nothing in the layer below carries, but something to stand on is near."""
+    """The support of a layer that nothing in the layer below carries, though something to stand on is near."""
     if bodies[m].is_empty() or areas.placeable[m].is_empty():
         return Polygons()
     loose = bodies[m] - bodies[m - 1]

@@ -21,6 +21,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile, load, shipped
 from slicer.paths import SlicedPart
 from slicer.slice import slice_part
+from tests.machine.hand import moves_of
 
 LEANING = np.array([0.0, np.sin(np.radians(25.0)), np.cos(np.radians(25.0))])
 LIGHT = ["process.walls=1", "process.infill_density=0.05"]  # a third of the lines
@@ -140,7 +141,7 @@ def test_a_flipped_sign_of_the_tilt_is_found(machine: str) -> None:
     profile, decomposition, sliced, _ = _planned(machine)
     tilt = profile.machine.tilt.model_copy(update={"sign": -profile.machine.tilt.sign, "limits_deg": (-360.0, 360.0)})
     changed = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": tilt})})
-    program = MachineProgram.of("flipped", plan(decomposition, sliced, profile).moves)
+    program = MachineProgram.of("flipped", moves_of(plan(decomposition, sliced, profile)))
     codes = _errors(list(write_gcode(program, changed)), machine)
     assert "sign" in codes
 
@@ -148,7 +149,7 @@ def test_a_flipped_sign_of_the_tilt_is_found(machine: str) -> None:
 @EVERY
 def test_a_tilt_word_of_the_other_sign_is_found(machine: str) -> None:
     lines, letter = list(_text(machine)), _planned(machine)[0].machine.tilt.letter
-    pose = [m for m in _planned(machine)[3].moves if isinstance(m, BeginPart)][1].pose
+    pose = [m for m in moves_of(_planned(machine)[3]) if isinstance(m, BeginPart)][1].pose
     assert pose != level(_planned(machine)[0].machine)
     word = f"{pose.tilt_deg:.4f}"
     flipped = [

@@ -24,7 +24,7 @@ from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile, load
 from slicer.paths import Kind, Layer, Path
-from tests.machine.hand import post_and_arm, printed, squares
+from tests.machine.hand import moves_of, post_and_arm, printed, squares
 
 MODES = [(name, "table") for name in dialects()] + [
     (name, "workpiece") for name, dialect in dialects().items() if dialect.follow_on
@@ -106,7 +106,7 @@ def test_every_turn_is_one_row_at_the_planned_pace_and_the_head_stands_still(dia
     _, _, parsed = both(dialect, coordinates)
     turns = np.flatnonzero(parsed.kind == MoveKind.ROTATE)
     change = parsed.end[turns] - parsed.start[turns]
-    planned = [move for move in printed()[3].moves if isinstance(move, Reorient)]
+    planned = [move for move in moves_of(printed()[3]) if isinstance(move, Reorient)]
     assert parsed.end[turns, 3:] == pytest.approx(np.array([[m.pose.tilt_deg, m.pose.turn_deg] for m in planned[1:]]), abs=1e-4)
     assert np.abs(change[:, :3]).max() < 1e-9
     assert parsed.feed[turns] / 60 == pytest.approx(np.array([m.speed_deg_s for m in planned[1:]]), rel=1e-3)

@@ -18,7 +18,7 @@ from machine.reader.parsed import MoveKind
 from profiles.errors import ProfileError
 from profiles.profile import Profile, load
 from slicer.paths import Kind
-from tests.machine.hand import printed, text
+from tests.machine.hand import moves_of, printed, text
 
 GOLDEN = Path(__file__).parents[1] / "programs"
 BOTH = pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
@@ -115,14 +115,14 @@ def test_the_first_layer_s_temperature_is_waited_for_and_lowered_in_the_second()
 
 def test_layers_that_ask_for_more_heat_get_it_up_to_the_machines_limit():
     profile, _, _, program = printed()
-    moves = tuple(replace(m, nozzle_add_c=95.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in program.moves)
+    moves = tuple(replace(m, nozzle_add_c=95.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in moves_of(program))
     heats = [line for line in write_gcode(MachineProgram.of(program.name, moves), profile) if line.startswith("M104 S")]
     assert heats[-3:] == ["M104 S210", "M104 S300", "M104 S0"]
 
 
 def test_the_heat_of_a_hotter_layer_after_a_turn_is_asked_for_before_the_turn() -> None:
     profile, _, _, program = printed()
-    moves = tuple(replace(m, nozzle_add_c=5.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in program.moves)
+    moves = tuple(replace(m, nozzle_add_c=5.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in moves_of(program))
     lines = list(write_gcode(MachineProgram.of(program.name, moves), profile))
     turned = next(k for k, line in enumerate(lines) if line.startswith("G0 A90"))
     last_stroke = max(k for k, line in enumerate(lines[:turned]) if re.match(r"G1 X.* E[0-9]", line))

@@ -17,6 +17,7 @@ from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load
 from tests.limbs import MODELS, moved_part, printed, sliced
+from tests.machine.hand import moves_of
 
 TOP_MM = 24.0  # of the posts
 
@@ -70,8 +71,8 @@ def _without_turns(profile: Profile) -> Profile:
 
 def test_a_stop_within_a_limb_takes_the_tip_above_all_that_stands() -> None:
     program, run = printed("outer posts", [Stop(2, 5, None, False)])
-    stop = next(k for k, move in enumerate(program.moves) if isinstance(move, Pause))
-    before = program.moves[stop - 1]
+    stop = next(k for k, move in enumerate(moves_of(program)) if isinstance(move, Pause))
+    before = moves_of(program)[stop - 1]
     assert isinstance(before, Travel)
     assert before.points_mm[-1, 2] >= TOP_MM + load().machine.clearance_mm
     assert run.errors == ()

@@ -15,7 +15,7 @@ from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load
 from slicer.paths import SlicedPart
-from tests.machine.hand import post_and_arm, printed, squares
+from tests.machine.hand import moves_of, post_and_arm, printed, squares
 
 BOTH = pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
 
@@ -31,20 +31,20 @@ def test_every_stroke_lies_where_the_slicer_put_it_on_the_workpiece(machine: str
     profile, decomposition, sliced, program = printed(machine)
     for index, (part, piece) in enumerate(zip(decomposition.parts, sliced, strict=True)):
         paths = [(layer.z_mm, path) for layer in piece.layers for path in layer.paths]
-        for stroke, (z, path) in zip(_strokes(program.moves, index), paths, strict=True):
+        for stroke, (z, path) in zip(_strokes(moves_of(program), index), paths, strict=True):
             wanted = (np.column_stack([path.points, np.full(len(path.points), z + part.base.offset_mm)])) @ part.rotation
             assert workpiece_points(profile.machine, part.pose, stroke.points_mm) == pytest.approx(wanted, abs=1e-9)
 
 
 @BOTH
 def test_each_travel_and_stroke_begins_where_the_last_one_ended(machine: str) -> None:
-    moves = [move for move in printed(machine)[3].moves if isinstance(move, Stroke | Travel | Wipe)]
+    moves = [move for move in moves_of(printed(machine)[3]) if isinstance(move, Stroke | Travel | Wipe)]
     for before, after in pairwise(moves):
         assert after.points_mm[0] == pytest.approx(before.points_mm[-1], abs=1e-9)
 
 
 def test_a_reorientation_is_wipe_lift_turn_cross_lower_prime() -> None:
-    moves = printed()[3].moves
+    moves = moves_of(printed()[3])
     turn = [k for k, move in enumerate(moves) if isinstance(move, Reorient)][1]
     begin = next(k for k in range(turn, 0, -1) if isinstance(moves[k], Wipe))
     names = [name for name, _ in groupby(type(move).__name__ for move in moves[begin : turn + 7])]
@@ -58,21 +58,21 @@ def test_a_reorientation_is_wipe_lift_turn_cross_lower_prime() -> None:
 
 def test_after_a_reorientation_no_more_is_pushed_standing_than_was_pulled_back() -> None:
     profile, _, _, program = printed()
-    back = [float(np.sum(move.filament_mm)) for move in program.moves if isinstance(move, Retract | Wipe)]
+    back = [float(np.sum(move.filament_mm)) for move in moves_of(program) if isinstance(move, Retract | Wipe)]
     assert min(back) == -profile.material.retract_mm
     assert sum(back) == pytest.approx(profile.material.retract_mm)
 
 
 def test_the_filament_is_the_volume_of_the_sliced_parts_and_what_oozed_in_the_turn() -> None:
     profile, _, sliced, program = printed()
-    filament = sum(float(move.filament_mm.sum()) for move in program.moves if isinstance(move, Stroke))
+    filament = sum(float(move.filament_mm.sum()) for move in moves_of(program) if isinstance(move, Stroke))
     filament -= profile.material.prime_extra_mm
     assert filament * pi * profile.material.diameter_mm**2 / 4 == pytest.approx(sum(piece.volume_mm3 for piece in sliced))
 
 
 def test_the_table_ends_level_for_the_next_homing() -> None:
     profile, _, _, program = printed()
-    assert [move.pose for move in program.moves if isinstance(move, Reorient)][-1] == level(profile.machine)
+    assert [move.pose for move in moves_of(program) if isinstance(move, Reorient)][-1] == level(profile.machine)
 
 
 def _cramped(z_mm: float, xy_mm: float, plate_mm: float) -> Profile:
@@ -92,8 +92,10 @@ def _tall(profile: Profile):
 def test_with_a_short_z_axis_the_head_stands_aside() -> None:
     profile = _cramped(60.5, 160.0, 60.0)
     program = plan(*_tall(profile), profile)
-    turn = next(k for k, move in enumerate(program.moves) if isinstance(move, Reorient) and move.pose != level(profile.machine))
-    x, y, z = program.moves[turn - 1].points_mm[-1]
+    turn = next(
+        k for k, move in enumerate(moves_of(program)) if isinstance(move, Reorient) and move.pose != level(profile.machine)
+    )
+    x, y, z = moves_of(program)[turn - 1].points_mm[-1]
     assert z == 60.5
     assert np.hypot(x, y) > 60.0
     assert dry_run(write_gcode(program, profile), profile).errors == ()
@@ -109,19 +111,19 @@ def test_no_safe_place_is_refused_with_part_and_heights() -> None:
 def test_a_part_without_a_path_is_left_out() -> None:
     profile, decomposition, sliced, _ = printed()
     program = plan(decomposition, [sliced[0], SlicedPart(2, ())], profile)
-    assert [move.index for move in program.moves if isinstance(move, BeginPart)] == [1]
+    assert [move.index for move in moves_of(program) if isinstance(move, BeginPart)] == [1]
 
 
 def test_strokes_are_slowed_to_what_the_hot_end_melts() -> None:
     profile = load(settings=["material.volumetric_limit_mm3_s=1"])
     decomposition = post_and_arm(profile.machine)
     program = plan(decomposition, [squares(decomposition.parts[0], profile)], profile)
-    speeds = {move.speed_mm_s for move in program.moves if isinstance(move, Stroke)}
+    speeds = {move.speed_mm_s for move in moves_of(program) if isinstance(move, Stroke)}
     assert max(speeds) * ((0.45 - 0.2) * 0.2 + pi * 0.01) == pytest.approx(1.0)
 
 
 def test_layers_are_numbered_from_one_in_every_part() -> None:
-    numbers = [(move.part, move.index) for move in printed()[3].moves if isinstance(move, BeginLayer)]
+    numbers = [(move.part, move.index) for move in moves_of(printed()[3]) if isinstance(move, BeginLayer)]
     assert numbers == [(1, 1), (1, 2), (1, 3), (2, 1), (2, 2), (2, 3)]
 
 

@@ -15,6 +15,7 @@ from mdp.pose import level, rotation
 from profiles.profile import Profile, load, load_one, shipped
 from slicer.paths import Kind
 from slicer.slice import slice_part
+from tests.machine.hand import moves_of
 from tests.shapes import box
 
 
@@ -36,7 +37,7 @@ def test_every_shipped_machine_fills_its_nozzle_beside_the_print(machine: str) -
     profile = loaded(machine)
     program, lanes = printed(box(20, 20, 0.4), profile)
     assert lanes is not None
-    moves = program.moves
+    moves = moves_of(program)
     ((at, line),) = [(k, move) for k, move in enumerate(moves) if isinstance(move, Stroke) and move.kind is Kind.PURGE]
     assert line.filament_mm.sum() == pytest.approx(3.9 * (profile.machine.head.nozzle_mm / 0.4) ** 1.05, rel=0.15)
     assert at < next(k for k, move in enumerate(moves) if isinstance(move, BeginPart))

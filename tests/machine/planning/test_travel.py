@@ -17,6 +17,7 @@ from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
 from slicer.strokes.wiping import first_length, wipe_trail
+from tests.machine.hand import moves_of
 from tests.shapes import box
 from tests.slicer.hand import whole
 
@@ -34,8 +35,8 @@ def _towers(*settings: str) -> tuple[MachineProgram, Profile]:
 
 def _filament(program: MachineProgram) -> tuple[float, float]:
     """Pulled back and pushed forward outside strokes."""
-    pulled = sum(float(np.sum(m.filament_mm)) for m in program.moves if isinstance(m, Wipe))
-    amounts = [m.filament_mm for m in program.moves if isinstance(m, Retract)]
+    pulled = sum(float(np.sum(m.filament_mm)) for m in moves_of(program) if isinstance(m, Wipe))
+    amounts = [m.filament_mm for m in moves_of(program) if isinstance(m, Retract)]
     return pulled + sum(a for a in amounts if a > 0), -sum(a for a in amounts if a < 0)
 
 
@@ -54,7 +55,7 @@ def test_extra_prime_is_pushed_after_every_retraction() -> None:
 
 def test_a_wipe_goes_over_the_path_just_printed_at_the_pace_of_the_filament() -> None:
     program, profile = _towers()
-    wipes = [(a, b) for a, b in pairwise(program.moves) if isinstance(b, Wipe)]
+    wipes = [(a, b) for a, b in pairwise(moves_of(program)) if isinstance(b, Wipe)]
     assert all(isinstance(before, Stroke) for before, _ in wipes)
     for _, wipe in wipes:
         lengths = np.linalg.norm(np.diff(wipe.points_mm, axis=0), axis=1)
@@ -66,7 +67,7 @@ def test_a_wipe_goes_over_the_path_just_printed_at_the_pace_of_the_filament() ->
 
 def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
     layer, checked, pulled = BeginLayer(1, 1, 0.0, 0.2, 0.0), 0, False
-    moves = _towers("process.lift_mm=0.4")[0].moves
+    moves = moves_of(_towers("process.lift_mm=0.4")[0])
     last = max(index for index, move in enumerate(moves) if isinstance(move, Stroke))  # then the tip goes aside
     for before, move in pairwise(moves[:last]):
         layer = move if isinstance(move, BeginLayer) else layer
@@ -79,7 +80,7 @@ def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
 
 
 def test_coasting_pushes_nothing_over_the_last_stretch_before_a_retraction() -> None:
-    moves = _towers("material.coast_mm=0.5", "process.infill_density=1")[0].moves
+    moves = moves_of(_towers("material.coast_mm=0.5", "process.infill_density=1")[0])
     coasted = [a for a, b in pairwise(moves) if isinstance(a, Stroke) and isinstance(b, Wipe) and a.filament_mm[-1] == 0]
     assert len(coasted) > 5
     for stroke in coasted:

@@ -31,7 +31,7 @@ def test_the_wall_climbs_evenly_from_the_bottom_to_the_top() -> None:
     assert [Kind.SKIN in {path.kind for path in layer.paths} for layer in sliced.layers[:5]] == [True] * 4 + [False]
     climbing = [path for layer in sliced.layers[5:-1] for path in layer.paths]
     assert len(climbing) == len(sliced.layers) - 6
-    heights = np.concatenate([layer.points_z_mm for layer in sliced.layers[4:]])
+    heights = np.concatenate([layer.points_mm[:, 2] for layer in sliced.layers[4:]])
     assert (np.diff(heights) >= -1e-9).all()
     assert (heights[0], heights[-1]) == pytest.approx((0.8, 6.0))
     ends = [path for layer in sliced.layers[4:] for path in layer.paths]

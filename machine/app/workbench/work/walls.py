@@ -31,7 +31,7 @@ def _count(sliced: SlicedPart, kinds: tuple[Kind, ...]) -> int:
 def _pieces(layer: Layer, kinds: tuple[Kind, ...], step: int) -> Floats:
     """(n, 7) in the part frame: two ends and the height, which is that of so many layers."""
     high = layer.height_mm * step
-    points = np.column_stack([layer.points, layer.points_z_mm - high / 2.0])
+    points = layer.points_mm - (0.0, 0.0, high / 2.0)
     begins = np.repeat(layer.is_of(*kinds), np.diff(layer.starts))
     begins[layer.starts[1:] - 1] = False  # nothing leads from a stroke's last point to the next stroke
     at = np.flatnonzero(begins)
