@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
-from slicer.geometry.polyline import lengths_mm
+from slicer.geometry.polyline import length_mm, lengths_mm
 
 ON_PLATE_MM = 0.35  # so high above the plate a bead still sags onto it
 
@@ -68,7 +68,7 @@ class Path:
     @property
     def length_mm(self) -> float:
         """Length of the bead."""
-        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+        return length_mm(self.points)
 
 
 @dataclass(frozen=True, eq=False)

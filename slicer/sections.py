@@ -29,7 +29,7 @@ class Neighbours:
     """Sections of the model's other parts in a part's frame; no later stage cuts their meshes again.
 
     beside: of later parts at the height at which each layer of the part is cut; above: of later parts over the last layer, as
-    many as shells look; below: of the model under the base plane, the nearest first; empty where the earlier parts are not known.
+    many as shells reach; below: of the model under the base plane, the nearest first, empty where earlier parts are not known.
     """
 
     beside: Sequence[Polygons]
@@ -92,7 +92,7 @@ class Sections:
         more = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
         outlines, own, ungrooved = ([*places, *[Polygons()] * count] for places in (self.outlines, self.own, self.ungrooved))
         around, known = self.neighbours, len(self.neighbours.above)
-        higher = [*around.beside, *around.above, *[Polygons()] * count]  # the added layers lie where those above were sectioned
+        higher = [*around.beside, *around.above, *[Polygons()] * count]  # the added layers are at the heights of `above`
         end = len(around.beside) + count
         around = replace(around, beside=higher[:end], above=higher[end : end + known])
         return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved, neighbours=around)

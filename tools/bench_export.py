@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settings = [*SAME, *([TREE] if options.support else []), *options.set]
     ours = [*OURS, "export", "--parts", "1", "--as-is", *(word for setting in settings for word in ("--set", setting)), "-o"]
     theirs = [options.rival, *PRUSA.split(), *(SNUG if options.support else ("--no-overhangs",)), "-o"]
-    print("| model | ours, core s | wall s | lines | PrusaSlicer, core s | wall s | lines | ratio | of wall |")
+    print("| model | ours, core s | wall s | lines | PrusaSlicer, core s | wall s | lines | ratio | wall ratio |")
     print("|---|---|---|---|---|---|---|---|---|")
     for model in options.models:
         print(row(model, _mesh(model, options.height), ours, theirs), flush=True)

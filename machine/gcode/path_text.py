@@ -60,7 +60,8 @@ def path_text(paths: Paths, texts: Texts, words: PathWords, known: Whole, filame
     pushed so far, not rounded. Both become those after the last line. A point where the tip is already gives no line, its
     filament goes to the next one.
     """
-    text = np.empty(LONGEST * len(paths.points_mm) + len(texts.content), dtype=np.uint8)
+    points = int(paths.starts[-1] - paths.starts[0])
+    text = np.empty(LONGEST * points + len(texts.content), dtype=np.uint8)
     size = _write(paths, texts, words, known, filament_mm, text)
     return text[:size].tobytes().decode("utf-8")
 
@@ -124,7 +125,7 @@ def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tu
 
 @borrower
 def _step_mm(points_mm: Floats, filament_mm: Floats, k: int, more: float) -> float:
-    """Filament of the step to point k as it is written; more: what is shared is multiplied by, 0: not shared."""
+    """Filament of the step to point k as it is written; more: factor on the shared filament; 0: each step keeps its own."""
     if more == 0.0:
         return float(filament_mm[k])
     exact = written = 0.0

@@ -180,12 +180,13 @@ def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
 
 def _contents(program: MachineProgram, row: int) -> Iterator[str]:
     """What the strokes of the part that begins at a row come to."""
-    strokes = _part_strokes(program)
     after = next(end for end in _part_rows(program) if end > row)
-    own = strokes[(strokes > row) & (strokes < after)]
-    points = np.repeat(np.isin(np.arange(len(program)), own), np.diff(program.starts))
-    layers = np.unique(np.searchsorted(program.mark_rows, own))
-    comment = totals_comment(program.points_mm[points], float(program.filament_mm[points].sum()), len(layers))
+    begin, end = program.starts[row], program.starts[after]
+    own = program.is_stroke[row:after] & (program.what[row:after] != NUMBER[Kind.PURGE])
+    points = np.repeat(own, np.diff(program.starts[row : after + 1]))
+    layers = np.unique(np.searchsorted(program.mark_rows, row + np.flatnonzero(own)))
+    filament_mm = float(program.filament_mm[begin:end][points].sum())
+    comment = totals_comment(program.points_mm[begin:end][points], filament_mm, len(layers))
     if comment:
         yield comment
 
@@ -272,9 +273,9 @@ def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int]
     texts, done = list[str](), 0
 
     def write(until: int) -> str:
-        ends = np.cumsum([0, *(len(as_bytes(text)) for text in texts)])
+        pieces = [text.encode() for text in texts]
         paths = Paths(points, filament_mm, starts[done : until + 1], does[done:until], speed[done:until])
-        return pen.paths(paths, Texts(as_bytes("".join(texts)), ends))
+        return pen.paths(paths, Texts(np.frombuffer(b"".join(pieces), np.uint8), np.cumsum([0, *map(len, pieces)])))
 
     after = ""
     columns = (what, program.fan[first:end], program.acceleration_mm_s2[first:end], program.width_mm[first:end])

@@ -208,7 +208,7 @@ def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
     counts = np.diff(program.starts)
     move = np.repeat(np.arange(len(program)), counts)
     ends = np.ones(len(move), np.bool_)
-    ends[program.starts[:-1][(counts > 0) & (program.what <= WIPE)]] = False  # a path has a point more than steps
+    ends[program.starts[:-1][(counts > 0) & (program.what <= WIPE)]] = False  # a path has one more point than it has steps
     at = np.flatnonzero(ends)
     stands = program.what[move[at]] > WIPE
     places = program.points_mm[np.where(stands, at, at - 1)]

@@ -164,7 +164,7 @@ def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate:
         if apart[k]:
             yield from to_path(tip, stroke.points_mm[0], approach[passed[k] : passed[k + 1]], retracts, shift, profile)
             yield from prime(tip, profile)
-        yield run_in(stroke, layer, tip, profile) if tip.run_in_mm > 0.0 else stroke
+        yield run_in(stroke, layer, tip, profile)
         tip.printed.append((points[starts[k] : starts[k + 1]], layer, k, shift))
         tip.at_mm = stroke.points_mm[-1]
 

@@ -5,6 +5,7 @@ a program. What is not usual ends the run, and the reader takes that line: other
 that is not above 0, a number of more digits than one division reads exactly, other comments.
 """
 
+from itertools import islice
 from math import inf
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ LONGEST = 200
 MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
 NONE, F = -1, 6  # what a letter stands for, besides the axes 0 to 5
 MOST_AT_ONCE = 4096  # lines
+MOST_TYPES = 64  # kinds of line; slicers have about 15, a further one ends the run
 WIDTH_IS, TYPE_IS = (np.frombuffer(key, dtype=np.uint8) for key in (b";WIDTH:", b";TYPE:"))
 WHOLE_DIGITS, DECIMALS = 9, 12  # of a width, as machine.reader.remarks reads it
 
@@ -60,7 +62,8 @@ def letters_of(reader: Reader) -> NDArray[np.int8]:
 
 
 def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], first: int) -> int:
-    """Rows of the plain moves from line `first`, counted from 0; returns the first line that is none, or was not come to.
+    """Rows of the plain moves from line `first`, counted from 0; returns the first line that is not a plain move, or that was not
+    reached.
 
     Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row.
     """
@@ -85,8 +88,8 @@ def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], firs
 
 
 def _types(reader: Reader) -> Text:
-    """The kinds of line seen so far, in the order of their numbers."""
-    kinds = [kind.encode("utf-8", "surrogatepass") for kind in reader.types]
+    """The first MOST_TYPES kinds of line seen so far, in the order of their numbers."""
+    kinds = [kind.encode("utf-8", "surrogatepass") for kind in islice(reader.types, MOST_TYPES)]
     return Text(np.frombuffer(b"".join(kinds) or b" ", dtype=np.uint8), np.cumsum([0, *map(len, kinds)]))
 
 

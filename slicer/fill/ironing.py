@@ -21,9 +21,10 @@ def ironed_areas(regions: Sequence[Region], beside: Sequence[Polygons], process:
     """
     if not process.ironing:
         return [Polygons()] * len(regions)
-    width, above = process.line_width_mm, [*beside[1:], *[Polygons()] * (len(regions) + 1 - len(beside))]
+    width = process.line_width_mm
     tops = [
-        region.bare if area.is_empty() else region.bare - offset(area, width) for region, area in zip(regions, above, strict=True)
+        region.bare if above.is_empty() else region.bare - offset(above, width)
+        for region, above in zip(regions, beside[1:], strict=True)
     ]
     return [_worth_it(opening(top, 0.5 * width)) for top in tops]
 

@@ -38,7 +38,7 @@ class Model:
 
 
 def neighbours_of(part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process) -> Neighbours:
-    """Sections of the other parts around the layers of a part, as far as its shells look."""
+    """Sections of the other parts around the layers of a part, as many layers away as its shells reach."""
     top, bottom = shell_layers(process)
     step = process.layer_height_mm
     over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)

@@ -43,7 +43,7 @@ def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, fl
 
 
 def _near_limbs(sections: Sections) -> dict[int, BasePlane]:
-    """The base planes of later limbs, limited to their neighbours, by part index."""
+    """The base planes of later limbs by part index, each limited to the surroundings of its limb."""
     part, far_mm = sections.part, 2.0 * float(np.linalg.norm(sections.mesh.vertices, axis=1).max())
     limbs = [upper for upper in sections.later if upper.base.limbs_mm is not None]
     places = {limb.index: offset(shadow_of(limb), NEAR_MM) for limb in limbs}

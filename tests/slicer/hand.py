@@ -58,7 +58,7 @@ def sections_at(mesh: Mesh, cuts_mm: Floats, *settings: str) -> Sections:
     """A mesh on the platform cut at heights, with layers of 0.2 mm around them."""
     outlines = [clean(loops, 0.0) for loops in cross_sections(mesh, cuts_mm)]
     heights = Heights(cuts_mm + 0.1, np.full(len(cuts_mm), 0.2), cuts_mm)
-    plate, around = Polygons.square((400.0, 400.0), True), Neighbours([Polygons()] * len(outlines))
+    plate, around = Polygons.square((400.0, 400.0), True), Neighbours([Polygons()] * len(outlines), [Polygons()])
     return Sections(whole(mesh), (), (), profile(*settings), mesh, heights, outlines, outlines, outlines, around, None, plate)
 
 

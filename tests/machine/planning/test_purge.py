@@ -13,7 +13,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level, rotation
 from profiles.profile import Profile, load, load_one, shipped
-from slicer.paths import Kind
+from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.slice import slice_part
 from tests.machine.hand import moves_of
 from tests.shapes import box
@@ -74,3 +74,14 @@ def test_the_line_is_written_in_the_words_of_the_firmware_once_the_nozzle_is_hot
     part = text.index(";PART:1 of 1")
     assert [line for line in text[hot:part] if line in lines] == lines
     assert not any(line.startswith(("M104", "M568")) and line.endswith("215") for line in text[:hot])
+
+
+def test_the_line_may_lie_between_two_strokes_that_no_travel_is_printed_over() -> None:
+    profile = loaded("generic_ac")
+    mesh, pose = box(20, 20, 0.4), level(profile.machine)
+    part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0)
+    ends = [np.array([[x, -95.0], [x, -90.0]]) for x in (-60.0, 60.0)]
+    paths = [Path(Kind.OUTER_WALL, line, 0.45, 20.0, 1.0, np.zeros((0, 2)), True) for line in ends]
+    lanes = purge_lanes([part], [SlicedPart(1, (Layer.of(0.2, 0.2, paths, 0.0),))], profile)
+    assert lanes is not None
+    assert lanes[:, :2].tolist() == [[-30.0, pytest.approx(-93.817, abs=1e-3)], [30.0, pytest.approx(-93.817, abs=1e-3)]]

@@ -81,3 +81,10 @@ def test_a_long_run_is_read_in_pieces() -> None:
     assert len(program.line) == 10000
     assert program.line[-1] == 10000
     assert program.end[-1, 0] == 9999 % 7 + 0.9
+
+
+def test_more_kinds_of_line_than_a_run_knows_are_read_alike() -> None:
+    lines = [line for k in (*range(100), *range(100)) for line in (f";TYPE:kind {k}", f"G1 X{k} E1")]
+    program = parse_gcode(lines, MACHINE)
+    assert [program.types[kind] for kind in program.type] == [f"kind {k}" for k in (*range(100), *range(100))]
+    assert_same(program, parse_gcode(in_turn(lines), MACHINE))
