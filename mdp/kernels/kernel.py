@@ -15,6 +15,7 @@ from numba import config, njit
 from numba.core import event
 
 from mdp.kernels.cache import folder, note_unwritten
+from mdp.kernels.loading import load_quickly
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -46,6 +47,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     try:
         compiled: Callable[P, R] = njit(**KERNEL)(function)
         _forgive(compiled, own.parent)
+        load_quickly(compiled)
         return compiled
     finally:
         config.CACHE_DIR = given

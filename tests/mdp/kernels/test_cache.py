@@ -33,11 +33,15 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return packages
 
 
-def result_and_compilations(program: Path) -> str:
-    """What a new interpreter works out for near(2.0), and how often it had to compile."""
-    code = "from mdp.near import near; print(near(2.0), sum(near.stats.cache_misses.values()))"
+def output_of(program: Path, code: str) -> str:
+    """What a new interpreter prints."""
     done = subprocess.run([sys.executable, "-c", code], cwd=program.parent, capture_output=True, text=True, check=True)
     return done.stdout.strip()
+
+
+def result_and_compilations(program: Path) -> str:
+    """What a new interpreter works out for near(2.0), and how often it had to compile."""
+    return output_of(program, "from mdp.near import near; print(near(2.0), sum(near.stats.cache_misses.values()))")
 
 
 def test_a_kernel_is_compiled_once_and_again_when_a_part_or_a_constant_in_another_file_changes(program: Path) -> None:

@@ -1,0 +1,54 @@
+"""Loading: a kernel's machine code comes from the cache without what numba prepares for compiling.
+
+Whenever numba loads machine code it imports everything that it can compile, parses the kernel's LLVM code and lists its symbols:
+.4 s for the 58 kernels of an export. That waits until a kernel is compiled, which most runs never do.
+"""
+
+from typing import Any
+
+from llvmlite.binding import parse_bitcode
+from numba.core.codegen import JITCodeLibrary
+from numba.core.runtime import rtsys
+
+
+class LoadedLibrary(JITCodeLibrary):
+    """A library of machine code; one that comes from the cache parses its LLVM code when another kernel is compiled with it."""
+
+    _bitcode = b""
+    _shared_module: Any
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> Any:
+        name, kind, data = state
+        if kind != "object":
+            return super()._unserialize(codegen, state)
+        library = cls(codegen, name)
+        machine_code, library._bitcode = data
+        library.enable_object_caching()
+        library._set_compiled_object(machine_code)
+        library._finalize_final_module()
+        return library
+
+    def _get_module_for_linking(self) -> Any:
+        if self._bitcode and self._shared_module is None:
+            self._shared_module = parse_bitcode(self._bitcode)
+        return super()._get_module_for_linking()
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Address of a function, 0 where the library has none of that name."""
+        if self._bitcode:
+            address: int = self._codegen._engine.get_function_address(name)
+            return address
+        return int(super().get_pointer_to_function(name))
+
+
+def load_quickly(kernel: Any) -> None:
+    """Have a kernel loaded from its cache this way."""
+    cache, load = kernel._cache, kernel._cache._load_overload
+
+    def load_overload(signature: Any, context: Any) -> Any:
+        rtsys.initialize(context)
+        context.codegen()._library_class = LoadedLibrary
+        return load(signature, context)
+
+    cache.load_overload = load_overload
