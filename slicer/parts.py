@@ -1,39 +1,32 @@
-"""Parts: all parts of a decomposition sliced, in processes side by side where that pays.
+"""Parts: all parts of a decomposition sliced, side by side where that pays.
 
 First the support of all parts is planned together, for what one part's support stands on may be printed with another. From
-then on a part's paths depend on nothing but the plan and the profile, so the result is the same bit for bit either way.
-Processes are forked, which takes milliseconds; a fresh interpreter would spend longer loading the kernels than slicing
-usually takes (measured: tools/RESULTS.md), so systems without fork slice part after part.
+then on a part's paths depend on nothing but the plan and the profile, so the result is the same bit for bit however many
+processes slice. Where one part is most of the print, its layers are worked out side by side instead.
 """
 
-import gc
 import os
-import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import active_children, get_all_start_methods, get_context
-from multiprocessing.sharedctypes import RawArray
-from typing import Any
+from mmap import mmap
+
+import numpy as np
 
 from mdp.decomposition import Part
-from mdp.kernels import threads
-from mdp.kernels.processes import end_with
+from mdp.kernels.processes import in_order
+from profiles.errors import SliceError
 from profiles.profile import Profile
 from slicer.interface.pins import plan_pins
-from slicer.overhangs import Overhang, find_overhangs
+from slicer.overhangs import find_overhangs
 from slicer.paths import SlicedPart
 from slicer.sectioning import section_part
 from slicer.slice import slice_supported
 from slicer.strokes.vase import check_vase
 from slicer.support.handed_down import plan_supports
-from slicer.support.support import Supports, own_supports
+from slicer.support.support import own_supports
 
 FEWEST_LAYERS = 250  # fewer are sliced sooner than processes are forked and their paths brought back
-LOOK_S = 0.2  # between two looks at processes: progress moves five times a second
-
-Planned = Sequence[tuple[Supports, Sequence[Overhang]]]
+LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +49,10 @@ class SlicingProgress:
         return sum(of if piece else min(count, of) for count, of, piece in pieces) / max(sum(self.expected), 1)
 
 
-OnProgress = Callable[[SlicingProgress], None]
-
-
 def slice_parts(
-    parts: Sequence[Part], profile: Profile, on_progress: OnProgress | None = None, processes: int | None = None
+    parts: Sequence[Part], profile: Profile, on_progress: Callable[[SlicingProgress], None] | None = None
 ) -> tuple[SlicedPart, ...]:
-    """Every part sliced; on_progress: called now and then. processes: how many side by side; None: as many as pay here.
+    """Every part sliced; on_progress: called now and then.
 
     Raises SliceError as slice_part does, for the first part in print order that has a reason.
     """
@@ -71,87 +61,40 @@ def slice_parts(
     sections = [section_part(part, profile, parts[:k], parts[k + 1 :], pins) for k, part in enumerate(parts)]
     overhangs = [find_overhangs(layers) for layers in sections]
     supports = plan_supports([own_supports(*pair) for pair in zip(sections, overhangs, strict=True)])
-    planned = list(zip(supports, overhangs, strict=True))
     expected = [len(support.areas) for support in supports]
-    if processes is None:
-        processes = _process_count(len(parts), sum(expected))
-    if processes < 2:
-        return _slice_in_turn(planned, expected, on_progress)
-    try:
-        return _slice_side_by_side(planned, expected, on_progress, processes)
-    except BrokenProcessPool:  # a process was killed from outside: this one does the work
-        return _slice_in_turn(planned, expected, on_progress)
+    layers = np.frombuffer(mmap(-1, 4 * len(parts)), np.int32)  # those that are done: other processes write them, too
+    ready: list[SlicedPart | None] = [None] * len(parts)
+    errors: dict[int, SliceError] = {}
+    here = os.getpid()
 
+    def show() -> None:
+        if on_progress is not None and os.getpid() == here:
+            on_progress(SlicingProgress(tuple(layers.tolist()), tuple(expected), tuple(ready)))
 
-def _process_count(parts: int, layers: int) -> int:
-    if parts < 2 or layers < FEWEST_LAYERS or "fork" not in get_all_start_methods():
-        return 1
-    return min(parts, threads.THREADS)
+    def sliced(k: int) -> SlicedPart | SliceError:
+        def on_layer(layer: int, of: int) -> None:
+            layers[k] = layer
+            show()
 
+        try:
+            return slice_supported(supports[k], overhangs[k], on_layer)
+        except SliceError as error:
+            return error
 
-def _slice_in_turn(planned: Planned, expected: Sequence[int], on_progress: OnProgress | None) -> tuple[SlicedPart, ...]:
-    sliced: list[SlicedPart] = []
-
-    def show(layer: int, of: int) -> None:
-        if on_progress is not None:
-            left = len(planned) - len(sliced)
-            layers = (*(len(piece.layers) for piece in sliced), layer, *[0] * left)[: len(planned)]
-            on_progress(SlicingProgress(layers, tuple(expected), (*sliced, *[None] * left)))
-
-    for supports, overhangs in planned:
-        sliced.append(slice_supported(supports, overhangs, show))
-    show(0, 0)
-    return tuple(sliced)
-
-
-_job: tuple[Planned, Any] | None = None  # what a forked process finds in its copy of the memory
-
-
-def _inherit(planned: Planned, counts: Any, parent: int) -> None:
-    global _job
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C reaches the whole group: end without a word, the parent speaks
-    _job = planned, counts
-    end_with(parent)
-
-
-def _slice_forked(k: int) -> SlicedPart:
-    """In a forked process: slice a part, counting its layers where the parent reads them."""
-    assert _job is not None
-    planned, counts = _job
-
-    def on_layer(layer: int, of: int) -> None:
-        counts[k] = layer
-
-    return slice_supported(*planned[k], on_layer)
-
-
-def _slice_side_by_side(
-    planned: Planned, expected: Sequence[int], on_progress: OnProgress | None, processes: int
-) -> tuple[SlicedPart, ...]:
-    """The highest parts first, so that no long one is left for the end."""
-    context = get_context("fork")
-    counts: Any = RawArray("i", len(planned))
-    gc.freeze()  # a search for garbage would write on all memory, of which each process would have its own then
-    pool = ProcessPoolExecutor(processes, context, _inherit, (planned, counts, os.getpid()))
-    try:
-        order = sorted(range(len(planned)), key=lambda k: (-expected[k], k))
-        futures = {k: pool.submit(_slice_forked, k) for k in order}
-        waiting = set(futures.values())
-        while waiting:
-            waiting = wait(waiting, LOOK_S, FIRST_COMPLETED).not_done
-            if on_progress is not None:
-                ready = tuple(_result(futures[k]) for k in range(len(planned)))
-                on_progress(SlicingProgress(tuple(counts), tuple(expected), ready))
-        return tuple(futures[k].result() for k in range(len(planned)))
-    except BaseException:
-        for process in active_children():  # nobody waits for what they slice
-            process.kill()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-        gc.unfreeze()
-
-
-def _result(future: "Future[SlicedPart]") -> SlicedPart | None:
-    """What a process has sliced, if it has."""
-    return future.result() if future.done() and not future.cancelled() and future.exception() is None else None
+    by_layers = max(expected) > LARGEST_SHARE * sum(expected) or sum(expected) < FEWEST_LAYERS
+    largest_first = sorted(range(len(parts)), key=lambda k: (-expected[k], k))  # so that no large one is left for the end
+    results = (
+        map(sliced, largest_first)
+        if by_layers
+        else in_order(lambda place: sliced(largest_first[place]), len(parts), on_wait=show)
+    )
+    for k, result in zip(largest_first, results, strict=True):
+        if isinstance(result, SliceError):
+            errors[k] = result
+        else:
+            ready[k] = result
+            layers[k] = len(result.layers)
+            show()
+    if errors:
+        raise errors[min(errors)]
+    return tuple(piece for piece in ready if piece is not None)

@@ -1,22 +1,25 @@
 """Shells: what every layer of a part consists of: walls, skins and sparse places, before any bead is laid."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from mdp.kernels.processes import in_order
 from profiles.process import Process
 from slicer.bead import Bead, first_layer_process, interface_process, with_line_width
 from slicer.fill.bridge import Bridge
 from slicer.fill.infill import pattern_density
 from slicer.fill.ironing import ironed_areas
 from slicer.fill.region import Region, regions
-from slicer.geometry.polygons import Polygons
-from slicer.interface.cut_walls import cover, cut_walls
+from slicer.geometry.polygons import Polygons, settled
+from slicer.interface.cut_walls import CutWalls, cover, cut_walls
 from slicer.interface.model import model_around
 from slicer.overhangs import Overhang, bridges_of_layers
 from slicer.sections import Sections
 from slicer.strokes.overhanging import strengthen_overhangs
 from slicer.support.support import Supports
 from slicer.walls.walls import Walls
+
+FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +64,13 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     processes = layer_processes(process, sections.on_platform, len(sections.outlines))
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
     model = model_around(sections)
-    rows = zip(sections.own, model.sections, processes, sections.heights.height_mm.tolist(), strict=True)
-    walled = [
-        cut_walls(section, whole, own, height_mm=height_mm, nozzle_mm=nozzle_mm, usual=process.walls)
-        for section, whole, own, height_mm in rows
-    ]
+    heights_mm = sections.heights.height_mm.tolist()
+
+    def walls_of(layer: int) -> CutWalls:
+        around, own = (sections.own[layer], model.sections[layer]), processes[layer]
+        return _settled(cut_walls(*around, own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=process.walls))
+
+    walled = list(in_order(walls_of, len(processes), FEWEST_LAYERS))
     covers = cover(model, sections.own, walled)
     filled = regions([layer.walls.inside for layer in walled], covers, not sections.on_platform, process)
     bridges = bridges_of_layers(sections, overhangs, supports.areas)
@@ -80,6 +85,13 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
         ],
         pattern_density([region.sparse for region in filled], infill, process.layer_height_mm),
     )
+
+
+def _settled(walled: CutWalls) -> CutWalls:
+    """The same whether another process has worked it out or this one."""
+    walls = replace(walled.walls, inside=settled(walled.walls.inside), narrow=settled(walled.walls.narrow))
+    inside = walls.inside if walled.model_inside is walled.walls.inside else settled(walled.model_inside)
+    return CutWalls(walls, walled.ending, inside)
 
 
 def layer_processes(process: Process, on_platform: bool, layers: int) -> list[Process]:

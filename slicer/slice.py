@@ -7,10 +7,12 @@ layer (slicer.shells), its beads (slicer.layer_beads), and these in order, with 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from mdp.decomposition import Part
+from mdp.kernels.processes import in_order
 from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
@@ -26,7 +28,7 @@ from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, Unsupported
 from slicer.sectioning import section_part
 from slicer.sections import Sections
-from slicer.shells import Shells, build_shells
+from slicer.shells import FEWEST_LAYERS, Shells, build_shells
 from slicer.strokes.order import order_beads
 from slicer.strokes.overhanging import split_overhangs
 from slicer.strokes.pieces import in_pieces
@@ -81,8 +83,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = rear, np.zeros((0, 2)), 0, len(sections.outlines)
     usual = min(bottom_layers(process), count) if process.spiral_vase else count
-    for i in range(usual):
-        own, auxiliary = lay_beads(shells, i)
+    for i, (own, auxiliary) in enumerate(in_order(partial(lay_beads, shells), usual, FEWEST_LAYERS)):
         if own:
             last = i
         elif process.walls and (i in sections.too_thin or not sections.own[i].is_empty()):

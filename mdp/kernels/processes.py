@@ -1,14 +1,16 @@
-"""Processes: work side by side, each piece in a copy of this process, where it holds the interpreter's lock most of the time.
+"""Processes: pieces of work that hold the interpreter's lock, done side by side by copies of this process.
 
 A copy is forked, which takes milliseconds; systems without fork do one piece after the other. A copy has none of our threads nor
 those of a library: what runs in it starts none, and calls no boolean of solids, which has its own.
 """
 
+import gc
 import os
 import pickle
+import select
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import Thread
 from typing import TypeVar
@@ -16,23 +18,51 @@ from typing import TypeVar
 from mdp.kernels import threads
 
 LOOK_S = 0.2  # between two looks at the parent
-MOST_PIECES = 4096  # whose numbers every system's pipe holds
-NUMBER = 2  # bytes of one
+MOST_RUNS = 4096  # of pieces, whose numbers every system's pipe holds
+NUMBER, LENGTH = 2, 8  # bytes of a run's number, and of the length of an answer
+AHEAD = 64  # runs of results that wait for the caller: copies that are farther ahead wait, too
+ROOM = 1 << 20  # bytes that a copy can answer before anybody reads, where the system allows it
 
 Result = TypeVar("Result")
 
+_forked = False  # whether copies are at work or this is one
 
-def side_by_side(pieces: Sequence[Callable[[], Result]]) -> list[Result]:
-    """What the pieces of work give, in their order: something small that can be pickled. The first one's error is raised."""
-    copies = min(threads.THREADS, len(pieces)) - 1
-    if copies < 1 or len(pieces) > MOST_PIECES or not hasattr(os, "fork"):
-        return [piece() for piece in pieces]
-    with _numbers(len(pieces)) as numbers, _copies(copies, pieces, numbers) as answers:
-        known = _work(pieces, numbers)
-        for answer in answers:  # one whose process could not be had is at its end
-            with suppress(EOFError, pickle.UnpicklingError), open(answer, "rb", closefd=False) as pipe:  # killed from outside
-                known |= pickle.load(pipe)
-    return [known[k] if k in known else piece() for k, piece in enumerate(pieces)]
+
+def in_order(
+    work: Callable[[int], Result], count: int, fewest: int = 2, on_wait: Callable[[], None] | None = None
+) -> Iterator[Result]:
+    """work(0), work(1) .. work(count - 1), in this order; copies of this process work ahead while the caller uses the results.
+
+    Results are pickled. The error of the first piece that raises one is raised. Within `work` there are no further copies.
+    fewest: so many pieces are worth a copy. on_wait: called now and then while the results of copies are waited for.
+    """
+    copies = min(threads.THREADS, count) - 1
+    if copies < 1 or count < fewest or _forked or not hasattr(os, "fork"):
+        yield from map(work, range(count))
+        return
+    size = -(-count // MOST_RUNS)
+    runs = -(-count // size)
+
+    def results(run: int) -> Iterator[Result]:
+        return map(work, range(run * size, min((run + 1) * size, count)))
+
+    with _numbers(runs) as numbers, _copies(copies, results, numbers) as answers:
+        known: dict[int, list[Result] | None] = {}  # None: a piece raises an error, its run is done again when its turn comes
+        for run in range(runs):
+            while run not in known:
+                _receive(answers, known, 0.0)
+                if run not in known and (number := _next(numbers)) is not None:
+                    known[number] = _tried(results, number)
+                elif run not in known and not answers:  # killed from outside
+                    known[run] = None
+                elif run not in known:
+                    _receive(answers, known, LOOK_S)
+                    if on_wait is not None:
+                        on_wait()
+            if len(known) < AHEAD:
+                _receive(answers, known, 0.0)
+            done = known.pop(run)
+            yield from results(run) if done is None else done
 
 
 def end_with(parent: int) -> None:
@@ -48,7 +78,7 @@ def _watch(parent: int) -> None:
 
 @contextmanager
 def _numbers(count: int) -> Iterator[int]:
-    """A pipe with the numbers of the pieces: who reads one does that piece."""
+    """A pipe with the numbers of the runs: who reads one does that run."""
     numbers, end = os.pipe()
     os.write(end, b"".join(k.to_bytes(NUMBER, "big") for k in range(count)))
     os.close(end)
@@ -59,26 +89,29 @@ def _numbers(count: int) -> Iterator[int]:
 
 
 @contextmanager
-def _copies(count: int, pieces: Sequence[Callable[[], Result]], numbers: int) -> Iterator[list[int]]:
+def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int) -> Iterator[set[int]]:
     """Copies of this process at work, and the pipes by which they answer; none of them is left."""
+    global _forked  # one mark for the process
     answers: list[int] = []
     copies: list[int] = []
-    parent = os.getpid()
+    parent, _forked = os.getpid(), True
     try:
         for _ in range(count):
             answer, end = os.pipe()
             answers.append(answer)
+            _widen(end)
             try:
                 copy = os.fork()
             except OSError:  # no memory or no number for another process: those that are there do the work
                 os.close(end)
                 break
             if copy == 0:
-                _answer(pieces, numbers, end, parent)
+                _answer(results, numbers, end, parent)
             copies.append(copy)
             os.close(end)
-        yield answers
+        yield set(answers)
     finally:
+        _forked = False
         for answer in answers:
             os.close(answer)
         for copy in copies:
@@ -86,24 +119,58 @@ def _copies(count: int, pieces: Sequence[Callable[[], Result]], numbers: int) ->
             os.waitpid(copy, 0)
 
 
-def _answer(pieces: Sequence[Callable[[], Result]], numbers: int, end: int, parent: int) -> None:
+def _widen(pipe: int) -> None:
+    """Let a pipe hold ROOM bytes, where the system allows it."""
+    import fcntl  # where there is no fork there is none
+
+    with suppress(AttributeError, OSError):
+        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, ROOM)
+
+
+def _answer(results: Callable[[int], Iterator[object]], numbers: int, end: int, parent: int) -> None:
     """All that a copy does."""
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)  # Ctrl-C reaches all: the parent speaks
         end_with(parent)
         threads.use_threads(1)
+        gc.freeze()  # a search for garbage would write on all memory, of which this copy would have its own then
         with open(end, "wb") as pipe:
-            pickle.dump(_work(pieces, numbers), pipe)
+            while (run := _next(numbers)) is not None:
+                text = pickle.dumps((run, _tried(results, run)), protocol=5)
+                pipe.write(len(text).to_bytes(LENGTH, "big") + text)
+                pipe.flush()
     finally:
         os._exit(0)
 
 
-def _work(pieces: Sequence[Callable[[], Result]], numbers: int) -> dict[int, Result]:
-    """Do pieces until none is left; those that raise an error are left out."""
-    known: dict[int, Result] = {}
-    while number := os.read(numbers, NUMBER):
-        k = int.from_bytes(number, "big")
-        with suppress(Exception):
-            known[k] = pieces[k]()
-    return known
+def _next(numbers: int) -> int | None:
+    """The next run that nobody does yet."""
+    number = os.read(numbers, NUMBER)
+    return int.from_bytes(number, "big") if number else None
+
+
+def _tried(results: Callable[[int], Iterator[Result]], run: int) -> list[Result] | None:
+    with suppress(Exception):
+        return list(results(run))
+    return None
+
+
+def _receive(answers: set[int], known: dict[int, list[Result] | None], wait_s: float) -> None:
+    """Take in what copies have answered until now; answers that have ended leave the set."""
+    for answer in select.select(list(answers), [], [], wait_s)[0]:
+        length = _read(answer, LENGTH)
+        text = _read(answer, int.from_bytes(length, "big"))
+        if text:
+            run, done = pickle.loads(text)
+            known[run] = done
+        else:
+            answers.discard(answer)
+
+
+def _read(pipe: int, size: int) -> bytes:
+    """So many bytes, none where the pipe ends before."""
+    text = bytearray()
+    while len(text) < size and (more := os.read(pipe, size - len(text))):
+        text += more
+    return bytes(text) if len(text) == size else b""

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from mdp.cost.model_need import excess_mm2
 from mdp.decomposition import FrontRow, Part
-from mdp.kernels.processes import side_by_side
+from mdp.kernels.processes import in_order
 from mdp.search.node import Node
 from mdp.sweep.limbs import limb_faces
 from profiles.profile import Profile
@@ -104,8 +103,9 @@ def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:
 
 def price_rows(rows: Sequence[FrontRow], parts: Mapping[int, Sequence[Part]], price: Pricing) -> list[FrontRow]:
     """Rows with what their parts take to print. parts: of the places of rows that get a price."""
-    prices = side_by_side([partial(price, of_row) for of_row in parts.values()])
-    known = dict(zip(parts, prices, strict=True))
+    places = list(parts)
+    prices = in_order(lambda k: price(parts[places[k]]), len(places))
+    known = dict(zip(places, prices, strict=True))
     return [_with_price(row, known.get(place)) for place, row in enumerate(rows)]
 
 

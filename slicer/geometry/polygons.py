@@ -3,6 +3,7 @@
 Outer contours run counter-clockwise, holes clockwise. Only the Positive fill rule is used, so every input must be oriented.
 """
 
+import copyreg
 from collections.abc import Sequence
 from typing import TypeAlias
 
@@ -29,6 +30,18 @@ def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
         return Polygons()
     whole = Polygons(list(loops), FillRule.Positive).simplify(RESOLUTION_MM)
     return closing(whole, closing_mm) if closing_mm > 0.0 else whole
+
+
+def _of_contours(loops: Sequence[Floats]) -> Polygons:
+    return Polygons(list(loops), FillRule.Positive)
+
+
+copyreg.pickle(Polygons, lambda polygons: (_of_contours, (polygons.to_polygons(),)))  # on their way between processes
+
+
+def settled(polygons: Polygons) -> Polygons:
+    """The polygons as another process would receive them; those that have been there and back do not change again."""
+    return _of_contours(polygons.to_polygons())
 
 
 def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polygons:

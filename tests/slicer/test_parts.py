@@ -7,25 +7,44 @@ import sys
 
 import pytest
 
+import slicer.parts
+from mdp.kernels import threads
 from profiles.errors import SliceError
-from slicer.parts import SlicingProgress, _process_count, slice_parts
-from tests.shapes import box
-from tests.slicer.hand import content, cut, profile
+from slicer.parts import SlicingProgress, slice_parts
+from tests.shapes import box, hollow_tee
+from tests.slicer.hand import content, cut, profile, whole
 
-PLANES = (((0.0, 0.0, 1.0), 16.0), ((0.0, 0.0, 1.0), 8.0))
+PLANES = (((0.0, 0.0, 1.0), 40.0), ((0.0, 0.0, 1.0), 20.0))
+CORES = pytest.mark.parametrize("cores", [1, 3])
 
 
-def test_processes_side_by_side_give_the_same_bytes_as_one_after_the_other() -> None:
-    parts = cut(box(10, 10, 24), *PLANES)
-    alone, together = (slice_parts(parts, profile(), processes=k) for k in (1, 2))
+@CORES
+def test_parts_side_by_side_are_the_same_bytes_as_one_after_the_other(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = cut(box(10, 10, 60), *PLANES)
+    monkeypatch.setattr(threads, "THREADS", cores)
+    together = slice_parts(parts, profile())
+    monkeypatch.setattr(slicer.parts, "in_order", lambda work, count, on_wait: map(work, range(count)))
     assert [piece.index for piece in together] == [1, 2, 3]
-    assert [content(piece) for piece in together] == [content(piece) for piece in alone]
+    assert [content(piece) for piece in together] == [content(piece) for piece in slice_parts(parts, profile())]
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_progress_rises_to_all_layers(processes: int) -> None:
+@pytest.mark.parametrize("keys", [(), ("process.top_skin_monotonic=true", "process.infill_pattern=gyroid", "process.walls=3")])
+def test_layers_side_by_side_are_the_same_bytes_as_one_after_the_other(
+    keys: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = whole(hollow_tee())
+    sliced = []
+    for cores in (1, 2, 3):
+        monkeypatch.setattr(threads, "THREADS", cores)
+        sliced.append(content(slice_parts([model], profile(*keys))[0]))
+    assert sliced[0] == sliced[1] == sliced[2]
+
+
+@CORES
+def test_progress_rises_to_all_layers(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "THREADS", cores)
     reports: list[SlicingProgress] = []
-    sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), reports.append, processes)
+    sliced = slice_parts(cut(box(10, 10, 60), *PLANES), profile(), reports.append)
     layers = [sum(progress.layers) for progress in reports]
     assert layers == sorted(layers)
     assert reports[-1].layers == tuple(len(piece.layers) for piece in sliced)
@@ -34,27 +53,30 @@ def test_progress_rises_to_all_layers(processes: int) -> None:
     assert (reports[-1].begun, shares[-1]) == (3, 1.0)
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_a_part_is_handed_over_as_soon_as_it_is_sliced(processes: int) -> None:
+@CORES
+def test_a_part_is_handed_over_as_soon_as_it_is_sliced(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "THREADS", cores)
     reports: list[SlicingProgress] = []
-    sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), reports.append, processes)
+    sliced = slice_parts(cut(box(10, 10, 60), *PLANES), profile(), reports.append)
     ready = [sum(piece is not None for piece in progress.ready) for progress in reports]
     assert ready == sorted(ready)
-    assert ready[-1] == 3
+    assert set(ready) == {0, 1, 2, 3}
     assert [piece and piece.index for piece in reports[-1].ready] == [piece.index for piece in sliced]
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_a_part_that_gives_no_path_and_needs_no_floor_is_told_from_any_process(processes: int) -> None:
+@CORES
+def test_the_first_part_in_order_that_gives_no_path_is_named(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "THREADS", cores)
     layers = ("top_layers", "bottom_layers", "interface_bottom_layers")
     nothing = profile("process.walls=0", "process.infill_density=0", *(f"process.{key}=0" for key in layers))
     with pytest.raises(SliceError, match="part 3 gives no path at all"):
-        slice_parts(cut(box(10, 10, 24), *PLANES), nothing, processes=processes)
+        slice_parts(cut(box(10, 10, 60), *PLANES), nothing)
 
 
 SLICING = """
 import os
 import slicer.parts
+from mdp.kernels import threads
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
@@ -64,7 +86,8 @@ def slice_supported(*_):
         pass
 
 slicer.parts.slice_supported = slice_supported
-slicer.parts.slice_parts(cut(box(10, 10, 24), ((0.0, 0.0, 1.0), 12.0)), profile(), processes=2)
+threads.use_threads(2)
+slicer.parts.slice_parts(cut(box(10, 10, 60), ((0.0, 0.0, 1.0), 30.0)), profile())
 """
 
 
@@ -82,8 +105,3 @@ def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -
                 os.kill(process, signal.SIGKILL)
             raise
         assert parent.returncode == -ended_by
-
-
-def test_a_single_part_and_few_layers_are_sliced_here() -> None:
-    assert _process_count(1, 10**6) == 1
-    assert _process_count(5, 10) == 1

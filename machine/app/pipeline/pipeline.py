@@ -1,6 +1,6 @@
 """Pipeline: joins the stages, from a model's name to parts, sliced parts, G-code lines and the dry run."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -43,7 +43,7 @@ from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 from slicer.interface.pins import pin_width_mm, room_around_mm
-from slicer.parts import OnProgress, SlicingProgress, slice_parts
+from slicer.parts import SlicingProgress, slice_parts
 from slicer.paths import SlicedPart
 
 
@@ -154,7 +154,7 @@ def build(
     pictures: bool = False,
     stops: Sequence[Stop] = (),
     report: Report | None = None,
-    on_slices: OnProgress | None = None,
+    on_slices: Callable[[SlicingProgress], None] | None = None,
 ) -> Program:
     """Slice, plan, write and dry-run a decomposition, at its place on the plate. Before slicing it raises MoveError for a part
     that the machine has no room for, ProfileError for a G-code block that the machine's firmware refuses.

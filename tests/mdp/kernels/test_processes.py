@@ -4,14 +4,12 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from mdp.kernels import threads
-from mdp.kernels.processes import side_by_side
+from mdp.kernels.processes import in_order
 
 HERE = os.getpid()
 
@@ -29,15 +27,19 @@ def fail(number: int) -> int:
     raise ValueError(f"piece {number}")
 
 
+def pid(number: int) -> int:
+    return os.getpid()
+
+
 def killed_elsewhere(number: int) -> int:
     if os.getpid() != HERE:
         os.kill(os.getpid(), signal.SIGKILL)
     return square(number)
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 700])
+@pytest.mark.parametrize("count", [0, 1, 2, 700, 9000])
 def test_results_come_in_the_order_of_the_pieces(count: int) -> None:
-    assert side_by_side([partial(square, k) for k in range(count)]) == [k * k for k in range(count)]
+    assert list(in_order(square, count)) == [k * k for k in range(count)]
 
 
 def test_two_pieces_are_done_in_two_processes_at_once() -> None:
@@ -48,18 +50,56 @@ def test_two_pieces_are_done_in_two_processes_at_once() -> None:
         os.read(other_end, 1)
         return os.getpid()
 
-    pieces: list[Callable[[], int]] = [partial(meet, to_there, there), partial(meet, to_here, here)]
-    assert len(set(side_by_side(pieces))) == 2
+    ends = (to_there, there), (to_here, here)
+    assert len(set(in_order(lambda k: meet(*ends[k]), 2))) == 2
 
 
 def test_the_first_error_in_order_is_raised_whoever_meets_it() -> None:
-    pieces = [partial(square, 1), *(partial(fail, k) for k in range(1, 30))]
     with pytest.raises(ValueError, match=r"^piece 1$"):
-        side_by_side(pieces)
+        list(in_order(lambda k: fail(k) if k else square(k), 30))
 
 
 def test_what_a_killed_process_leaves_undone_is_done_here() -> None:
-    assert side_by_side([partial(killed_elsewhere, k) for k in range(20)]) == [k * k for k in range(20)]
+    assert list(in_order(killed_elsewhere, 20)) == [k * k for k in range(20)]
+
+
+def test_results_are_there_while_later_pieces_are_still_worked_on() -> None:
+    first_used, told = os.pipe()
+
+    def wait_from_the_third_on(number: int) -> int:
+        if number > 1 and os.getpid() != HERE:
+            os.read(first_used, 1)  # never written before the first result is used
+        return number
+
+    results = in_order(wait_from_the_third_on, 5)
+    first = next(results)
+    os.write(told, b"xxxxx")
+    assert [first, *results] == [0, 1, 2, 3, 4]
+
+
+def test_results_larger_than_any_pipe_arrive_whole() -> None:
+    sizes = [len(result) for result in in_order(lambda k: bytes(3_000_000 + k), 9)]
+    assert sizes == [3_000_000 + k for k in range(9)]
+
+
+def test_an_error_ends_the_copies_although_the_caller_holds_the_rest() -> None:
+    results = in_order(lambda k: fail(k) if k == 3 else square(k), 30)
+    with pytest.raises(ValueError, match=r"^piece 3$"):
+        list(results)
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def test_within_a_piece_there_are_no_further_copies() -> None:
+    def inner(number: int) -> bool:
+        own = os.getpid()
+        return all(there == own for there in in_order(pid, 8))
+
+    assert all(in_order(inner, 12))
+
+
+def test_few_pieces_are_not_worth_a_copy() -> None:
+    assert set(in_order(pid, 9, fewest=10)) == {HERE}
 
 
 def test_where_no_process_can_be_had_this_one_does_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,12 +107,12 @@ def test_where_no_process_can_be_had_this_one_does_the_work(monkeypatch: pytest.
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr(os, "fork", refuse)
-    assert side_by_side([os.getpid, os.getpid]) == [HERE, HERE]
+    assert list(in_order(pid, 2)) == [HERE, HERE]
 
 
 def test_one_core_forks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "THREADS", 1)
-    assert side_by_side([os.getpid, os.getpid]) == [HERE, HERE]
+    assert list(in_order(pid, 2)) == [HERE, HERE]
 
 
 def test_neither_processes_nor_pipes_are_left() -> None:
@@ -84,22 +124,22 @@ def test_neither_processes_nor_pipes_are_left() -> None:
         return os.listdir(folder / "fd"), [task.joinpath("children").read_text() for task in folder.joinpath("task").iterdir()]
 
     before = held()
-    side_by_side([partial(square, k) for k in range(5)])
+    list(in_order(square, 5))
     assert held() == before
 
 
 WORKING = """
 import os
 from mdp.kernels import threads
-from mdp.kernels.processes import side_by_side
+from mdp.kernels.processes import in_order
 
-def work():
+def work(number):
     os.write(1, f"{os.getpid()}\\n".encode())
     while True:
         pass
 
 threads.use_threads(2)
-side_by_side([work, work])
+list(in_order(work, 2))
 """
 
 

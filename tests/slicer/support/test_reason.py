@@ -45,7 +45,7 @@ NO_BRIDGES = ("process.bridge_longest_mm=1", "process.support_distance_mm=1")
 def test_a_place_without_support_has_the_reason_that_its_part_is_made_for(
     parts: list[Part], settings: tuple[str, ...], reason: str
 ) -> None:
-    areas = [area for piece in slice_parts(parts, profile(*settings), processes=1) for area in piece.unsupported]
+    areas = [area for piece in slice_parts(parts, profile(*settings)) for area in piece.unsupported]
     assert {area.reason for area in areas} == {reason}
     assert [area.mm2 for area in areas] == sorted((area.mm2 for area in areas), reverse=True)
 
