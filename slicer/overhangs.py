@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
-import numpy as np
-
 from mdp.overhang import UP, facing_down
 from mdp.support_need.need import needs_support
-from slicer.fill.bridge import LEAST, Bridge, find_bridge, find_bridges
+from slicer.fill.bridge import LEAST, Bridge, find_bridge
 from slicer.geometry.cross_section import RIM_MM, faces_by_layer
-from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, edges, islands, offset, union
 from slicer.sections import Sections
-from slicer.zones import no_support_areas
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
 HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
@@ -38,11 +35,8 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     what bridges layer by layer, as arches do, does not either. Without support whatever has an anchor to hold on to is printed as
     a bridge, however long.
     """
-    overhangs = _all_overhangs(sections)
-    if not sections.part.no_support.anywhere:
-        return overhangs
-    shut = no_support_areas(sections.part, sections.mesh, sections.heights.cut_mm)
-    return [_without(overhang, area) for overhang, area in zip(overhangs, shut, strict=True)]
+    overhangs, shut = _all_overhangs(sections), sections.no_support
+    return [_without(overhang, area) for overhang, area in zip(overhangs, shut, strict=True)] if shut else overhangs
 
 
 def _without(overhang: Overhang, shut: Polygons) -> Overhang:
@@ -104,33 +98,6 @@ def _sort_islands(
             rest.append(island)
     left = Polygons.compose(rest) if rest else Polygons()
     return Overhang(left ^ need, tuple(bridges), left - need)
-
-
-def bridges_of_layers(
-    sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons]
-) -> list[tuple[Bridge, ...]]:
-    """The bridges of every layer: those that carry themselves, and what hangs over no support, as well as it can be.
-
-    Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
-    supported: where each layer's support is.
-    """
-    process, heights, outlines = sections.process, sections.heights, sections.outlines
-    bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
-    for i, overhang in enumerate(overhangs):
-        free = overhang.hanging + overhang.ledges
-        if free.is_empty() or sections.below(i) is None:
-            continue
-        drop_mm = float(heights.bottom_mm[i]) - process.support_gap_mm - 2.0 * process.layer_height_mm
-        lowest = int(np.searchsorted(heights.tip_mm, drop_mm))
-        held = union([area for area in supported[lowest:i] if not area.is_empty()])
-        held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
-        bare = opening(free - held, 0.25 * process.line_width_mm)
-        if bare.is_empty():
-            continue
-        slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
-        anchors = edges(offset(union([_plastic_below(sections, i), held, slopes]), 0.25 * process.line_width_mm))
-        bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
-    return bridges
 
 
 def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:

@@ -21,7 +21,7 @@ from mdp.decomposition import Part
 from mdp.kernels import threads
 from mdp.kernels.processes import end_with
 from profiles.profile import Profile
-from slicer.interface.pins import plan_pins
+from slicer.interface.interlock import plan_pins
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import SlicedPart
 from slicer.sectioning import section_part

@@ -100,11 +100,6 @@ def widen(area: Polygons, distance_mm: float) -> Polygons:
     return offset(area, distance_mm, WIDEST)
 
 
-def only_slivers(places: Polygons) -> bool:
-    """Whether the places are nothing but slivers."""
-    return bool(places.area() < SPECK_MM2 or offset(places, -SLIVER_MM).is_empty())
-
-
 def drop_slivers(places: Polygons) -> Polygons:
     """Without slivers."""
     core = Polygons() if places.area() < SPECK_MM2 else offset(places, -SLIVER_MM)
