@@ -1,4 +1,4 @@
-"""Overhangs: the places of each layer that hang over nothing and are too flat to carry themselves, and which of them bridge."""
+"""Overhangs: what of each layer needs support, what bridges from anchor to anchor, and what is a ledge that carries itself."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -17,9 +17,10 @@ HEAP = 12  # so many layers are united first: a sweep over all of them at once m
 
 @dataclass(frozen=True, eq=False)
 class Overhang:
-    """Of one layer: hanging wants support, bridges carry themselves, ledges do, too, but no line reaches all over them.
+    """The overhangs of one layer.
 
-    unwanted: what hangs, and a person wants no support for.
+    hanging: needs support; bridges: lines span them; ledges: carry themselves, though no line spans them; unwanted: would need
+    support, but a person wants none there.
     """
 
     hanging: Polygons = field(default_factory=Polygons)
@@ -35,18 +36,6 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     what bridges layer by layer, as arches do, does not either. Without support whatever has an anchor to hold on to is printed as
     a bridge, however long.
     """
-    overhangs, shut = _all_overhangs(sections), sections.no_support
-    return [_without(overhang, area) for overhang, area in zip(overhangs, shut, strict=True)] if shut else overhangs
-
-
-def _without(overhang: Overhang, shut: Polygons) -> Overhang:
-    if shut.is_empty() or overhang.hanging.is_empty():
-        return overhang
-    hanging = overhang.hanging - shut
-    return replace(overhang, hanging=hanging, unwanted=overhang.hanging - hanging)
-
-
-def _all_overhangs(sections: Sections) -> list[Overhang]:
     process, mesh, outlines, cuts_mm = sections.process, sections.mesh, sections.outlines, sections.heights.cut_mm
     level_mm, arch_mm = (inf, inf) if process.support == "none" else (process.bridge_mm, process.arch_longest_mm)
     overhangs = [Overhang()] * len(outlines)
@@ -54,7 +43,7 @@ def _all_overhangs(sections: Sections) -> list[Overhang]:
     needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_platform))
     faces = faces_by_layer(mesh, cuts_mm, risky)
     for i in range(int(sections.on_platform), len(outlines)):
-        below = _plastic_below(sections, i)
+        below = outlines[i - 1] if i else offset(sections.plastic_below or Polygons(), RIM_MM)
         floating, triangles = _floating(outlines[i], below), faces.get(i, [])
         hanging = (outlines[i] - below) ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
         hanging = hanging if floating.is_empty() else hanging + floating
@@ -62,13 +51,12 @@ def _all_overhangs(sections: Sections) -> list[Overhang]:
             all_need = len(needing.get(i, ())) == len(triangles)
             need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
             anchors = below + (outlines[i] - hanging)  # also slopes beside it that carry themselves
-            overhangs[i] = _sort_islands(hanging, need, anchors, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
+            found = _sort_islands(hanging, need, anchors, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
+            if sections.no_support:
+                wanted = found.hanging - sections.no_support[i]
+                found = replace(found, hanging=wanted, unwanted=found.hanging - wanted)
+            overhangs[i] = found
     return overhangs
-
-
-def _plastic_below(sections: Sections, layer: int) -> Polygons:
-    """What a layer that is not on the platform lies on."""
-    return sections.outlines[layer - 1] if layer else offset(sections.plastic_below or Polygons(), RIM_MM)
 
 
 def _floating(outline: Polygons, below: Polygons) -> Polygons:

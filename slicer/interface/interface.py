@@ -88,9 +88,8 @@ def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
     rise = near[:, 5] - near[:, 2]
     level = np.abs(rise) < 1e-9
     at = (z_mm - near[:, 2] + reach_mm * np.array([[-1.0], [1.0]])) / np.where(level, 1.0, rise)
-    begin, end = (
-        near[:, :3] + share[:, None] * (near[:, 3:] - near[:, :3]) for share in np.where(level, [[0], [1]], _clipped(at))
-    )
+    shares: Floats = np.where(level, [[0.0], [1.0]], np.sort(at, axis=0).clip(0.0, 1.0))  # in order, and within the segments
+    begin, end = (near[:, :3] + share[:, None] * (near[:, 3:] - near[:, :3]) for share in shares)
     heights = np.array([begin[:, 2], end[:, 2]]) - z_mm
     least = np.where(heights.prod(axis=0) < 0.0, 0.0, np.abs(heights).min(axis=0))
     reaches = np.sqrt(np.maximum(reach_mm**2 - least**2, 0.0))
@@ -101,9 +100,3 @@ def _around(begin: Floats, end: Floats, reach_mm: float) -> Polygons:
     """What lies as near as that to a segment seen from above."""
     disc = Polygons.circle(reach_mm, SIDES)
     return Polygons.batch_hull([disc.translate((float(x), float(y))) for x, y in (begin[:2], end[:2])])
-
-
-def _clipped(shares: Floats) -> Floats:
-    """(2, n) shares of segments in order, within them."""
-    inside: Floats = np.sort(shares, axis=0).clip(0.0, 1.0)
-    return inside

@@ -128,8 +128,9 @@ def _pins_of(part: Part, parts: Sequence[Part], planned: Pins, profile: Profile)
             free = clean(solid) - union([Polygons(loops) for loops in holes if loops])
             room = room ^ offset_round(free, -keep_mm - 0.5 * wide_mm)
         heights: Heights | None = None
+        least_mm = wide_mm + 2.0 * process.line_width_mm  # two walls between holes
         for x, y in _places(room, process):
-            if not len(pins) or np.hypot(*(pins[:, :2] - (x, y)).T).min() >= least_spacing_mm(process, wide_mm):
+            if not len(pins) or np.hypot(*(pins[:, :2] - (x, y)).T).min() >= least_mm:
                 heights = heights or part_heights(lower, [other for other in parts if other.index > lower.index], below)
                 hole = mesh_of(_hole(x, y, wide_mm, -process.pin_depth_mm, 0.0)).transform(*change)
                 pins = np.vstack([pins, [x, y, _taken_mm3(hole, heights)]])
@@ -139,11 +140,6 @@ def _pins_of(part: Part, parts: Sequence[Part], planned: Pins, profile: Profile)
 def pin_width_mm(profile: Profile) -> float:
     """Diameter of a hole."""
     return profile.process.pin_width_nozzles * profile.machine.head.nozzle_mm
-
-
-def least_spacing_mm(process: Process, wide_mm: float) -> float:
-    """Between the middles of two holes: two walls part them."""
-    return wide_mm + 2.0 * process.line_width_mm
 
 
 def room_around_mm(process: Process) -> float:

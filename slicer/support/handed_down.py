@@ -107,17 +107,18 @@ def plan_supports(own: Sequence[Supports]) -> list[Supports]:
     planned = list(own)
     if all(supports.unsupported_mm2 == 0.0 for supports in own[1:]):
         return planned
-    rooms = _rooms(own)
-    handed: dict[int, HandedDown] = {}
-    for k in sorted(rooms, reverse=True):
-        handed[k] = _hand_down(rooms[k], own[k].missed, [handed[m] for m in sorted(handed)])
+    handed: dict[int, HandedDown] = {}  # by its part's place in the print order
+    for k, (box, top_mm) in _extents(own).items():
+        handed[k] = _room(up_to(own[k].sections, top_mm), box, top_mm, list(handed.values()))
+    for k in sorted(handed, reverse=True):
+        handed[k] = _hand_down(handed[k], own[k].missed, [handed[m] for m in sorted(handed) if m > k])
     for k in sorted(handed):
         planned[k] = _stand(handed[k], own[k], planned[:k])
     return planned
 
 
-def _extents(own: Sequence[Supports]) -> list[tuple[Floats, float]]:
-    """For every part the box x0 y0 x1 y1 of its base plane that handed-down support may need, and up to which height."""
+def _extents(own: Sequence[Supports]) -> dict[int, tuple[Polygons, float]]:
+    """The box of its base plane that handed-down support may need, and up to which height, of every part that may have any."""
     lean = tan(radians(max(supports.sections.process.support_branch_angle_deg for supports in own)))
     boxes = [np.array([np.inf, np.inf, -np.inf, -np.inf]) for _ in own]
     tops = [0.0] * len(own)
@@ -136,26 +137,14 @@ def _extents(own: Sequence[Supports]) -> list[tuple[Floats, float]]:
         for m in range(k if x0 < x1 else 0):
             turn, moved = frame_change(own[m].sections.part, own[k].sections.part)
             corners = (np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]]) - moved) @ turn
-            top_mm = min(float(corners[:, 2].max()), _highest_mm(own, m))
+            part = own[m].sections.part
+            highest_mm = max(float((other.sections.part.mesh.vertices @ part.direction).max()) for other in own[m:])
+            top_mm = min(float(corners[:, 2].max()), highest_mm - part.base.offset_mm)
             if top_mm > 0.0:
                 take(m, corners[:, :2].min(axis=0), corners[:, :2].max(axis=0), top_mm)
-    return list(zip(boxes, tops, strict=True))
-
-
-def _highest_mm(own: Sequence[Supports], k: int) -> float:
-    """How high the parts from part k on reach along its direction."""
-    part = own[k].sections.part
-    return max(float((supports.sections.part.mesh.vertices @ part.direction).max()) for supports in own[k:]) - part.base.offset_mm
-
-
-def _rooms(own: Sequence[Supports]) -> dict[int, HandedDown]:
-    """The room of every part with which support may be handed down, by its place in the print order."""
-    rooms: dict[int, HandedDown] = {}
-    for k, ((x0, y0, x1, y1), top_mm) in enumerate(_extents(own)):
-        if x0 < x1 and own[k].sections.process.support != "none":
-            box = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
-            rooms[k] = _room(up_to(own[k].sections, top_mm), box, top_mm, list(rooms.values()))
-    return rooms
+    some = [k for k, (x0, _, x1, _) in enumerate(boxes) if x0 < x1 and own[k].sections.process.support != "none"]
+    squares = {k: Polygons.square(tuple(boxes[k][2:] - boxes[k][:2])).translate(tuple(boxes[k][:2])) for k in some}
+    return {k: (square, tops[k]) for k, square in squares.items()}
 
 
 def up_to(sections: Sections, top_mm: float) -> Sections:
@@ -187,7 +176,8 @@ def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[Ha
     """Where support of a part may stand if that of earlier parts may."""
     window = box ^ _within_axes(sections)
     count = max(min(int(np.searchsorted(sections.heights.bottom_mm, top_mm)), len(sections.outlines)), 1)
-    far_mm = _reach_mm(sections, box)
+    x0, y0, x1, y1 = box.bounds()
+    far_mm = max(support_reach_mm(sections), 2.0 * hypot(max(abs(x0), abs(x1)), max(abs(y0), abs(y1))) + AROUND_MM)
     blocked = blocked_areas(sections, count, 0.0, far_mm)
     if not sections.on_platform:
         blocked = unite_layers(blocked, near_table(sections, sections.heights[:count], far_mm))
@@ -209,12 +199,6 @@ def _within_axes(sections: Sections) -> Polygons:
     moved = shift(machine, sections.part.pose)
     x, y = (np.array(axis.limits_mm) - moved[k] for k, axis in enumerate((machine.x, machine.y)))
     return Polygons.square((x[1] - x[0], y[1] - y[0])).translate((x[0], y[0]))
-
-
-def _reach_mm(sections: Sections, box: Polygons) -> float:
-    """A distance from the origin that no support of a part ever reaches, be it handed down."""
-    x0, y0, x1, y1 = box.bounds()
-    return max(support_reach_mm(sections), 2.0 * hypot(max(abs(x0), abs(x1)), max(abs(y0), abs(y1))) + AROUND_MM)
 
 
 def _hand_down(room: HandedDown, missed: Sequence[Polygons], later: Sequence[HandedDown]) -> HandedDown:
@@ -244,13 +228,13 @@ def _patches(room: HandedDown, bodies: Sequence[Polygons], wanted: Sequence[Poly
 
 def _hanging_low(areas: ReachableAreas, wanted: Sequence[Polygons]) -> list[tuple[int, Polygons]]:
     """The hanging places that support above the base plane has no room under, with their layers."""
-    low = enumerate(wanted[: int(np.searchsorted(areas.bottom_mm, areas.process.support_gap_mm + 1.0))])
+    low = enumerate(wanted[: int(np.searchsorted(areas.heights.bottom_mm, areas.process.support_gap_mm + 1.0))])
     return [(k, area) for k, area in low if not area.is_empty() and not len(areas.carrying_layers(k))]
 
 
 def _gap_mm(areas: ReachableAreas, layer: int) -> float:
     """How far below the base plane support under a layer ends."""
-    return max(areas.process.support_gap_mm - max(float(areas.bottom_mm[layer]), 0.0), 0.0)
+    return max(areas.process.support_gap_mm - max(float(areas.heights.bottom_mm[layer]), 0.0), 0.0)
 
 
 def _own_placeable(room: HandedDown) -> Polygons:

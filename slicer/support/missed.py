@@ -65,10 +65,10 @@ def _bare(k: int, hanging: Polygons, printed: Sequence[Polygons], areas: Reachab
 def _without_near(k: int, bare: Polygons, areas: ReachableAreas) -> Polygons:
     """A bare place without what has plastic or the platform so near below it that no layer of support has room between."""
     process = areas.process
-    lowest = float(areas.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
+    lowest = float(areas.heights.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
     if lowest <= EVEN_MM and areas.sections.on_platform:
         return Polygons()
-    near = list(areas.sections.outlines[int(np.searchsorted(areas.top_mm, lowest - EVEN_MM)) : k - 1])
+    near = list(areas.sections.outlines[int(np.searchsorted(areas.heights.tip_mm, lowest - EVEN_MM)) : k - 1])
     rest = bare - union(near) if near else bare
     return rest if rest.area() >= LEAST_MM2 else Polygons()
 

@@ -108,7 +108,7 @@ def grow(
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
             contact = _contact(union(asked), body, areas.reachable[m], radius)
-            grows = grows.add_contact(contact, areas.reachable[m], float(areas.top_mm[m]))
+            grows = grows.add_contact(contact, areas.reachable[m], float(areas.heights.tip_mm[m]))
             contacts[m] = _body(contact, radius)
             body = body + contacts[m]
         left = [(hanging - body, last) for hanging, last in pending if last < m]
@@ -158,10 +158,10 @@ def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygo
     for m in range(len(bodies) - 2, -1, -1):
         ends = _loose_ends(bodies, areas, m + 1)
         if not ends.is_empty():
-            roots.append((ends, float(areas.bottom_mm[m + 1]) - deep))
+            roots.append((ends, float(areas.heights.bottom_mm[m + 1]) - deep))
         if roots:
             blocked = _blocked_area(union([root for root, _ in roots]), areas, m)
-            left = [(root - blocked, last) for root, last in roots if areas.bottom_mm[m] >= last]
+            left = [(root - blocked, last) for root, last in roots if areas.heights.bottom_mm[m] >= last]
             roots = [(root, last) for root, last in left if not _only_slivers(root)]
             grown[m] = union([bodies[m], *(root for root, _ in roots)])
     return grown

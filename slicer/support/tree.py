@@ -196,8 +196,8 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
         narrow = _narrow(old, reachable, borders, float(depth), lean)
         if narrow is not None:
             low.append(narrow)
-        elif not old.full or not _stands_on(old, areas.placeable[layer]):
-            left.append(old)
+        elif not old.full or 2.0 * (old.area - areas.placeable[layer]).area() >= old.area.area():
+            left.append(old)  # less than half of it has come to ground
     return _drop_enclosed(low + _move_aside(left, areas, layer))
 
 
@@ -213,8 +213,8 @@ def _depths(branches: Sequence[Branch], borders: Floats) -> Floats:
 
 def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
     """Where the branches would go if nothing was in their way: wide ones shrink, trunks go to meet the nearest trunk."""
-    z_mm, lean = float(areas.top_mm[layer - 1]), float(areas.lean_mm[layer])
-    rise, (least_mm, per_mm) = float(areas.top_mm[layer]) - z_mm, growth(areas.process, areas.radius_mm)
+    z_mm, lean = float(areas.heights.tip_mm[layer - 1]), float(areas.lean_mm[layer])
+    rise, (least_mm, per_mm) = float(areas.heights.tip_mm[layer]) - z_mm, growth(areas.process, areas.radius_mm)
     thick = [trunk_radius_mm(branch.top_mm - z_mm, least_mm, per_mm) for branch in branches]
     trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + EVEN_MM]
     goals = _goals(np.array([[branches[k].x, branches[k].y] for k in trunks]), z_mm * lean / rise)
@@ -265,11 +265,6 @@ def _narrow(branch: Branch, reachable: Polygons, borders: Floats, depth_mm: floa
     return thin if (thin.area - reachable).area() < LEAST_MM2 else None
 
 
-def _stands_on(branch: Branch, placeable: Polygons) -> bool:
-    """Whether most of a branch has come to ground."""
-    return bool(2.0 * (branch.area - placeable).area() < branch.area.area())
-
-
 def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
     """Branches in the way of something: what of them has a place below stays, the rest goes aside, or ends on ground."""
     if not branches:
@@ -280,23 +275,14 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
     area = closing(area, SMOOTH_MM) if tidy else area
     carrying = carrying_area(area, reachable, areas.placeable[layer], lean)
     carrying = _draw_in(carrying, lean) if tidy and (area - reachable).is_empty() else carrying
-    below = islands(_tidy(carrying, reachable)) if tidy else _islands_below(carrying, reachable)
+    below: list[Polygons] = []
+    if tidy:
+        thick = drop_slivers(carrying)
+        below = islands(thick.simplify(FINE_MM) + _widened(carrying - thick, reachable))
+    for island in () if tidy else islands(carrying):  # what is just a thin limb of one can wait
+        below += islands(_widened(island, reachable)) if _sliver(island) else [island.simplify(FINE_MM)]
     top = max(branch.top_mm for branch in branches)
     return [branch_of(island, top) for island in below if island.area() >= LEAST_MM2]
-
-
-def _tidy(places: Polygons, reachable: Polygons) -> Polygons:
-    """Places whose slivers are wide enough to be followed down."""
-    thick = drop_slivers(places)
-    return thick.simplify(FINE_MM) + _widened(places - thick, reachable)
-
-
-def _islands_below(places: Polygons, reachable: Polygons) -> list[Polygons]:
-    """The islands of places, wider where all of an island is a sliver: what is just a thin limb of one can wait."""
-    below: list[Polygons] = []
-    for island in islands(places):
-        below += islands(_widened(island, reachable)) if _sliver(island) else [island.simplify(FINE_MM)]
-    return below
 
 
 def _widened(slivers: Polygons, reachable: Polygons) -> Polygons:
