@@ -19,15 +19,16 @@ from slicer.heights import Heights
 class Sections:
     """A part's layers, one entry each, before anything is laid, and all that is known of the model's other parts around them.
 
-    The part is printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame. outlines: all of a
-    layer; own: without the pedestal; ungrooved: own, before the grooves for later parts. beside: what later parts have of each
-    layer; above: of the layers over the last one, as many as shells reach; beneath: what the model has of those under the base
-    plane, the nearest first, empty where earlier parts are not known. standing: of a limb, what earlier parts have of each layer.
-    plastic_below: just under the base plane, None on the platform; plate: its outline, of use to part 1. joints: (k, 6) segments
-    where the part meets others on the surface; pins: (k, 3) those that it fills, x, y and mm3; grooves: the area of those that it
-    fills. no_seam: (k, 6) segments of each layer where a person wants no wall to begin; no_support: the places of each layer that
-    are to get none, () for nowhere. pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold
-    something, but nothing that gets a line.
+    Part: printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame.
+    Layers: `outlines` are all of each; `own` without the pedestal, `ungrooved` those before the grooves for later parts.
+    Model around: later parts have `beside` of each layer and `above` of those over the last one, as many as shells reach; the
+    model has `beneath` of those under the base plane, the nearest first, () where earlier parts are not known; earlier parts
+    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is its
+    outline, of use to part 1. `joints`, (k, 6) segments, are where the part meets others on the surface.
+    Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
+    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, () for nowhere.
+    pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold something, but nothing that gets a
+    line.
     """
 
     part: Part

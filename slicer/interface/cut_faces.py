@@ -73,7 +73,6 @@ def cut_walls(
     Those that run round; inner walls along the surface that end on a cut face's, all of one width, and what fills between them;
     what the walls would enclose if the model were not cut. usual: how many walls the model would have here.
     """
-    width = process.line_width_mm
     if model is None:
         round_ = layer_walls(section, process.walls, process, height_mm, nozzle_mm)
         fewer = round_ if usual == process.walls else layer_walls(section, usual, process, height_mm, nozzle_mm)
@@ -83,12 +82,14 @@ def cut_walls(
     round_ = layer_walls(section, min(process.interface_walls, process.walls), process, height_mm, nozzle_mm)
     if process.interface_walls >= process.walls or round_.inside.is_empty():
         return round_, (), fewer.inside
+    width = process.line_width_mm
     within = offset(round_.inside, REACH * width - 0.5 * spacing_mm(width, height_mm))
     loops, ending = [*round_.loops, *((),) * (process.interface_walls - len(round_.loops))], []
     for level in range(process.interface_walls, len(whole.loops)):
         runs = [run for loop in whole.loops[level] for run in _within(loop, within) if length_mm(run) > width]
-        loops.append(tuple(run[:-1] for run in runs if _is_closed(run)))
-        ending += [Bead(Kind.INNER_WALL, run, width, wall_rank(level, process)) for run in runs if not _is_closed(run)]
+        beads = [Bead(Kind.INNER_WALL, run, width, wall_rank(level, process)) for run in runs]
+        loops.append(tuple(bead.points[:-1] for bead in beads if bead.closed))
+        ending += [bead for bead in beads if not bead.closed]
     inside = round_.inside ^ whole.inside
     lines = [
         *(bead.points for bead in ending),
@@ -98,16 +99,11 @@ def cut_walls(
     return replace(round_, loops=tuple(loops), inside=inside), tuple(ending), fewer.inside
 
 
-def _is_closed(run: Floats) -> bool:
-    return len(run) > 3 and bool((run[0] == run[-1]).all())
-
-
 def _within(loop: Floats, area: Polygons) -> list[Floats]:
     """What of a loop (n, 2) lies in an area, as open or closed polylines."""
     if area.is_empty():
         return []
-    sides = Sides.of(edges(area))
-    points, within = cut_line(close_loop(loop), sides)
+    points, within = cut_line(close_loop(loop), Sides.of(edges(area)))
     if within.all():
         return [points]
     bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
@@ -148,8 +144,6 @@ def _nearest_areas(whole: Polygons, distances: Sequence[Floats], near: Sequence[
 
     near: where each counts, None: everywhere.
     """
-    if len(distances) == 1:
-        return [whole.area() if near[0] is None else (whole ^ near[0]).area()]
     areas = []
     for k, (mine, own) in enumerate(zip(distances, near, strict=True)):
         nearer = whole if own is None else whole ^ own

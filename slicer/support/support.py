@@ -52,10 +52,10 @@ class Supports:
 def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     """The support that stands on the platform, on the part itself and on what lies below its base plane."""
     process, nothing = sections.support_process, [Polygons()] * len(sections.outlines)
-    if process.support == "none":
-        return Supports(sections, nothing, nothing, nothing, nothing, nothing)
-    unwanted = drop_small([overhang.unwanted for overhang in overhangs], process.support_least_mm2)
-    wanted = drop_small(_drop_nearly_held(sections, overhangs), process.support_least_mm2)
+    wanted = unwanted = nothing
+    if process.support != "none":
+        unwanted = drop_small([overhang.unwanted for overhang in overhangs], process.support_least_mm2)
+        wanted = drop_small(_drop_nearly_held(sections, overhangs), process.support_least_mm2)
     count = max((k for k, area in enumerate(wanted) if not area.is_empty()), default=-1)
     if count < 0:
         return Supports(sections, nothing, nothing, nothing, nothing, unwanted)
