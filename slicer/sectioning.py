@@ -34,7 +34,7 @@ from slicer.geometry.polygons import (
 )
 from slicer.heights import Heights, part_heights, pedestal_layers
 from slicer.interface.base_plane import limb_planes, plane_in_frame_of
-from slicer.interface.interface import joints, plastic_below, sections_of, touching
+from slicer.interface.interface import joints, near_parts, plastic_below, sections_of
 from slicer.interface.interlock import Pins, cut_grooves, cut_pins, grooves, plan_pins
 from slicer.sections import Sections
 from slicer.strokes.vase import vase_profile
@@ -113,7 +113,7 @@ def _model_around(
     (top, bottom), step = shell_layers(process), process.layer_height_mm
     over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
     far_mm = max(step * max(top, bottom, process.interface_top_layers), reach_mm(process))
-    before, after = (touching(part, others, far_mm) for others in (earlier, later))
+    before, after = (near_parts(part, others, far_mm) for others in (earlier, later))
     others, count = sections_of(after, part, np.concatenate([heights.cut_mm, over])), len(heights.cut_mm)
     deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
     beneath = [closing(model, CLOSING_MM) for model in sections_of([*before, *after], part, deep)[::-1]] if earlier else []

@@ -19,7 +19,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.interface.cut_faces import interface_mm3
 from slicer.interface.interface import skin_beside
-from slicer.interface.interlock import begin_inside, fill_grooves, pour
+from slicer.interface.interlock import begin_inside, fill_grooves, fill_pins
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, Unsupported
 from slicer.sectioning import section_part
@@ -124,7 +124,7 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     profile, process, material, on_platform = sections.profile, sections.process, sections.profile.material, sections.on_platform
     outline, height_mm = sections.outlines[index], float(sections.heights.height_mm[index])
     if index == 0 and not on_platform:
-        beads = [*pour(sections.pins, profile, height_mm), *begin_inside(beads)]
+        beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
     strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
     strokes = split_overhangs(strokes, outline, sections.below(index), own)
     if index == 0 and not on_platform and process.interlock == "grooves":

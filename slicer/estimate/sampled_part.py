@@ -16,7 +16,7 @@ from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, union
 from slicer.heights import Heights, part_heights, pedestal_layers
 from slicer.interface.cut_faces import joined
-from slicer.interface.interface import sections_of, touching
+from slicer.interface.interface import near_parts, sections_of
 from slicer.shells import layer_processes
 from slicer.walls.brim import plate_outline
 
@@ -126,7 +126,7 @@ def sample_part(part: Part, profile: Profile, later: Sequence[Part] = ()) -> Sam
 
 def _others(part: Part, later: Sequence[Part], heights: Heights, layers: Sequence[int], process: Process) -> dict[int, Polygons]:
     """What of some layers, which may lie over the last one, later parts take."""
-    near = touching(part, later, process.layer_height_mm * max(process.interface_top_layers, shell_layers(process)[0]))
+    near = near_parts(part, later, process.layer_height_mm * max(process.interface_top_layers, shell_layers(process)[0]))
     if not near:
         return {}
     count, last_mm = len(heights.tip_mm), float(heights.tip_mm[-1])

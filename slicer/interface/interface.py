@@ -40,7 +40,7 @@ def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Pol
     return [union(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
 
 
-def touching(part: Part, others: Sequence[Part], reach_mm: float) -> list[Part]:
+def near_parts(part: Part, others: Sequence[Part], reach_mm: float) -> list[Part]:
     """Those of other parts whose box, in the part's frame, comes as near to its own as that."""
     low, high = part.in_part_frame().bounds_mm
     boxes = [in_frame_of(part, neighbour).bounds_mm for neighbour in others]

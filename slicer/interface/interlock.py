@@ -29,7 +29,7 @@ from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, area_mm2, clean, islands, offset, offset_round, union
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights
-from slicer.interface.interface import BELOW_MM, base_section, frame_change, in_frame_of, touching
+from slicer.interface.interface import BELOW_MM, base_section, frame_change, in_frame_of, near_parts
 from slicer.paths import Kind, bead_area_mm2
 from slicer.strokes.split import split
 from slicer.strokes.strokes import Strokes
@@ -115,7 +115,7 @@ def _pins_of(part: Part, parts: Sequence[Part], planned: Pins, profile: Profile)
     """The pins of one of all parts; planned: those of the parts before it."""
     own = profile.of_part(part.index)
     process, wide_mm, pins = own.process, pin_width_mm(own), np.zeros((0, 3))
-    for lower in touching(part, [other for other in parts if other.index < part.index], BELOW_MM):
+    for lower in near_parts(part, [other for other in parts if other.index < part.index], BELOW_MM):
         below = profile.of_part(lower.index)
         keep_mm, change = room_around_mm(below.process), frame_change(part, lower)
         looks = ceil((process.pin_depth_mm + keep_mm) / process.layer_height_mm) + 1  # about as many as there are layers
@@ -212,7 +212,7 @@ def _taken_mm3(hole: Mesh, heights: Heights) -> float:
     return float(np.dot(areas, heights.height_mm[first:last]))
 
 
-def pour(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
+def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
     """The strokes that fill a part's pins: rounds in the mouth, as many as keep the plastic to what every firmware takes."""
     process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
     radius = 0.5 * (pin_width_mm(profile) - nozzle_mm)

@@ -41,11 +41,11 @@ def blocked_areas(sections: Sections, count: int, gap_mm: float, far_mm: float) 
     if sections.standing:
         blocked = unite_layers(blocked, beside_standing(sections, slice(count), far_mm))
     if sections.no_support:
-        blocked = unite_layers(blocked, shut_areas(sections)[:count])
+        blocked = unite_layers(blocked, unwanted_areas(sections)[:count])
     return blocked
 
 
-def shut_areas(sections: Sections) -> list[Polygons]:
+def unwanted_areas(sections: Sections) -> list[Polygons]:
     """For each layer where a person wants no support: in the boxes, and over the faces as far as what would stand on them."""
     heights, gap_mm = sections.heights, sections.process.support_bottom_gap_mm
     near = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + EVEN_MM, side="right")
@@ -55,7 +55,7 @@ def shut_areas(sections: Sections) -> list[Polygons]:
 def above_base_planes(
     part: Part, later: Sequence[Part], heights: Heights, gap_mm: float, far_mm: float, machine: Machine
 ) -> list[Polygons]:
-    """For each layer what lies above the base plane of any later part, taken as lower by gap_mm.
+    """The area of each layer above the base plane of any later part, taken as lower by gap_mm.
 
     While a part is printed the head moves above its base plane, so nothing may stand there, near that part or not. A limb only
     forbids what the head could meet.
@@ -86,13 +86,13 @@ def beside_standing(sections: Sections, layers: slice, far_mm: float) -> list[Po
 
 
 def near_table(sections: Sections, heights: Heights, far_mm: float) -> list[Polygons]:
-    """For each layer what lies so near to the table that the head would meet it."""
+    """The area of each layer so near to the table that the head would meet it."""
     least_mm = least_tip_height_mm(sections.profile.machine, sections.part.pose)
     return _above_planes([plane_in_frame_of(sections.part, -UP, -least_mm)], heights, far_mm)
 
 
 def _above_planes(planes: Sequence[Floats], heights: Heights, far_mm: float) -> list[Polygons]:
-    """For each layer what of it lies above any plane: (4,) unit normal and offset."""
+    """The area of each layer above any plane: (4,) unit normal and offset."""
     layers: list[list[Polygons]] = [[] for _ in heights.tip_mm]
     everywhere = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True)
     for x, y, z, offset_mm in planes:

@@ -19,8 +19,10 @@ MOST = 0.5  # share of a place that one reason has to hold for
 
 
 def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """What of the hanging places neither lies over printed support, half a bead beyond its edge, nor spans from there to
-    the part, nor has the part or the platform a layer's height below where support would end, nor is part of a mere ledge.
+    """The hanging places that support does not hold, layer by layer.
+
+    A place is held over printed support and half a bead beyond its edge, where it spans from there to the part, where the part or
+    the platform is a layer's height below where support would end, and on a mere ledge.
     """
     missed = []
     for k, hanging in enumerate(wanted):
@@ -53,7 +55,7 @@ def _held(k: int, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygon
 
 
 def _bare(k: int, hanging: Polygons, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygons:
-    """What of a hanging place lies over no support and does not span from there to the part."""
+    """The part of a hanging place that lies over no support and does not span from there to the part."""
     held, distance_mm = _held(k, printed, areas), areas.process.support_distance_mm
     bare = hanging - held
     if k and not held.is_empty() and bare.area() >= LEAST_MM2:
@@ -63,7 +65,7 @@ def _bare(k: int, hanging: Polygons, printed: Sequence[Polygons], areas: Reachab
 
 
 def _without_near(k: int, bare: Polygons, areas: ReachableAreas) -> Polygons:
-    """A bare place without what has plastic or the platform so near below it that no layer of support has room between."""
+    """An unsupported place less what has plastic or the platform so near below that no layer of support fits between."""
     process = areas.process
     lowest = float(areas.heights.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
     if lowest <= EVEN_MM and areas.sections.on_platform:
@@ -84,7 +86,7 @@ def explain(sections: Sections, missed: Sequence[Polygons], unwanted: Sequence[P
 
 
 def _connected_areas(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, Polygons]]:
-    """What hangs, seen from above as connected places: the area of each, the layer with most of it and what of it is there."""
+    """Connected hanging places seen from above: the area of each, the layer with most of it, and its share there."""
     for island in islands(seen_from_above(hanging)):
         pieces = {k: piece ^ island for k, piece in enumerate(hanging) if not piece.is_empty()}
         mm2 = {k: piece.area() for k, piece in pieces.items()}

@@ -139,7 +139,7 @@ def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: flo
 def stand(
     bodies: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas
 ) -> tuple[list[Polygons], list[Polygons]]:
-    """What of grown support stands, and where of it is dense: per layer. bodies, contacts: as grow gives them."""
+    """The grown support that stands, and its dense places, layer by layer. bodies, contacts: as grow gives them."""
     printed = _keep_standing(_add_roots(bodies, areas), areas)
     return printed, _dense(printed, contacts, areas)
 
@@ -205,8 +205,8 @@ def _only_slivers(places: Polygons) -> bool:
 
 
 def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """What of support that no support carries does not stand: discs reach beyond what is placeable, but nothing stands beside
-    it alone."""
+    """The share that does not stand of support which no support carries: discs reach beyond placeable places, but nothing stands
+    beside one alone."""
     placeable = areas.placeable[m]
     beside = rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm)
     alone = [piece for piece in islands(rest) if _only_slivers(piece ^ placeable)]

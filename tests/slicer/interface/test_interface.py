@@ -17,10 +17,10 @@ from slicer.interface.base_plane import plane_in_frame_of
 from slicer.interface.cut_faces import _nearest_areas, joined
 from slicer.interface.interface import (
     frame_change,
+    near_parts,
     plastic_below,
     sections_of,
     skin_beside,
-    touching,
 )
 from slicer.interface.interlock import begin_inside
 from slicer.paths import Kind, Layer
@@ -78,9 +78,9 @@ def test_the_sections_of_a_part_and_of_the_others_are_the_model_s(seed: int, off
 
 def test_parts_touch_that_come_as_near_as_that() -> None:
     low, middle, high = cut(box(20, 20, 40), ((0.0, 0.0, 1.0), 30.0), ((0.0, 0.0, 1.0), 10.0))
-    assert touching(low, [middle, high], 0.5) == [middle]
-    assert touching(low, [middle, high], 20.5) == [middle, high]
-    assert touching(middle, [low, high], 0.5) == [low, high]
+    assert near_parts(low, [middle, high], 0.5) == [middle]
+    assert near_parts(low, [middle, high], 20.5) == [middle, high]
+    assert near_parts(middle, [low, high], 0.5) == [low, high]
 
 
 def test_beneath_a_part_lies_what_earlier_ones_have_at_its_base_and_under_the_first_one_nothing() -> None:

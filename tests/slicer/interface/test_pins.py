@@ -16,7 +16,7 @@ from mdp.mesh import Floats
 from profiles.errors import ProfileError
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, with_part_settings
-from slicer.interface.interlock import plan_pins, pour
+from slicer.interface.interlock import fill_pins, plan_pins
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import section_part
 from slicer.sections import Sections
@@ -62,7 +62,7 @@ def poured_mm3(parts: Sequence[Part], *keys: str) -> float:
     """What the beads that fill pins take."""
     own = profile(*BARE, *PINS, *keys)
     area = bead_area_mm2(own.process.line_width_mm, 0.2) * own.process.interface_flow
-    beads = [bead for pins in plan_pins(parts, own).values() for bead in pour(pins, own, 0.2)]
+    beads = [bead for pins in plan_pins(parts, own).values() for bead in fill_pins(pins, own, 0.2)]
     return sum(bead.length_mm * bead.flow * area for bead in beads)
 
 
@@ -189,7 +189,7 @@ def test_a_large_face_has_no_more_than_are_wanted_spread_all_over_it(most: int) 
 
 def test_no_holes_without_the_setting() -> None:
     assert plan_pins(stacked(), profile()) == {}
-    assert [len(pour(pins, profile(), 0.2)) for pins in plan_pins(stacked(), profile()).values()] == []
+    assert [len(fill_pins(pins, profile(), 0.2)) for pins in plan_pins(stacked(), profile()).values()] == []
 
 
 @pytest.mark.parametrize(
