@@ -117,6 +117,15 @@ def test_what_begins_in_mid_air_hangs_with_all_of_its_section() -> None:
     assert hanging_mm2(overhangs) == {begun: pytest.approx(12.0, rel=0.002), arm: pytest.approx(22 * 8 - 12.0, rel=0.002)}
 
 
+def test_a_tip_too_steep_to_need_support_hangs_where_it_gets_wide_enough_for_a_line_and_no_higher() -> None:
+    slope = np.tan(np.radians(35))
+    tip = CONE(6, 0.0, 6 * slope, CORNERS).translate((22, 6, 14))
+    overhangs = overhangs_of(standing(CUBE((8, 12, 20)) + CUBE((30, 12, 4)).translate((0, 0, 20)) + tip))
+    ((begun, mm2),) = [(i, mm2) for i, mm2 in hanging_mm2(overhangs).items() if i < round(20 / LAYER_MM)]
+    assert mm2 == pytest.approx(disc_mm2((LAYER_MM * (begun + 0.5) - 14) * slope), rel=0.05)
+    assert 14 < LAYER_MM * begun < 15
+
+
 def test_the_first_layer_of_a_later_part_hangs_where_it_reaches_over_the_one_before() -> None:
     base, plate = cut(tee(), ((0, 0, 1), 30.0))
     overhangs = find_overhangs(section_part(plate, profile(), [base]))
