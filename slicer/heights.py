@@ -62,21 +62,29 @@ def layer_heights(
     from the top or from the one below. Raises SliceError as equal_heights().
     """
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
-    roof_mm, bottom, heights = pedestal_mm - process.pedestal_gap_mm, _bottom(process, on_platform), NO_LAYERS
+    from_mm, first_mm, heights = 0.0, _first_mm(process, on_platform), NO_LAYERS
+    roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top_mm and roof_mm >= process.least_layer_height_mm:
         heights = equal_heights(roof_mm, process, True, nozzle_mm)
-        bottom = _Bottom(pedestal_mm, process.first_layer_height_mm)
+        from_mm, first_mm = pedestal_mm, process.first_layer_height_mm
     for plane_mm in limb_planes_mm:
-        if min(plane_mm - bottom.from_mm, top_mm - plane_mm) >= process.least_layer_height_mm:
-            heights += _heights_from(mesh, plane_mm, process, nozzle_mm, bottom)
-            bottom = _Bottom(plane_mm, process.layer_height_mm)
-    return heights + _heights_from(mesh, top_mm, process, nozzle_mm, bottom)
+        if min(plane_mm - from_mm, top_mm - plane_mm) >= process.least_layer_height_mm:
+            heights += _heights_from(mesh, plane_mm, process, nozzle_mm, from_mm, first_mm)
+            from_mm, first_mm = plane_mm, process.layer_height_mm
+    return heights + _heights_from(mesh, top_mm, process, nozzle_mm, from_mm, first_mm)
 
 
-def limb_planes_mm(part: Part, later: Sequence[Part]) -> list[float]:
-    """Heights above a part's base plane of the planes, level there, from which later limbs are printed, lowest first."""
+def part_heights(part: Part, later: Sequence[Part], profile: Profile) -> Heights:
+    """The layers of a part printed before `later` ones, with the planes of limbs that are level there; profile: its own."""
     limbs = [limb.base for limb in later if limb.base.limbs_mm is not None]
-    return sorted({base.offset_mm - part.base.offset_mm for base in limbs if float(base.normal @ part.base.normal) > 1.0 - LEVEL})
+    planes_mm = {base.offset_mm - part.base.offset_mm for base in limbs if float(base.normal @ part.base.normal) > 1.0 - LEVEL}
+    pedestal_mm = profile.search.pedestal_mm if part.index == 1 else 0.0
+    return layer_heights(part.in_part_frame(), profile, part.index == 1, pedestal_mm, sorted(planes_mm))
+
+
+def pedestal_layers(heights: Heights, pedestal_mm: float) -> int:
+    """How many layers belong to the pedestal."""
+    return int(np.searchsorted(heights.tip_mm, pedestal_mm + 1e-6))
 
 
 def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm: float) -> Heights:
@@ -92,19 +100,11 @@ def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm:
     [0.3, 0.5, 0.7, 0.9]
     """
     _check(top_mm, process)
-    return _equal_from(top_mm, process, nozzle_mm, _bottom(process, on_platform))
+    return _equal_from(top_mm, process, nozzle_mm, 0.0, _first_mm(process, on_platform))
 
 
-@dataclass(frozen=True)
-class _Bottom:
-    """from_mm: where the first layer begins; first_mm: its height."""
-
-    from_mm: float
-    first_mm: float
-
-
-def _bottom(process: Process, on_platform: bool) -> _Bottom:
-    return _Bottom(0.0, process.first_layer_height_mm if on_platform else interface_height_mm(process))
+def _first_mm(process: Process, on_platform: bool) -> float:
+    return process.first_layer_height_mm if on_platform else interface_height_mm(process)
 
 
 def interface_height_mm(process: Process) -> float:
@@ -117,23 +117,22 @@ def interface_height_mm(process: Process) -> float:
     return max((1.0 - process.interface_overlap) * process.layer_height_mm, least)
 
 
-def _heights_from(mesh: Mesh, top: float, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
-    """Layers from the bottom up to a top."""
+def _heights_from(mesh: Mesh, top: float, process: Process, nozzle_mm: float, from_mm: float, first_mm: float) -> Heights:
+    """Layers from one height up to a top, the first of a height of its own."""
     least = process.least_layer_height_mm
     _check(top, process)
-    adaptive = process.adaptive_cusp_mm > 0.0 and top - bottom.from_mm > bottom.first_mm + least
-    thick = adaptive_heights(mesh, process, bottom.from_mm + bottom.first_mm, top) if adaptive else []
+    adaptive = process.adaptive_cusp_mm > 0.0 and top - from_mm > first_mm + least
+    thick = adaptive_heights(mesh, process, from_mm + first_mm, top) if adaptive else []
     if not thick:
-        return _equal_from(top, process, nozzle_mm, bottom)
-    rest = top - bottom.from_mm - bottom.first_mm - sum(thick)
+        return _equal_from(top, process, nozzle_mm, from_mm, first_mm)
+    rest = top - from_mm - first_mm - sum(thick)
     if rest > 1e-6:
         thick = _spread(thick, rest, least, process.most_layer_height_mm)
-    return _stack_layers([bottom.first_mm, *thick], bottom.from_mm, top)
+    return _stack_layers([first_mm, *thick], from_mm, top)
 
 
-def _equal_from(top_mm: float, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
-    """The same of equal layers. What is no higher than a layer and a little is one layer."""
-    from_mm, first_mm = bottom.from_mm, bottom.first_mm
+def _equal_from(top_mm: float, process: Process, nozzle_mm: float, from_mm: float, first_mm: float) -> Heights:
+    """Equal layers above the first one. A remainder up to about a layer becomes one layer."""
     layer, total, most = process.layer_height_mm, top_mm - from_mm, min(process.highest_layer_mm, nozzle_mm)
     count = max(floor((total - first_mm) / layer + 1e-9), 0)
     rest = total - first_mm - count * layer
@@ -180,17 +179,12 @@ def _spread(thick: list[float], rest: float, least: float, most: float) -> list[
     return [total / count] * count
 
 
-@dataclass(frozen=True, eq=False)
-class Slopes:
-    """most_mm: (n,) highest layer that may touch each bin of bin_mm from the base plane up; levels_mm: rising heights."""
+def _measure_slopes(mesh: Mesh, process: Process) -> tuple[Floats, float, Floats]:
+    """What the surface of a mesh in its part frame allows: steps of at most adaptive_cusp_mm, between least and most height.
 
-    most_mm: Floats
-    bin_mm: float
-    levels_mm: Floats
-
-
-def _measure_slopes(mesh: Mesh, process: Process) -> Slopes:
-    """What the surface of a mesh in its part frame allows: steps of at most adaptive_cusp_mm, between least and most height."""
+    (n,) the highest layer, mm, that may touch each of n bins from the base plane up, the height of a bin, and the rising heights
+    of level surfaces.
+    """
     top = float(mesh.bounds_mm[1, 2])
     bin_mm = max(BIN_SHARE * process.least_layer_height_mm, top / MOST_BINS)
     leaning = np.abs(mesh.normals[:, 2])
@@ -199,10 +193,8 @@ def _measure_slopes(mesh: Mesh, process: Process) -> Slopes:
     allowed = process.adaptive_cusp_mm / np.maximum(steepest, 1e-9)
     heights_mm = np.round(mesh.vertices[mesh.faces[level, 0], 2], 6)
     levels, which = np.unique(heights_mm, return_inverse=True)
-    areas = np.bincount(which, mesh.areas_mm2[level], len(levels))
-    return Slopes(
-        np.clip(allowed, process.least_layer_height_mm, process.most_layer_height_mm), bin_mm, levels[areas >= LEAST_LEVEL_MM2]
-    )
+    wide = np.bincount(which, mesh.areas_mm2[level], len(levels)) >= LEAST_LEVEL_MM2
+    return np.clip(allowed, process.least_layer_height_mm, process.most_layer_height_mm), bin_mm, levels[wide]
 
 
 @kernel
@@ -225,15 +217,15 @@ def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float
     where what is left under a level is less than two of the least, one layer takes all of it, or the level is passed over where
     that one would be too high. What is left so under the top is not taken.
     """
-    slopes, least_mm = _measure_slopes(mesh, process), process.least_layer_height_mm
-    stops = [level for level in slopes.levels_mm.tolist() if from_mm < level < top_mm - least_mm] + [top_mm]
+    (most_mm, bin_mm, levels_mm), least_mm = _measure_slopes(mesh, process), process.least_layer_height_mm
+    stops = [level for level in levels_mm.tolist() if from_mm < level < top_mm - least_mm] + [top_mm]
     thick: list[float] = []
     z = from_mm
     for stop in stops:
         if stop - z < least_mm and stop < top_mm:
             continue
         while stop - z > 1e-9:
-            height, left = _highest(slopes, z), stop - z
+            height, left = _highest(most_mm, bin_mm, z), stop - z
             if process.most_layer_height_mm + 1e-9 < left < 2.0 * least_mm:
                 break
             if left <= height + 1e-9 or left < 2.0 * least_mm:
@@ -245,11 +237,11 @@ def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float
     return thick
 
 
-def _highest(slopes: Slopes, z_mm: float) -> float:
+def _highest(most_mm: Floats, bin_mm: float, z_mm: float) -> float:
     """The highest layer from a height up that every bin it touches allows."""
-    k = min(int(z_mm / slopes.bin_mm), len(slopes.most_mm) - 1)
-    height = float(slopes.most_mm[k])
-    while k + 1 < len(slopes.most_mm) and (k + 1) * slopes.bin_mm < z_mm + height:
+    k = min(int(z_mm / bin_mm), len(most_mm) - 1)
+    height = float(most_mm[k])
+    while k + 1 < len(most_mm) and (k + 1) * bin_mm < z_mm + height:
         k += 1
-        height = min(height, max(float(slopes.most_mm[k]), k * slopes.bin_mm - z_mm))
+        height = min(height, max(float(most_mm[k]), k * bin_mm - z_mm))
     return height

@@ -1,18 +1,15 @@
-"""Overhangs: the places of each layer that hang over nothing and are too flat to carry themselves, and which of them bridge."""
+"""Overhangs: what of each layer needs support, what bridges from anchor to anchor, and what is a ledge that carries itself."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
-import numpy as np
-
 from mdp.overhang import UP, facing_down
 from mdp.support_need.need import needs_support
-from slicer.fill.bridge import LEAST, Bridge, find_bridge, find_bridges
+from slicer.fill.bridge import LEAST, Bridge, find_bridge
 from slicer.geometry.cross_section import RIM_MM, faces_by_layer
-from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, edges, islands, offset, union
 from slicer.sections import Sections
-from slicer.zones import no_support_areas
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
 HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
@@ -20,9 +17,10 @@ HEAP = 12  # so many layers are united first: a sweep over all of them at once m
 
 @dataclass(frozen=True, eq=False)
 class Overhang:
-    """Of one layer: hanging wants support, bridges carry themselves, ledges do, too, but no line reaches all over them.
+    """The overhangs of one layer.
 
-    unwanted: what hangs, and a person wants no support for.
+    hanging: needs support; bridges: lines span them; ledges: carry themselves, though no line spans them; unwanted: would need
+    support, but a person wants none there.
     """
 
     hanging: Polygons = field(default_factory=Polygons)
@@ -38,21 +36,6 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     what bridges layer by layer, as arches do, does not either. Without support whatever has an anchor to hold on to is printed as
     a bridge, however long.
     """
-    overhangs = _all_overhangs(sections)
-    if not sections.part.no_support.anywhere:
-        return overhangs
-    shut = no_support_areas(sections.part, sections.mesh, sections.heights.cut_mm)
-    return [_without(overhang, area) for overhang, area in zip(overhangs, shut, strict=True)]
-
-
-def _without(overhang: Overhang, shut: Polygons) -> Overhang:
-    if shut.is_empty() or overhang.hanging.is_empty():
-        return overhang
-    hanging = overhang.hanging - shut
-    return replace(overhang, hanging=hanging, unwanted=overhang.hanging - hanging)
-
-
-def _all_overhangs(sections: Sections) -> list[Overhang]:
     process, mesh, outlines, cuts_mm = sections.process, sections.mesh, sections.outlines, sections.heights.cut_mm
     level_mm, arch_mm = (inf, inf) if process.support == "none" else (process.bridge_mm, process.arch_longest_mm)
     overhangs = [Overhang()] * len(outlines)
@@ -60,7 +43,7 @@ def _all_overhangs(sections: Sections) -> list[Overhang]:
     needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_platform))
     faces = faces_by_layer(mesh, cuts_mm, risky)
     for i in range(int(sections.on_platform), len(outlines)):
-        below = _plastic_below(sections, i)
+        below = outlines[i - 1] if i else offset(sections.plastic_below or Polygons(), RIM_MM)
         floating, triangles = _floating(outlines[i], below), faces.get(i, [])
         hanging = (outlines[i] - below) ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
         hanging = hanging if floating.is_empty() else hanging + floating
@@ -68,13 +51,12 @@ def _all_overhangs(sections: Sections) -> list[Overhang]:
             all_need = len(needing.get(i, ())) == len(triangles)
             need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
             anchors = below + (outlines[i] - hanging)  # also slopes beside it that carry themselves
-            overhangs[i] = _sort_islands(hanging, need, anchors, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
+            found = _sort_islands(hanging, need, anchors, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
+            if sections.no_support:
+                wanted = found.hanging - sections.no_support[i]
+                found = replace(found, hanging=wanted, unwanted=found.hanging - wanted)
+            overhangs[i] = found
     return overhangs
-
-
-def _plastic_below(sections: Sections, layer: int) -> Polygons:
-    """What a layer that is not on the platform lies on."""
-    return sections.outlines[layer - 1] if layer else offset(sections.plastic_below or Polygons(), RIM_MM)
 
 
 def _floating(outline: Polygons, below: Polygons) -> Polygons:
@@ -104,33 +86,6 @@ def _sort_islands(
             rest.append(island)
     left = Polygons.compose(rest) if rest else Polygons()
     return Overhang(left ^ need, tuple(bridges), left - need)
-
-
-def bridges_of_layers(
-    sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons]
-) -> list[tuple[Bridge, ...]]:
-    """The bridges of every layer: those that carry themselves, and what hangs over no support, as well as it can be.
-
-    Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
-    supported: where each layer's support is.
-    """
-    process, heights, outlines = sections.process, sections.heights, sections.outlines
-    bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
-    for i, overhang in enumerate(overhangs):
-        free = overhang.hanging + overhang.ledges
-        if free.is_empty() or sections.below(i) is None:
-            continue
-        drop_mm = float(heights.bottom_mm[i]) - process.support_gap_mm - 2.0 * process.layer_height_mm
-        lowest = int(np.searchsorted(heights.tip_mm, drop_mm))
-        held = union([area for area in supported[lowest:i] if not area.is_empty()])
-        held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
-        bare = opening(free - held, 0.25 * process.line_width_mm)
-        if bare.is_empty():
-            continue
-        slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
-        anchors = edges(offset(union([_plastic_below(sections, i), held, slopes]), 0.25 * process.line_width_mm))
-        bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
-    return bridges
 
 
 def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:

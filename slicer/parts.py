@@ -16,7 +16,7 @@ from mdp.decomposition import Part
 from mdp.kernels.processes import in_order
 from profiles.errors import SliceError
 from profiles.profile import Profile
-from slicer.interface.pins import plan_pins
+from slicer.interface.interlock import plan_pins
 from slicer.overhangs import find_overhangs
 from slicer.paths import SlicedPart
 from slicer.sectioning import section_part

@@ -1,13 +1,13 @@
 """Sections: a part's layers as outlines, the first value on the way from a mesh to paths."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.mesh import Mesh
+from mdp.mesh import Floats, Mesh
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import with_line_width
@@ -15,36 +15,20 @@ from slicer.geometry.polygons import Polygons
 from slicer.heights import Heights
 
 
-@dataclass(frozen=True)
-class Pin:
-    """A hole, in the frame of the part that fills it: the middle of its mouth, and what it takes of the layers below."""
-
-    x_mm: float
-    y_mm: float
-    volume_mm3: float
-
-
-@dataclass(frozen=True, eq=False)
-class Neighbours:
-    """Sections of the model's other parts in a part's frame; no later stage cuts their meshes again.
-
-    beside: of later parts at the height at which each layer of the part is cut; above: of later parts over the last layer, as
-    many as shells reach; below: of the model under the base plane, the nearest first, empty where earlier parts are not known.
-    """
-
-    beside: Sequence[Polygons]
-    above: Sequence[Polygons] = ()
-    below: Sequence[Polygons] = ()
-
-
 @dataclass(frozen=True, eq=False)
 class Sections:
-    """A part's layers, one entry each, before anything is laid.
+    """A part's layers, one entry each, before anything is laid, and all that is known of the model's other parts around them.
 
-    The part is printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame. outlines: all of a
-    layer; own: without the pedestal; ungrooved: own, before the grooves for later parts. plastic_below: just under the base
-    plane, None on the platform; plate: its outline, of use to part 1. pedestal_layers: how many of the lowest ones the pedestal
-    takes; pins: those that the part fills; too_thin: layers that hold something, but nothing that gets a line.
+    Part: printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame.
+    Layers: `outlines` are all of each; `own` without the pedestal, `ungrooved` those before the grooves for later parts.
+    Model around: later parts have `beside` of each layer and `above` of those over the last one, as many as shells reach; the
+    model has `beneath` of those under the base plane, the nearest first, () where earlier parts are not known; earlier parts
+    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is its
+    outline, of use to part 1. `joints`, (k, 6) segments, are where the part meets others on the surface.
+    Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
+    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, () for nowhere.
+    pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold something, but nothing that gets a
+    line.
     """
 
     part: Part
@@ -56,12 +40,19 @@ class Sections:
     outlines: Sequence[Polygons]
     own: Sequence[Polygons]
     ungrooved: Sequence[Polygons]
-    neighbours: Neighbours
+    beside: Sequence[Polygons]
     plastic_below: Polygons | None
     plate: Polygons
+    above: Sequence[Polygons] = ()
+    beneath: Sequence[Polygons] = ()
+    standing: Sequence[Polygons] = ()
+    joints: Floats = field(default_factory=lambda: np.zeros((0, 6)))
+    pins: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    grooves: Polygons = field(default_factory=Polygons)
+    no_seam: Sequence[Floats] = ()
+    no_support: Sequence[Polygons] = ()
     pedestal_layers: int = 0
     too_thin: frozenset[int] = frozenset()
-    pins: Sequence[Pin] = ()
 
     @property
     def on_platform(self) -> bool:
@@ -81,18 +72,3 @@ class Sections:
     def below(self, layer: int) -> Polygons | None:
         """The plastic that a layer lies on; None for the platform."""
         return self.outlines[layer - 1] if layer else self.plastic_below
-
-    def up_to(self, top_mm: float) -> "Sections":
-        """The sections with empty layers on top as far as that height."""
-        tip_mm, height_mm = self.heights.tip_mm, self.process.layer_height_mm
-        count = int(np.ceil((top_mm - tip_mm[-1]) / height_mm - 1e-9))
-        if count <= 0:
-            return self
-        tips_mm = tip_mm[-1] + height_mm * np.arange(1, count + 1)
-        more = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
-        outlines, own, ungrooved = ([*places, *[Polygons()] * count] for places in (self.outlines, self.own, self.ungrooved))
-        around, known = self.neighbours, len(self.neighbours.above)
-        higher = [*around.beside, *around.above, *[Polygons()] * count]  # the added layers are at the heights of `above`
-        end = len(around.beside) + count
-        around = replace(around, beside=higher[:end], above=higher[end : end + known])
-        return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved, neighbours=around)

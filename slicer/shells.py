@@ -1,23 +1,32 @@
-"""Shells: what every layer of a part consists of: walls, skins and sparse places, before any bead is laid."""
+"""Shells: the walls, skins and sparse places of every layer of a part, and then its beads, whose order is not known yet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mdp.kernels.processes import in_order
 from profiles.process import Process
-from slicer.bead import Bead, first_layer_process, interface_process, with_line_width
-from slicer.fill.bridge import Bridge
-from slicer.fill.infill import pattern_density
-from slicer.fill.ironing import ironed_areas
+from slicer.bead import WALLS, Bead, first_layer_process, interface_process, simplify_bead, with_line_width
+from slicer.fill.bridge import Bridge, bridge_area, bridge_beads, find_bridges, infill_bridge_area, infill_bridge_beads
+from slicer.fill.infill import infill_beads, pattern_density
+from slicer.fill.ironing import ironed_areas, ironing_beads
 from slicer.fill.region import Region, regions
-from slicer.geometry.polygons import Polygons, settled
-from slicer.interface.cut_walls import CutWalls, cover, cut_walls
-from slicer.interface.model import model_around
-from slicer.overhangs import Overhang, bridges_of_layers
+from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_beads
+from slicer.geometry.cross_section import RIM_MM
+from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, settled, union
+from slicer.interface.cut_faces import cover, cut_walls, model_sections
+from slicer.overhangs import Overhang
+from slicer.paths import Kind
 from slicer.sections import Sections
 from slicer.strokes.overhanging import strengthen_overhangs
+from slicer.support.beads import pedestal_beads, support_beads
 from slicer.support.support import Supports
-from slicer.walls.walls import Walls
+from slicer.walls.brim import brim
+from slicer.walls.gap import gaps
+from slicer.walls.walls import Walls, wall_beads
+
+DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
 
@@ -63,38 +72,114 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     process, nozzle_mm = sections.process, sections.profile.machine.head.nozzle_mm
     processes = layer_processes(process, sections.on_platform, len(sections.outlines))
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
-    model = model_around(sections)
+    model = model_sections(sections)
     heights_mm = sections.heights.height_mm.tolist()
 
-    def walls_of(layer: int) -> CutWalls:
-        around, own = (sections.own[layer], model.sections[layer]), processes[layer]
-        return _settled(cut_walls(*around, own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=process.walls))
+    def walls_of(layer: int) -> tuple[Walls, tuple[Bead, ...], Polygons]:
+        own, usual = processes[layer], process.walls
+        return _settled(
+            *cut_walls(sections.own[layer], model[layer], own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=usual)
+        )
 
     walled = list(in_order(walls_of, len(processes), FEWEST_LAYERS))
-    covers = cover(model, sections.own, walled)
-    filled = regions([layer.walls.inside for layer in walled], covers, not sections.on_platform, process)
+    covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
+    filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process)
     bridges = bridges_of_layers(sections, overhangs, supports.areas)
-    around = sections.neighbours
-    ironed = ironed_areas(filled, [*around.beside, *around.above[:1]], process)
+    ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process)
     infill = with_line_width(process, process.infill_line_width_mm)
     return Shells(
         supports,
         [
-            Shell(own, layer.walls, layer.ending, region, spans, smooth)
-            for own, layer, region, spans, smooth in zip(processes, walled, filled, bridges, ironed, strict=True)
+            Shell(own, walls, ending, region, spans, smooth)
+            for own, (walls, ending, _), region, spans, smooth in zip(processes, walled, filled, bridges, ironed, strict=True)
         ],
         pattern_density([region.sparse for region in filled], infill, process.layer_height_mm),
     )
 
 
-def _settled(walled: CutWalls) -> CutWalls:
+def _settled(walls: Walls, ending: tuple[Bead, ...], model_inside: Polygons) -> tuple[Walls, tuple[Bead, ...], Polygons]:
     """The same whether another process has worked it out or this one."""
-    walls = replace(walled.walls, inside=settled(walled.walls.inside), narrow=settled(walled.walls.narrow))
-    inside = walls.inside if walled.model_inside is walled.walls.inside else settled(walled.model_inside)
-    return CutWalls(walls, walled.ending, inside)
+    rest = replace(walls, inside=settled(walls.inside), narrow=settled(walls.narrow))
+    return rest, ending, rest.inside if model_inside is walls.inside else settled(model_inside)
+
+
+def bridges_of_layers(
+    sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons]
+) -> list[tuple[Bridge, ...]]:
+    """The bridges of every layer: those that carry themselves, and what hangs over no support, as well as it can be.
+
+    Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
+    supported: where each layer's support is.
+    """
+    process, heights, outlines = sections.process, sections.heights, sections.outlines
+    bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
+    for i, overhang in enumerate(overhangs):
+        free, below = overhang.hanging + overhang.ledges, sections.below(i)
+        if free.is_empty() or below is None:
+            continue
+        drop_mm = float(heights.bottom_mm[i]) - process.support_gap_mm - 2.0 * process.layer_height_mm
+        lowest = int(np.searchsorted(heights.tip_mm, drop_mm))
+        held = union([area for area in supported[lowest:i] if not area.is_empty()])
+        held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
+        bare = opening(free - held, 0.25 * process.line_width_mm)
+        if not bare.is_empty():
+            slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
+            carrying = union([below if i else offset(below, RIM_MM), held, slopes])
+            anchors = edges(offset(carrying, 0.25 * process.line_width_mm))
+            bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
+    return bridges
 
 
 def layer_processes(process: Process, on_platform: bool, layers: int) -> list[Process]:
     """The settings of every layer: the first has widths of its own, and on plastic more walls, if it has any."""
     first = first_layer_process(process) if on_platform else interface_process(process)
     return [first if i == 0 else process for i in range(layers)]
+
+
+def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
+    """What a layer prints of the part itself, and for it; walls that run round come as loops, without their seams."""
+    return _simplified(_part_beads(shells, layer)), _simplified(_auxiliary_beads(shells, layer))
+
+
+def _simplified(beads: list[Bead]) -> list[Bead]:
+    return [bead if bead.kind in WALLS else simplify_bead(bead) for bead in beads]
+
+
+def _part_beads(shells: Shells, layer: int) -> list[Bead]:
+    shell, heights = shells.layers[layer], shells.sections.heights
+    process, region, height_mm = shell.process, shell.region, float(heights.height_mm[layer])
+    width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
+    lines = SolidLines(angle_of_layer_deg(process.infill_angle_deg, layer), width, height_mm, overlap)
+    beads = wall_beads(shell.walls, process, height_mm) + gaps(shell.walls.narrow, width, height_mm)
+    for bridge in shell.bridges:
+        area = bridge_area(bridge, shell.walls.inside, width)
+        if not area.is_empty():
+            beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
+            region = region.without(area, width)
+    if layer and process.infill_density < DENSE:
+        area = infill_bridge_area(region.solid, shells.layers[layer - 1].region.sparse, width)
+        if not area.is_empty():
+            beads += infill_bridge_beads(area, lines, process.infill_bridge_flow)
+            region = region.without(area, width)
+    beads += skin_beads(region.solid, Kind.SKIN, lines)
+    top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
+    beads += skin_beads(region.top, Kind.TOP_SKIN, top)
+    beads += ironing_beads(shell.ironed, lines, process)
+    sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
+    return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
+
+
+def _auxiliary_beads(shells: Shells, layer: int) -> list[Bead]:
+    """Support, pedestal, skirt and brim."""
+    sections, supports, process = shells.sections, shells.supports, shells.layers[layer].process
+    outline, height_mm = sections.outlines[layer], float(sections.heights.height_mm[layer])
+    on_plate = layer == 0 and sections.on_platform
+    support_process = with_line_width(process, process.support_line_width_mm)
+    beads = support_beads(supports.areas[layer], supports.dense[layer], support_process, height_mm, on_plate)
+    if layer < sections.pedestal_layers:
+        beads += pedestal_beads(outline, layer, sections.pedestal_layers, process, height_mm)
+    if on_plate:
+        top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in (sections.part, *sections.later))
+        footprint = union([outline, supports.areas[0]])
+        beads += brim(footprint, outline, sections.plate, process, top_mm=top_mm, height_mm=height_mm)
+    return beads

@@ -2,7 +2,7 @@
 
 Each value is made from the one before: the part's sections (slicer.sectioning), what of them overhangs (slicer.overhangs), the
 support that this needs (slicer.support.support; for all parts together slicer.support.handed_down), the shells of every
-layer (slicer.shells), its beads (slicer.layer_beads), and these in order, with speed and flow.
+layer and its beads (slicer.shells), and these in order, with speed and flow.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,16 +19,14 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
-from slicer.interface.interface import begin_inside, interface_edges, skin_beside
-from slicer.interface.interlock import fill_grooves
-from slicer.interface.pins import plan_pins, pour
-from slicer.interface.plastic import interface_mm3
-from slicer.layer_beads import lay_beads
+from slicer.interface.cut_faces import interface_mm3
+from slicer.interface.interface import skin_beside
+from slicer.interface.interlock import begin_inside, fill_grooves, fill_pins
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, Unsupported
 from slicer.sectioning import section_part
 from slicer.sections import Sections
-from slicer.shells import FEWEST_LAYERS, Shells, build_shells
+from slicer.shells import FEWEST_LAYERS, Shells, build_shells, lay_beads
 from slicer.strokes.order import order_beads
 from slicer.strokes.overhanging import split_overhangs
 from slicer.strokes.pieces import in_pieces
@@ -37,9 +35,8 @@ from slicer.strokes.seam_plan import plan_seams
 from slicer.strokes.speed import fan_share, first_layer_speeds, layer_time_s, own_fans, rising_fan, speeds_mm_s
 from slicer.strokes.vase import bottom_layers, vase_layers
 from slicer.strokes.wiping import may_wipe_over
-from slicer.support.reason import explain
+from slicer.support.missed import explain
 from slicer.support.support import Supports, own_supports
-from slicer.zones import no_seam_segments
 
 OnLayer = Callable[[int, int], None]
 
@@ -64,8 +61,7 @@ def slice_part(
     >>> [round(layer.z_mm, 3) for layer in slice_part(part, profile).layers]
     [0.2, 0.4, 0.6, 0.8, 1.0]
     """
-    pins = plan_pins((*earlier, part, *later), profile)
-    sections = section_part(part, profile, earlier, later, pins)
+    sections = section_part(part, profile, earlier, later)
     overhangs = find_overhangs(sections)
     return slice_supported(own_supports(sections, overhangs), overhangs, on_layer)
 
@@ -74,9 +70,9 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     """The layers of a part with the support planned for it, as slice_part."""
     shells = build_shells(supports, overhangs)
     sections, process = supports.sections, supports.sections.process
-    rear, edges = rear_of(sections.mesh.bounds_mm), interface_edges(sections)
-    unwanted = no_seam_segments(sections.part, sections.mesh, sections.heights.cut_mm)
-    limits = [seam_limits(edges, zone, z_mm, process) for zone, z_mm in zip(unwanted, sections.heights.cut_mm, strict=True)]
+    rear, edges = rear_of(sections.mesh.bounds_mm), sections.joints
+    rows = zip(sections.no_seam, sections.heights.cut_mm, strict=True)
+    limits = [seam_limits(edges, unwanted, z_mm, process) for unwanted, z_mm in rows]
     aligned = process.seam == "aligned" and process.walls > 0
     planned = plan_seams(sections, limits) if aligned else [NO_SEAMS] * len(limits)
     layers: list[Layer] = []
@@ -118,7 +114,9 @@ def _unsupported(supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupport
     """The places that got no support, with the numbers of the layers that print anything."""
     tops = np.array([layer.z_mm for layer in layers])
     count = np.searchsorted(tops, supports.sections.heights.tip_mm, side="right")
-    return tuple(replace(area, layer=int(count[area.layer])) for area in explain(supports))
+    return tuple(
+        replace(area, layer=int(count[area.layer])) for area in explain(supports.sections, supports.missed, supports.unwanted)
+    )
 
 
 def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
@@ -127,11 +125,11 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     profile, process, material, on_platform = sections.profile, sections.process, sections.profile.material, sections.on_platform
     outline, height_mm = sections.outlines[index], float(sections.heights.height_mm[index])
     if index == 0 and not on_platform:
-        beads = [*pour(sections.pins, profile, height_mm), *begin_inside(beads)]
+        beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
     strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
     strokes = split_overhangs(strokes, outline, sections.below(index), own)
     if index == 0 and not on_platform and process.interlock == "grooves":
-        strokes = fill_grooves(strokes, sections.part, process, height_mm)
+        strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
     fixed: Mapping[Kind, float] | None = None
     flow, fan, add_c = material.flow, 1.0, 0.0
     if not on_platform and index < process.interface_layers:

@@ -13,11 +13,14 @@ BOX_EDGES = tuple((a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) i
 
 
 def no_support_areas(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
-    """For each layer the sections of the boxes and the shadows of the faces, as they belong to it, that get no support.
+    """For each layer the sections of the boxes and the shadows of the faces, as they belong to it, that get no support; [] for a
+    part that may have some everywhere.
 
     mesh: the part's, in its frame; cuts_mm: the middles of the layers.
     """
     marked = part.no_support
+    if not marked.anywhere:
+        return []
     named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))
     boxes = [box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm) for box in marked.boxes]
     layers = []

@@ -25,7 +25,6 @@ CONFINED = {
         "mdp/formats/polygons",
         "slicer/geometry/",
         "slicer/interface/interlock",
-        "slicer/interface/pins",
         "machine/kinematics/collision",
         "machine/app/pipeline/precompile",
         "machine/calibration/coupon/",

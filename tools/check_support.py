@@ -20,7 +20,7 @@ from profiles.profile import Profile, load
 from slicer.overhangs import find_overhangs
 from slicer.sectioning import section_part
 from slicer.support.handed_down import plan_supports
-from slicer.support.reason import explain
+from slicer.support.missed import explain
 from slicer.support.support import Supports, own_supports
 
 HEAD = (
@@ -63,13 +63,13 @@ def row(file: Path, profile: Profile) -> str:
         planned = plan_supports(own)
     except UserError as error:
         return f"| {file.name} | {error} |"
-    needs_mm2 = sum(supports.wanted_mm2 for supports in own)
+    needs_mm2 = sum(area.area() for supports in own for area in supports.wanted)
     left_mm2 = [sum(supports.unsupported_mm2 for supports in several) for several in (own, planned)]
     volumes = [_mm3(several, profile) for several in (own, planned)]
     why = [
         f"part {part.index} layer {area.layer + 1}: {area.mm2:.1f} mm2, {area.reason}"
         for part, supports in zip(parts, planned, strict=True)
-        for area in explain(supports)
+        for area in explain(supports.sections, supports.missed, supports.unwanted)
     ]
     cells = [file.name, len(parts), f"{needs_mm2:.1f}", *(f"{mm2:.1f}" for mm2 in left_mm2)]
     cells += [f"{left_mm2[1] / max(needs_mm2, 1e-9):.4f}", *(f"{mm3:.0f}" for mm3 in volumes)]

@@ -21,7 +21,7 @@ from slicer.geometry.polygons import contours, offset
 from slicer.paths import Kind, bead_area_mm2
 from slicer.strokes.speed import axes_mm_s2, first_layer_speeds, travel_mm_s2
 from slicer.strokes.vase import vase_profile
-from slicer.support.pedestal import DENSITY, ROOF_LAYERS
+from slicer.support.beads import PEDESTAL_DENSITY, ROOF_LAYERS
 from slicer.walls.brim import brim
 
 # Fitted to dry runs with the standard profiles: 12 models in one piece and in four parts; the hops, 28 prints of 20 models.
@@ -118,7 +118,7 @@ def _pedestal_strokes(part: SampledPart, layer: int, speeds: LayerSpeeds) -> lis
     closed = layer == 0 or layer >= part.pedestal - ROOF_LAYERS
     strokes = loop_strokes(Kind.SUPPORT, contours(offset(outline, -0.5 * width)), bead_mm2, 0.0, speeds)
     inside = extent_of(offset(outline, -width))
-    density, angle = 1.0 if closed else DENSITY, process.infill_angle_deg
+    density, angle = 1.0 if closed else PEDESTAL_DENSITY, process.infill_angle_deg
     return strokes + line_strokes(Kind.SUPPORT, inside, speeds, density=density, width_mm=width, angle_deg=angle)
 
 

@@ -15,8 +15,9 @@ from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, offset
 from slicer.heights import Heights
 from slicer.overhangs import find_overhangs
-from slicer.sections import Neighbours, Sections
+from slicer.sections import Sections
 from slicer.support.support import own_supports
+from slicer.zones import no_support_areas
 
 LAYERS = 50  # thick layers at most, and one above what hangs: on thin limbs 40 lost up to 0.3 of the support that 60 find
 COARSE_MM = 0.05  # sections are simplified by this
@@ -63,9 +64,10 @@ def thick_support(part: Part, heights: Heights, profile: Profile, plate: Polygon
         outlines=outlines,
         own=outlines,
         ungrooved=outlines,
-        neighbours=Neighbours([Polygons()] * len(outlines)),
+        beside=[Polygons()] * len(outlines),
         plastic_below=None if on_platform else outlines[0],
         plate=plate,
+        no_support=no_support_areas(part, mesh, thick.cut_mm),
     )
     supports = own_supports(sections, find_overhangs(sections))
     areas, contacts = tuple(map(extent_of, supports.areas)), tuple(map(extent_of, supports.dense))

@@ -91,6 +91,11 @@ def union(several: Sequence[Polygons]) -> Polygons:
     return Polygons.batch_boolean(list(several), OpType.Add) if several else Polygons()
 
 
+def unite_layers(some: Sequence[Polygons], others: Sequence[Polygons]) -> list[Polygons]:
+    """What lies in either of two polygons, layer by layer."""
+    return [union(pair) for pair in zip(some, others, strict=True)]
+
+
 def islands(polygons: Polygons) -> list[Polygons]:
     """The connected pieces, each with its holes.
 

@@ -1,18 +1,51 @@
-"""Base plane: that of a later part as the layers of an earlier part see it: places near it, places carried across."""
+"""Base plane: that of a later part as the layers of an earlier part see it: places near it, places carried across.
 
+That of a limb, beside which earlier parts stand above it, counts only near the limb.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
+from mdp.cut import solid_of
+from mdp.decomposition import Part
 from mdp.mesh import Floats
-from slicer.geometry.polygons import Polygons, contours, offset_round
+from slicer.geometry.polygons import Polygons, contours, offset, offset_round
 from slicer.heights import Heights
 from slicer.interface.interface import frame_change
-from slicer.interface.limb import room_of
-from slicer.sections import Sections
 
 LEVEL = 1e-9  # a plane whose normal is nearer to upright than this meets a layer nowhere or everywhere
 LEAST_COSINE = 0.05  # a plane that stands steeper is taken to lean so much: shadows on it stay finite
+AROUND_MM = 5.0  # support of a limb stays within this distance of its shadow
+COARSE_MM = 0.05  # tolerance to which a shadow is simplified
+PLACES_KEPT = 64
+
+
+def plane_in_frame_of(part: Part, normal: Floats, offset_mm: float) -> Floats:
+    """(4,) normal and offset of a plane of the workpiece frame in the frame of a part."""
+    turned = part.rotation @ normal
+    return np.array([*turned, offset_mm - turned[2] * part.base.offset_mm])
+
+
+@lru_cache(PLACES_KEPT)
+def shadow_of(limb: Part) -> Polygons:
+    """The outline of a limb seen along its direction, in its frame."""
+    return solid_of(limb.in_part_frame()).project().simplify(COARSE_MM)
+
+
+@lru_cache(PLACES_KEPT)
+def room_of(limb: Part) -> Polygons:
+    """The area of a limb's base plane over which it and its support are printed."""
+    return offset_round(shadow_of(limb), AROUND_MM)
+
+
+def limb_planes(part: Part, later: Sequence[Part], heights: Heights, beside_mm: float) -> dict[int, "BasePlane"]:
+    """The base planes of later limbs by part index, each as far as that beside its limb."""
+    limbs = [upper for upper in later if upper.base.limbs_mm is not None]
+    far_mm = 2.0 * float(np.linalg.norm(part.in_part_frame().vertices, axis=1).max()) if limbs else 0.0
+    return {limb.index: BasePlane.of(part, limb, heights, far_mm, offset(shadow_of(limb), beside_mm)) for limb in limbs}
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +64,11 @@ class BasePlane:
     places: Polygons | None = None
 
     @classmethod
-    def seen_from(cls, earlier: Sections, later: Sections, far_mm: float) -> "BasePlane":
-        """The base plane of a later part, as far as it or its support is printed over it."""
-        places = None if later.part.base.limbs_mm is None else room_of(later.part)
-        return cls(*frame_change(earlier.part, later.part), earlier.heights, far_mm, places)
+    def of(cls, earlier: Part, later: Part, heights: Heights, far_mm: float, places: Polygons | None = None) -> "BasePlane":
+        """The base plane of a later part, as far as it or its support is printed over it unless other places are given."""
+        if places is None and later.base.limbs_mm is not None:
+            places = room_of(later)
+        return cls(*frame_change(earlier, later), heights, far_mm, places)
 
     @property
     def cosine(self) -> float:

@@ -1,23 +1,28 @@
 """Interface: what a part finds beneath and beside it, in its own frame."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from profiles.process import Process
-from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead, outer_wall_width_mm
+from slicer.bead import outer_wall_width_mm
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, offset, union
 from slicer.geometry.segments import near_height
-from slicer.paths import Kind
-from slicer.sections import Sections
 
 SKIN = 0.8  # line widths inside the section from where on a tip is off the outer wall, whose middle lies at 0.5
 SIDES = 32  # of what is round about an edge
-BELOW_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
+BELOW_MM = 0.02  # from a base plane to the section that stands for the cut face in it, of the parts on either side
+BASES_KEPT = 64
+
+
+@lru_cache(BASES_KEPT)
+def base_section(part: Part) -> Polygons:
+    """The face with which a part stands on its base plane, in its frame."""
+    return clean(cross_sections(part.in_part_frame(), np.array([BELOW_MM]))[0])
 
 
 def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:
@@ -31,19 +36,20 @@ def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Pol
 
 def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Polygons]:
     """For every height in the part's frame the sections of other parts together."""
-    layers = [[clean(loops) for loops in cross_sections(_mesh_in_frame_of(part, neighbour), cuts_mm)] for neighbour in others]
+    layers = [[clean(loops) for loops in cross_sections(in_frame_of(part, neighbour), cuts_mm)] for neighbour in others]
     return [union(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
 
 
-def touching(part: Part, others: Sequence[Part], reach_mm: float) -> list[Part]:
+def near_parts(part: Part, others: Sequence[Part], reach_mm: float) -> list[Part]:
     """Those of other parts whose box, in the part's frame, comes as near to its own as that."""
     low, high = part.in_part_frame().bounds_mm
-    boxes = [_mesh_in_frame_of(part, neighbour).bounds_mm for neighbour in others]
+    boxes = [in_frame_of(part, neighbour).bounds_mm for neighbour in others]
     near = [bool(np.all((box[0] < high + reach_mm) & (box[1] > low - reach_mm))) for box in boxes]
     return [neighbour for neighbour, is_near in zip(others, near, strict=True) if is_near]
 
 
-def _mesh_in_frame_of(part: Part, neighbour: Part) -> Mesh:
+def in_frame_of(part: Part, neighbour: Part) -> Mesh:
+    """The mesh of a neighbour in the frame of a part."""
     return neighbour.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
 
 
@@ -53,33 +59,14 @@ def frame_change(part: Part, to: Part) -> tuple[Floats, Floats]:
     return turn, turn[:, 2] * part.base.offset_mm - np.array([0.0, 0.0, to.base.offset_mm])
 
 
-def plane_in_frame_of(part: Part, normal: Floats, offset_mm: float) -> Floats:
-    """(4,) normal and offset of a plane of the workpiece frame in the frame of a part."""
-    turned = part.rotation @ normal
-    return np.array([*turned, offset_mm - turned[2] * part.base.offset_mm])
+def joints(part: Part, later: Sequence[Part], section: Polygons, below: Polygons | None) -> Floats:
+    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface.
 
-
-def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
-    """The beads of a first layer on plastic, what fills its walls before them: outer walls are laid last, against beads that are
-    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up
-    for there, not where a wall has its seam.
+    section: of its first layer; below: the plastic under it, None on the platform.
     """
-    inside = [replace(bead, rank=BEFORE_WALLS) if FILL <= bead.rank <= LAST else bead for bead in beads]
-    if any(bead.rank <= OUTSIDE for bead in inside):
-        return inside
-    for kind in (Kind.INFILL, Kind.SKIN):
-        longest = max((bead for bead in inside if bead.kind is kind), key=lambda bead: bead.length_mm, default=None)
-        if longest is not None:
-            return [replace(longest, rank=OUTSIDE), *(bead for bead in inside if bead is not longest)]
-    return inside
-
-
-def interface_edges(sections: Sections) -> Floats:
-    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface."""
-    part, below = sections.part, sections.plastic_below
-    rims = [] if below is None else [np.insert(loop, 2, 0.0, axis=1) for loop in contours(sections.outlines[0] ^ below)]
-    for upper in sections.later:
-        for loop in contours(clean(cross_sections(upper.in_part_frame(), np.array([BELOW_MM]))[0])):
+    rims = [] if below is None else [np.insert(loop, 2, 0.0, axis=1) for loop in contours(section ^ below)]
+    for upper in later:
+        for loop in contours(base_section(upper)):
             placed = np.insert(loop, 2, upper.base.offset_mm, axis=1) @ upper.rotation
             rims.append(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm]))
     segments = [np.hstack([rim, np.roll(rim, -1, axis=0)]) for rim in rims]
@@ -101,9 +88,8 @@ def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
     rise = near[:, 5] - near[:, 2]
     level = np.abs(rise) < 1e-9
     at = (z_mm - near[:, 2] + reach_mm * np.array([[-1.0], [1.0]])) / np.where(level, 1.0, rise)
-    begin, end = (
-        near[:, :3] + share[:, None] * (near[:, 3:] - near[:, :3]) for share in np.where(level, [[0], [1]], _clipped(at))
-    )
+    shares: Floats = np.where(level, [[0.0], [1.0]], np.sort(at, axis=0).clip(0.0, 1.0))  # in order, and within the segments
+    begin, end = (near[:, :3] + share[:, None] * (near[:, 3:] - near[:, :3]) for share in shares)
     heights = np.array([begin[:, 2], end[:, 2]]) - z_mm
     least = np.where(heights.prod(axis=0) < 0.0, 0.0, np.abs(heights).min(axis=0))
     reaches = np.sqrt(np.maximum(reach_mm**2 - least**2, 0.0))
@@ -114,9 +100,3 @@ def _around(begin: Floats, end: Floats, reach_mm: float) -> Polygons:
     """What lies as near as that to a segment seen from above."""
     disc = Polygons.circle(reach_mm, SIDES)
     return Polygons.batch_hull([disc.translate((float(x), float(y))) for x, y in (begin[:2], end[:2])])
-
-
-def _clipped(shares: Floats) -> Floats:
-    """(2, n) shares of segments in order, within them."""
-    inside: Floats = np.sort(shares, axis=0).clip(0.0, 1.0)
-    return inside

@@ -1,4 +1,9 @@
-"""Support beads: outlines, sparse lines that stand on each other, dense lines next to the part."""
+"""Support beads: outlines, sparse lines that stand on each other, dense lines next to the part; and those of a pedestal.
+
+A pedestal lifts a model off the platform. It is printed like a raft, sparse under a closed roof, and breaks away: the roof ends a
+small gap below the model's first layer, which is printed at its own height: it bonds to the roof only here and there, enough to
+hold the model upright and tilted, and comes off by hand.
+"""
 
 from collections.abc import Sequence
 
@@ -6,10 +11,13 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import OUTSIDE, Bead, spacing_mm
 from slicer.fill.pattern import zigzag_lines
+from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset, opening
 from slicer.paths import Kind
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
+ROOF_LAYERS = 3  # of a pedestal: the first of them sags between the sparse lines, the last one is even
+PEDESTAL_DENSITY = 0.25  # of its inside: lines near enough for the roof to span, as a raft's base
 SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it
 
 
@@ -57,3 +65,18 @@ def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process:
     joined = offset(area, -0.25 * width)
     lines = [line for angle_deg in angles_deg for line in zigzag_lines(inner, joined, angle_deg, apart, JOIN * apart)]
     return lines if lines or process.support_walls else [close_loop(loop) for loop in contours(inner)]
+
+
+def pedestal_beads(outline: Polygons, layer: int, layers: int, process: Process, height_mm: float) -> list[Bead]:
+    """One layer of the pedestal: a wall, sparse crossing lines, closed at the platform and at the roof."""
+    width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
+    beads = [Bead(Kind.SUPPORT, close_loop(loop), width, OUTSIDE) for loop in contours(offset(outline, -0.5 * width))]
+    inside = offset(outline, -0.5 * (width + spacing))
+    angle = process.infill_angle_deg + 90.0 * (layer % 2)
+    if layer == 0 or layer >= layers - ROOF_LAYERS:
+        kind = Kind.SUPPORT if layer == 0 else Kind.SUPPORT_INTERFACE
+        lines = skin_beads(inside, kind, SolidLines(angle, width, height_mm, process.infill_overlap))
+        return beads + [Bead(kind, line.points, width, OUTSIDE, line.flow) for line in lines]
+    inner, apart = offset(inside, -0.5 * spacing), spacing / PEDESTAL_DENSITY
+    sparse = zigzag_lines(inner, offset(inside, -0.25 * width), angle, apart, JOIN * apart)
+    return beads + [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in sparse]

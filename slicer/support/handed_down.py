@@ -2,7 +2,7 @@
 
 Every place over the platform lies above the base plane of some part and below those of all later ones (that of a limb counts
 beside the limb alone): there is just one part with which support can be printed there. So what a part's own support misses is
-handed down in three passes: upward, where support of each part may stand if that of the parts before it may (Room); downward,
+handed down in three passes: upward, where support of each part may stand if that of the parts before it may; downward,
 from the last part to the first, the support itself, whose feet on a base plane become patches for the parts before (HandedDown);
 and upward again, what of it stands on what was really built.
 """
@@ -15,15 +15,17 @@ import numpy as np
 
 from mdp.mesh import Floats
 from mdp.pose import shift
-from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union
+from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union, unite_layers
+from slicer.heights import Heights
 from slicer.interface.base_plane import BasePlane
-from slicer.interface.interface import frame_change
+from slicer.interface.interface import frame_change, sections_of
 from slicer.overhangs import LEAST_MM2
 from slicer.sections import Sections
 from slicer.support.blocker import blocked_areas, near_table, support_reach_mm
 from slicer.support.missed import find_missed
 from slicer.support.reachable import ReachableAreas, reachable_areas
-from slicer.support.support import Grown, Supports, grow, stand, widen_foot
+from slicer.support.support import Supports, grow, stand, widen_foot
+from slicer.zones import no_seam_segments, no_support_areas
 
 AROUND_MM = 3.0  # support handed down may go so much farther aside than its lean takes it
 SHALLOW_MM = 1.2  # so far below a plane the middles of support that can come up to it lie
@@ -77,12 +79,13 @@ def upper_side(areas: Sequence[Polygons], plane: BasePlane, window: Polygons, de
 
 
 @dataclass(frozen=True, eq=False)
-class Room:
-    """Where handed-down support of a part may be.
+class HandedDown:
+    """Support that is printed with a part because no other can carry it.
 
     sections: as high as it is of use; window: the places of the base plane that matter and that the axes reach; areas: of
     the sections inside the box that matters; shut: where nothing may stand in the first layer; far_mm: how far from the origin
-    of the frame support reaches at most.
+    of the frame support reaches at most. bodies, contacts: of every layer what has grown, and where it begins; patches: what of
+    it needs support below its base. There are none of them as long as only the room for it is known.
     """
 
     sections: Sections
@@ -90,15 +93,13 @@ class Room:
     areas: ReachableAreas
     shut: Polygons
     far_mm: float
+    bodies: Sequence[Polygons] = ()
+    contacts: Sequence[Polygons] = ()
+    patches: Sequence[Patch] = ()
 
-
-@dataclass(frozen=True, eq=False)
-class HandedDown:
-    """Support that is printed with a part because no other can carry it; patches: what of it needs support below its base."""
-
-    room: Room
-    grown: Grown
-    patches: Sequence[Patch]
+    def plane_of(self, later: Sections) -> BasePlane:
+        """The base plane of a later part as the part sees it."""
+        return BasePlane.of(self.sections.part, later.part, self.sections.heights, self.far_mm)
 
 
 def plan_supports(own: Sequence[Supports]) -> list[Supports]:
@@ -106,17 +107,18 @@ def plan_supports(own: Sequence[Supports]) -> list[Supports]:
     planned = list(own)
     if all(supports.unsupported_mm2 == 0.0 for supports in own[1:]):
         return planned
-    rooms = _rooms(own)
-    handed: dict[int, HandedDown] = {}
-    for k in sorted(rooms, reverse=True):
-        handed[k] = _hand_down(rooms[k], own[k], [handed[m] for m in sorted(handed)])
+    handed: dict[int, HandedDown] = {}  # by its part's place in the print order
+    for k, (box, top_mm) in _extents(own).items():
+        handed[k] = _room(up_to(own[k].sections, top_mm), box, top_mm, list(handed.values()))
+    for k in sorted(handed, reverse=True):
+        handed[k] = _hand_down(handed[k], own[k].missed, [handed[m] for m in sorted(handed) if m > k])
     for k in sorted(handed):
         planned[k] = _stand(handed[k], own[k], planned[:k])
     return planned
 
 
-def _extents(own: Sequence[Supports]) -> list[tuple[Floats, float]]:
-    """For every part the box x0 y0 x1 y1 of its base plane that handed-down support may need, and up to which height."""
+def _extents(own: Sequence[Supports]) -> dict[int, tuple[Polygons, float]]:
+    """The box of its base plane that handed-down support may need, and up to which height, of every part that may have any."""
     lean = tan(radians(max(supports.sections.process.support_branch_angle_deg for supports in own)))
     boxes = [np.array([np.inf, np.inf, -np.inf, -np.inf]) for _ in own]
     tops = [0.0] * len(own)
@@ -135,36 +137,50 @@ def _extents(own: Sequence[Supports]) -> list[tuple[Floats, float]]:
         for m in range(k if x0 < x1 else 0):
             turn, moved = frame_change(own[m].sections.part, own[k].sections.part)
             corners = (np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]]) - moved) @ turn
-            top_mm = min(float(corners[:, 2].max()), _highest_mm(own, m))
+            part = own[m].sections.part
+            highest_mm = max(float((other.sections.part.mesh.vertices @ part.direction).max()) for other in own[m:])
+            top_mm = min(float(corners[:, 2].max()), highest_mm - part.base.offset_mm)
             if top_mm > 0.0:
                 take(m, corners[:, :2].min(axis=0), corners[:, :2].max(axis=0), top_mm)
-    return list(zip(boxes, tops, strict=True))
+    some = [k for k, (x0, _, x1, _) in enumerate(boxes) if x0 < x1 and own[k].sections.process.support != "none"]
+    squares = {k: Polygons.square(tuple(boxes[k][2:] - boxes[k][:2])).translate(tuple(boxes[k][:2])) for k in some}
+    return {k: (square, tops[k]) for k, square in squares.items()}
 
 
-def _highest_mm(own: Sequence[Supports], k: int) -> float:
-    """How high the parts from part k on reach along its direction."""
-    part = own[k].sections.part
-    return max(float((supports.sections.part.mesh.vertices @ part.direction).max()) for supports in own[k:]) - part.base.offset_mm
+def up_to(sections: Sections, top_mm: float) -> Sections:
+    """The sections with empty layers on top as far as that height."""
+    tip_mm, height_mm = sections.heights.tip_mm, sections.process.layer_height_mm
+    count = int(np.ceil((top_mm - tip_mm[-1]) / height_mm - 1e-9))
+    if count <= 0:
+        return sections
+    tips_mm = tip_mm[-1] + height_mm * np.arange(1, count + 1)
+    more, empty = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm), [Polygons()] * count
+    higher = [*sections.beside, *sections.above, *empty]  # the added layers are at the heights of `above`
+    known, end = len(sections.above), len(sections.beside) + count
+    part, heights = sections.part, sections.heights + more
+    return replace(
+        sections,
+        heights=heights,
+        outlines=[*sections.outlines, *empty],
+        own=[*sections.own, *empty],
+        ungrooved=[*sections.ungrooved, *empty],
+        beside=higher[:end],
+        above=higher[end : end + known],
+        standing=[*sections.standing, *sections_of(sections.earlier, part, more.cut_mm)] if sections.standing else (),
+        no_seam=no_seam_segments(part, sections.mesh, heights.cut_mm),
+        no_support=no_support_areas(part, sections.mesh, heights.cut_mm),
+    )
 
 
-def _rooms(own: Sequence[Supports]) -> dict[int, Room]:
-    """The room of every part with which support may be handed down, by its place in the print order."""
-    rooms: dict[int, Room] = {}
-    for k, ((x0, y0, x1, y1), top_mm) in enumerate(_extents(own)):
-        if x0 < x1 and own[k].sections.process.support != "none":
-            box = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
-            rooms[k] = _room(own[k].sections.up_to(top_mm), box, top_mm, list(rooms.values()))
-    return rooms
-
-
-def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[Room]) -> Room:
+def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[HandedDown]) -> HandedDown:
     """Where support of a part may stand if that of earlier parts may."""
     window = box ^ _within_axes(sections)
     count = max(min(int(np.searchsorted(sections.heights.bottom_mm, top_mm)), len(sections.outlines)), 1)
-    low, far_mm = sections.heights[:count], _reach_mm(sections, box)
-    blocked = blocked_areas(sections, low, 0.0, far_mm)
+    x0, y0, x1, y1 = box.bounds()
+    far_mm = max(support_reach_mm(sections), 2.0 * hypot(max(abs(x0), abs(x1)), max(abs(y0), abs(y1))) + AROUND_MM)
+    blocked = blocked_areas(sections, count, 0.0, far_mm)
     if not sections.on_platform:
-        blocked = _united(blocked, near_table(sections, low, far_mm))
+        blocked = unite_layers(blocked, near_table(sections, sections.heights[:count], far_mm))
     outside = offset(box, AROUND_MM) - window
     blocked = [union([layer, outside]) for layer in blocked] if outside.area() > 4.0 * AROUND_MM**2 else blocked
     near = replace(
@@ -173,8 +189,8 @@ def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[Ro
         plastic_below=None if sections.plastic_below is None else sections.plastic_below ^ box,
         plate=sections.plate ^ window,
     )
-    handed = union([_reached(room, sections, window) for room in earlier])
-    return Room(sections, window, reachable_areas(near, blocked, handed), blocked[0], far_mm)
+    reached = [upper_side(room.areas.reachable, room.plane_of(sections), window, SHALLOW_MM) for room in earlier]
+    return HandedDown(sections, window, reachable_areas(near, blocked, union(reached)), blocked[0], far_mm)
 
 
 def _within_axes(sections: Sections) -> Polygons:
@@ -185,36 +201,24 @@ def _within_axes(sections: Sections) -> Polygons:
     return Polygons.square((x[1] - x[0], y[1] - y[0])).translate((x[0], y[0]))
 
 
-def _reach_mm(sections: Sections, box: Polygons) -> float:
-    """A distance from the origin that no support of a part ever reaches, be it handed down."""
-    x0, y0, x1, y1 = box.bounds()
-    return max(support_reach_mm(sections), 2.0 * hypot(max(abs(x0), abs(x1)), max(abs(y0), abs(y1))) + AROUND_MM)
-
-
-def _reached(room: Room, later: Sections, window: Polygons) -> Polygons:
-    """The places on a later part's base plane that support of a part can come up to."""
-    return upper_side(room.areas.reachable, BasePlane.seen_from(room.sections, later, room.far_mm), window, SHALLOW_MM)
-
-
-def _hand_down(room: Room, own: Supports, later: Sequence[HandedDown]) -> HandedDown:
+def _hand_down(room: HandedDown, missed: Sequence[Polygons], later: Sequence[HandedDown]) -> HandedDown:
     """The support that a part's own misses, and that later parts ask for."""
     sections, areas = room.sections, room.areas
-    planes = [BasePlane.seen_from(sections, upper.room.sections, room.far_mm) for upper in later]
+    planes = [room.plane_of(upper.sections) for upper in later]
     begins: dict[int, list[Polygons]] = {}
     for plane, upper in zip(planes, later, strict=True):
         for patch in upper.patches:
             for layer, area in patch.begins(plane, len(areas.reachable)).items():
                 begins.setdefault(layer, []).append(area)
-    wanted = [Polygons()] * len(own.missed) if sections.on_platform else own.missed
-    grown = grow(wanted, {layer: union(places) for layer, places in begins.items()}, areas)
-    bodies = grown.bodies
+    wanted = [Polygons()] * len(missed) if sections.on_platform else missed
+    bodies, contacts = grow(wanted, {layer: union(places) for layer, places in begins.items()}, areas)
     for plane, upper in zip(planes, later, strict=True):
         bodies = keep_off(bodies, upper.patches, plane, sections.process.support_distance_mm)
-    grown = replace(grown, bodies=bodies)
-    return HandedDown(room, grown, () if sections.on_platform else _patches(room, bodies, wanted))
+    patches = () if sections.on_platform else _patches(room, bodies, wanted)
+    return replace(room, bodies=bodies, contacts=contacts, patches=patches)
 
 
-def _patches(room: Room, bodies: Sequence[Polygons], wanted: Sequence[Polygons]) -> list[Patch]:
+def _patches(room: HandedDown, bodies: Sequence[Polygons], wanted: Sequence[Polygons]) -> list[Patch]:
     """The area by which a part and its support hang over its base plane."""
     patches = [Patch(area, _gap_mm(room.areas, layer)) for layer, area in _hanging_low(room.areas, wanted)]
     if bodies and not bodies[0].is_empty():
@@ -224,32 +228,32 @@ def _patches(room: Room, bodies: Sequence[Polygons], wanted: Sequence[Polygons])
 
 def _hanging_low(areas: ReachableAreas, wanted: Sequence[Polygons]) -> list[tuple[int, Polygons]]:
     """The hanging places that support above the base plane has no room under, with their layers."""
-    low = enumerate(wanted[: int(np.searchsorted(areas.bottom_mm, areas.process.support_gap_mm + 1.0))])
+    low = enumerate(wanted[: int(np.searchsorted(areas.heights.bottom_mm, areas.process.support_gap_mm + 1.0))])
     return [(k, area) for k, area in low if not area.is_empty() and not len(areas.carrying_layers(k))]
 
 
 def _gap_mm(areas: ReachableAreas, layer: int) -> float:
     """How far below the base plane support under a layer ends."""
-    return max(areas.process.support_gap_mm - max(float(areas.bottom_mm[layer]), 0.0), 0.0)
+    return max(areas.process.support_gap_mm - max(float(areas.heights.bottom_mm[layer]), 0.0), 0.0)
 
 
-def _own_placeable(room: Room) -> Polygons:
+def _own_placeable(room: HandedDown) -> Polygons:
     """Where support stands on plastic without a gap."""
     process, below = room.areas.process, room.sections.plastic_below
     return Polygons() if below is None or process.support_bottom_gap_mm > 0.0 else offset(below, process.line_width_mm)
 
 
-def _stand(handed: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supports:
+def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supports:
     """A part's support with what of the handed-down one stands; earlier: what was built before it."""
-    room, sections = handed.room, handed.room.sections
-    areas, process, whole = room.areas, room.areas.process, replace(room.areas, sections=sections)
+    sections, areas, process = room.sections, room.areas, room.areas.process
+    whole = replace(areas, sections=sections)
     if not sections.on_platform:
         held = offset(_held(room, earlier, 0.0), 0.5 * areas.radius_mm)
         areas = replace(areas, placeable=(union([held, _own_placeable(room)]), *areas.placeable[1:]))
     count = len(sections.outlines)
-    printed, dense = (_padded(places, count) for places in stand(handed.grown, areas))
+    printed, dense = (_padded(places, count) for places in stand(room.bodies, room.contacts, areas))
     wanted, missed, unwanted = (_padded(places, count) for places in (own.wanted, own.missed, own.unwanted))
-    both = _united(printed, _padded(own.areas, count))
+    both = unite_layers(printed, _padded(own.areas, count))
     if sections.on_platform:
         foot = widen_foot(printed[0], whole, (room.window ^ sections.plate) - room.shut)
         both[0] = union([both[0], foot])
@@ -259,7 +263,7 @@ def _stand(handed: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Su
         for layer, _ in low:
             held = _held(room, earlier, _gap_mm(areas, layer))
             missed[layer] = missed[layer] - offset(held, 0.5 * process.line_width_mm)
-    return Supports(sections, both, _united(dense, _padded(own.dense, count)), wanted, missed, unwanted)
+    return Supports(sections, both, unite_layers(dense, _padded(own.dense, count)), wanted, missed, unwanted)
 
 
 def _padded(places: Sequence[Polygons], count: int) -> list[Polygons]:
@@ -267,12 +271,10 @@ def _padded(places: Sequence[Polygons], count: int) -> list[Polygons]:
     return [*places, *[Polygons()] * (count - len(places))]
 
 
-def _united(places: Sequence[Polygons], others: Sequence[Polygons]) -> list[Polygons]:
-    return [union(pair) for pair in zip(places, others, strict=True)]
-
-
-def _held(room: Room, earlier: Sequence[Supports], gap_mm: float) -> Polygons:
+def _held(room: HandedDown, earlier: Sequence[Supports], gap_mm: float) -> Polygons:
     """The places on a part's base plane that have support of earlier parts gap_mm beneath them."""
-    planes = [BasePlane.seen_from(supports.sections, room.sections, room.far_mm) for supports in earlier]
-    pairs = zip(earlier, planes, strict=True)
-    return union([upper_side(supports.areas, plane, room.window, gap_mm + NEAR_MM) for supports, plane in pairs])
+    later, held = room.sections.part, []
+    for supports in earlier:
+        plane = BasePlane.of(supports.sections.part, later, supports.sections.heights, room.far_mm)
+        held.append(upper_side(supports.areas, plane, room.window, gap_mm + NEAR_MM))
+    return union(held)

@@ -14,6 +14,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, offset, offset_round, union
+from slicer.heights import Heights
 from slicer.sections import Sections
 
 COARSE_MM = 0.03  # sections are simplified by this before they are grown
@@ -57,34 +58,29 @@ class ReachableAreas:
         return self.process.line_width_mm
 
     @property
-    def top_mm(self) -> Floats:
-        """(n,) upper sides of all layers of the part."""
-        return self.sections.heights.tip_mm
-
-    @property
-    def bottom_mm(self) -> Floats:
-        """(n,) lower sides of all layers of the part."""
-        return self.sections.heights.bottom_mm
+    def heights(self) -> Heights:
+        """Those of all layers of the part."""
+        return self.sections.heights
 
     def carrying_layers(self, layer: int) -> range:
         """The layers, from the highest down, on which what hangs in a layer may rest.
 
         The distance across keeps support as much lower under a slope that is just too flat.
         """
-        process, drop_mm = self.process, float(self.bottom_mm[layer]) - self.process.support_gap_mm
+        process, drop_mm = self.process, float(self.heights.bottom_mm[layer]) - self.process.support_gap_mm
         slack_mm = process.support_distance_mm / max(tan(radians(process.self_supporting_angle_deg)), 0.5)
-        highest = int(np.searchsorted(self.top_mm, drop_mm + EVEN_MM, side="right")) - 1
-        lowest = int(np.searchsorted(self.top_mm, drop_mm - slack_mm - EVEN_MM))
+        highest = int(np.searchsorted(self.heights.tip_mm, drop_mm + EVEN_MM, side="right")) - 1
+        lowest = int(np.searchsorted(self.heights.tip_mm, drop_mm - slack_mm - EVEN_MM))
         return range(highest, min(lowest, highest) - 1, -1) if highest >= 0 else range(0)
 
     def next_above(self, layer: int) -> int:
         """The first layer over one that support in it keeps no gap to."""
-        return int(np.searchsorted(self.bottom_mm, self.top_mm[layer] + self.process.support_gap_mm - EVEN_MM))
+        return int(np.searchsorted(self.heights.bottom_mm, self.heights.tip_mm[layer] + self.process.support_gap_mm - EVEN_MM))
 
     def next_below(self, layer: int) -> int:
         """How many layers lie so far under one that support in it may stand on them."""
-        drop_mm = self.bottom_mm[layer] - self.process.support_bottom_gap_mm
-        return min(int(np.searchsorted(self.top_mm, drop_mm + EVEN_MM, side="right")), layer)
+        drop_mm = self.heights.bottom_mm[layer] - self.process.support_bottom_gap_mm
+        return min(int(np.searchsorted(self.heights.tip_mm, drop_mm + EVEN_MM, side="right")), layer)
 
 
 def dilate(area: Polygons, distance_mm: float) -> Polygons:
@@ -98,11 +94,6 @@ def widen(area: Polygons, distance_mm: float) -> Polygons:
     What is grown layer after layer must not get round corners: each of them would be two in the next layer.
     """
     return offset(area, distance_mm, WIDEST)
-
-
-def only_slivers(places: Polygons) -> bool:
-    """Whether the places are nothing but slivers."""
-    return bool(places.area() < SPECK_MM2 or offset(places, -SLIVER_MM).is_empty())
 
 
 def drop_slivers(places: Polygons) -> Polygons:
@@ -143,7 +134,7 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
     plain = [s if s.is_empty() else s.simplify(COARSE_MM) for s in sections.outlines[:highest]]
     wide = [s if s.is_empty() else offset(s, radius + MARGIN_MM) for s in plain]
     tall = [s if s.is_empty() else offset(s, radius + process.support_distance_mm + MARGIN_MM) for s in plain[:count]]
-    root = int(np.searchsorted(np.maximum(areas.bottom_mm, 0.0), process.support_bottom_gap_mm - EVEN_MM))
+    root = int(np.searchsorted(np.maximum(areas.heights.bottom_mm, 0.0), process.support_bottom_gap_mm - EVEN_MM))
     placeable: list[Polygons] = []
     reachable: list[Polygons] = []
     for m in range(count):

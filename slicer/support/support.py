@@ -10,65 +10,22 @@ from slicer.geometry.polygons import Polygons, bounding_box, closing, islands, o
 from slicer.overhangs import LEAST_MM2, Overhang, drop_small
 from slicer.sections import Sections
 from slicer.support.blocker import blocked_areas, support_reach_mm
-from slicer.support.branch import Growth
 from slicer.support.missed import find_missed
 from slicer.support.reachable import (
     BEYOND,
     COARSE_MM,
     EVEN_MM,
+    SLIVER_MM,
     SMOOTH_MM,
     SPECK_MM2,
     ReachableAreas,
     dilate,
     drop_slivers,
-    only_slivers,
     reachable_areas,
 )
 from slicer.support.tree import Columns, Tree
 
 SLACK_MM = 0.01  # what rounding may add to the lean
-
-
-def add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """Support of every layer with the roots of what ends in the layers above.
-
-    A root is at most as deep as the steepest slope that support may not slide along is high under its disc.
-    """
-    process = areas.process
-    across = process.support_distance_mm + 2.0 * areas.radius_mm
-    angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
-    deep = across / max(tan(radians(angle)), 0.5)
-    grown = list(bodies)
-    roots: list[tuple[Polygons, float]] = []
-    for m in range(len(bodies) - 2, -1, -1):
-        ends = _loose_ends(bodies, areas, m + 1)
-        if not ends.is_empty():
-            roots.append((ends, float(areas.bottom_mm[m + 1]) - deep))
-        if roots:
-            blocked = _blocked_area(union([root for root, _ in roots]), areas, m)
-            left = [(root - blocked, last) for root, last in roots if areas.bottom_mm[m] >= last]
-            roots = [(root, last) for root, last in left if not only_slivers(root)]
-            grown[m] = union([bodies[m], *(root for root, _ in roots)])
-    return grown
-
-
-def _loose_ends(bodies: Sequence[Polygons], areas: ReachableAreas, m: int) -> Polygons:
-    """The support of a layer that nothing in the layer below carries, though something to stand on is near."""
-    if bodies[m].is_empty() or areas.placeable[m].is_empty():
-        return Polygons()
-    loose = bodies[m] - bodies[m - 1]
-    if loose.area() < SPECK_MM2 or (loose ^ areas.placeable[m]).area() < SPECK_MM2:
-        return Polygons()
-    return drop_slivers(loose - dilate(bodies[m - 1], float(areas.lean_mm[m])))
-
-
-def _blocked_area(root: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """Where the gaps to the part forbid support, about a root."""
-    distance_mm, outlines = areas.process.support_distance_mm, areas.sections.outlines
-    window = bounding_box(root, distance_mm + 1.0)
-    beside = offset((outlines[m] ^ window).simplify(COARSE_MM), distance_mm + COARSE_MM)
-    near = [*outlines[areas.next_below(m) : m], *outlines[m + 1 : areas.next_above(m)]]
-    return union([beside, *(outline ^ window for outline in near), *areas.shut[m : m + 1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,37 +44,24 @@ class Supports:
     unwanted: Sequence[Polygons]
 
     @property
-    def wanted_mm2(self) -> float:
-        """Hanging area, seen from above, that needs support."""
-        return float(sum(hanging.area() for hanging in self.wanted))
-
-    @property
     def unsupported_mm2(self) -> float:
         """Hanging area, seen from above, that none could reach."""
         return float(sum(hanging.area() for hanging in self.missed))
 
 
-@dataclass(frozen=True, eq=False)
-class Grown:
-    """Support as it has grown downward: of every layer all of it, and where it begins."""
-
-    bodies: Sequence[Polygons]
-    contacts: Sequence[Polygons]
-
-
 def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     """The support that stands on the platform, on the part itself and on what lies below its base plane."""
     process, nothing = sections.support_process, [Polygons()] * len(sections.outlines)
-    if process.support == "none":
-        return Supports(sections, nothing, nothing, nothing, nothing, nothing)
-    unwanted = drop_small([overhang.unwanted for overhang in overhangs], process.support_least_mm2)
-    wanted = drop_small(_drop_nearly_held(sections, overhangs), process.support_least_mm2)
+    wanted = unwanted = nothing
+    if process.support != "none":
+        unwanted = drop_small([overhang.unwanted for overhang in overhangs], process.support_least_mm2)
+        wanted = drop_small(_drop_nearly_held(sections, overhangs), process.support_least_mm2)
     count = max((k for k, area in enumerate(wanted) if not area.is_empty()), default=-1)
     if count < 0:
         return Supports(sections, nothing, nothing, nothing, nothing, unwanted)
-    blocked = blocked_areas(sections, sections.heights[:count], process.support_distance_mm, support_reach_mm(sections))
+    blocked = blocked_areas(sections, count, process.support_distance_mm, support_reach_mm(sections))
     areas = reachable_areas(sections, blocked)
-    printed, dense = stand(grow(wanted, {}, areas), areas)
+    printed, dense = stand(*grow(wanted, {}, areas), areas)
     missed = find_missed(wanted, printed, areas)
     if sections.on_platform:
         printed[0] = widen_foot(printed[0], areas, sections.plate - blocked[0])
@@ -142,13 +86,15 @@ def _drop_nearly_held(sections: Sections, overhangs: Sequence[Overhang]) -> list
     return free
 
 
-def grow(wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas) -> Grown:
-    """Support from the top down.
+def grow(
+    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas
+) -> tuple[list[Polygons], list[Polygons]]:
+    """Support from the top down: of every layer all of it, and where it begins.
 
     wanted: the hanging places of each layer; begins: places of a layer at which support has to begin.
     """
-    count, radius, process = len(areas.reachable), areas.radius_mm, areas.process
-    grows: Columns | Tree = Tree(Growth.of(process, radius)) if process.support_style == "tree" else Columns(Polygons())
+    count, radius = len(areas.reachable), areas.radius_mm
+    grows: Columns | Tree = Tree() if areas.process.support_style == "tree" else Columns(Polygons())
     bodies, contacts = [Polygons()] * count, [Polygons()] * count
     beginning: dict[int, list[tuple[Polygons, int]]] = {}
     for k, hanging in enumerate(wanted):
@@ -162,7 +108,7 @@ def grow(wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: Reac
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
             contact = _contact(union(asked), body, areas.reachable[m], radius)
-            grows = grows.add_contact(contact, areas.reachable[m], float(areas.top_mm[m]))
+            grows = grows.add_contact(contact, areas.reachable[m], float(areas.heights.tip_mm[m]))
             contacts[m] = _body(contact, radius)
             body = body + contacts[m]
         left = [(hanging - body, last) for hanging, last in pending if last < m]
@@ -170,7 +116,7 @@ def grow(wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: Reac
         if not body.is_empty():
             bodies[m] = body
             grows = grows.lower(areas, m) if m else grows
-    return Grown(bodies, contacts)
+    return bodies, contacts
 
 
 def _body(area: Polygons, radius: float) -> Polygons:
@@ -190,10 +136,54 @@ def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: flo
     return contact if beside.is_empty() else contact + (dilate(beside, radius) ^ reachable)
 
 
-def stand(grown: Grown, areas: ReachableAreas) -> tuple[list[Polygons], list[Polygons]]:
-    """What of grown support stands, and where of it is dense: per layer."""
-    printed = _keep_standing(add_roots(grown.bodies, areas), areas)
-    return printed, _dense(printed, grown.contacts, areas)
+def stand(
+    bodies: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas
+) -> tuple[list[Polygons], list[Polygons]]:
+    """The grown support that stands, and its dense places, layer by layer. bodies, contacts: as grow gives them."""
+    printed = _keep_standing(_add_roots(bodies, areas), areas)
+    return printed, _dense(printed, contacts, areas)
+
+
+def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
+    """Support of every layer with the roots of what ends in the layers above.
+
+    A root is at most as deep as the steepest slope that support may not slide along is high under its disc.
+    """
+    process = areas.process
+    across = process.support_distance_mm + 2.0 * areas.radius_mm
+    angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
+    deep = across / max(tan(radians(angle)), 0.5)
+    grown = list(bodies)
+    roots: list[tuple[Polygons, float]] = []
+    for m in range(len(bodies) - 2, -1, -1):
+        ends = _loose_ends(bodies, areas, m + 1)
+        if not ends.is_empty():
+            roots.append((ends, float(areas.heights.bottom_mm[m + 1]) - deep))
+        if roots:
+            blocked = _blocked_area(union([root for root, _ in roots]), areas, m)
+            left = [(root - blocked, last) for root, last in roots if areas.heights.bottom_mm[m] >= last]
+            roots = [(root, last) for root, last in left if not _only_slivers(root)]
+            grown[m] = union([bodies[m], *(root for root, _ in roots)])
+    return grown
+
+
+def _loose_ends(bodies: Sequence[Polygons], areas: ReachableAreas, m: int) -> Polygons:
+    """The support of a layer that nothing in the layer below carries, though something to stand on is near."""
+    if bodies[m].is_empty() or areas.placeable[m].is_empty():
+        return Polygons()
+    loose = bodies[m] - bodies[m - 1]
+    if loose.area() < SPECK_MM2 or (loose ^ areas.placeable[m]).area() < SPECK_MM2:
+        return Polygons()
+    return drop_slivers(loose - dilate(bodies[m - 1], float(areas.lean_mm[m])))
+
+
+def _blocked_area(root: Polygons, areas: ReachableAreas, m: int) -> Polygons:
+    """Where the gaps to the part forbid support, about a root."""
+    distance_mm, outlines = areas.process.support_distance_mm, areas.sections.outlines
+    window = bounding_box(root, distance_mm + 1.0)
+    beside = offset((outlines[m] ^ window).simplify(COARSE_MM), distance_mm + COARSE_MM)
+    near = [*outlines[areas.next_below(m) : m], *outlines[m + 1 : areas.next_above(m)]]
+    return union([beside, *(outline ^ window for outline in near), *areas.shut[m : m + 1]])
 
 
 def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
@@ -202,19 +192,24 @@ def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Po
     for m, body in enumerate(bodies):
         if not body.is_empty() and (m > 0 or not areas.sections.on_platform):
             rest = body - dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else body
-            loose = rest if only_slivers(rest) else _loose(rest, areas, m)
-            if not only_slivers(loose):
+            loose = rest if _only_slivers(rest) else _loose(rest, areas, m)
+            if not _only_slivers(loose):
                 body = _clip_loose(body, loose, areas)
         printed.append(body)
     return printed
 
 
+def _only_slivers(places: Polygons) -> bool:
+    """Whether the places are nothing but slivers."""
+    return bool(places.area() < SPECK_MM2 or offset(places, -SLIVER_MM).is_empty())
+
+
 def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """What of support that no support carries does not stand: discs reach beyond what is placeable, but nothing stands beside
-    it alone."""
+    """The share that does not stand of support which no support carries: discs reach beyond placeable places, but nothing stands
+    beside one alone."""
     placeable = areas.placeable[m]
     beside = rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm)
-    alone = [piece for piece in islands(rest) if only_slivers(piece ^ placeable)]
+    alone = [piece for piece in islands(rest) if _only_slivers(piece ^ placeable)]
     return union([beside, *alone])
 
 

@@ -20,16 +20,78 @@ The rule for every step: each place of a branch has a place of one below it with
 wide as a bead and does stand is sifted afterwards (support.stand); what hangs and is not held is counted (missed).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import floor
+from math import cos, floor, hypot, pi, radians, tan
 
-from slicer.geometry.polygons import Polygons, closing, islands, union
-from slicer.support.branch import Branch, Growth, branch_of, lower_branches
-from slicer.support.reachable import LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, carrying_area
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.geometry.distance import signed_distances
+from slicer.geometry.polygons import Polygons, closing, contours, edges, islands, offset, union
+from slicer.support.reachable import (
+    EVEN_MM,
+    FINE_MM,
+    LEAST_MM2,
+    SLIVER_MM,
+    SMOOTH_MM,
+    ReachableAreas,
+    carrying_area,
+    dilate,
+    drop_slivers,
+    widen,
+)
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
 JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
+CORNERS = 12  # of a trunk's outline
+THICKEST_MM = 2.5  # a trunk's radius: enough for any part that fits a machine
+MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
+FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin recovers
+THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
+TIDY_EVERY = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
+INSET = 0.7  # of the lean: then right corners move by the lean
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """The places of a branch's middle in one layer, all within `radius` of x, y; top_mm: where the branch ends.
+
+    full: the area has every place within the radius.
+    """
+
+    area: Polygons
+    x: float
+    y: float
+    radius: float
+    top_mm: float
+    full: bool = False
+
+    @property
+    def reach_mm(self) -> float:
+        """How far from x, y its farthest place is."""
+        return self.radius / cos(pi / CORNERS) if self.full else self.radius
+
+    def shrink(self, radius: float) -> "Branch":
+        """Every place moved towards the middle, by no more than the radius becomes less."""
+        share = radius / self.radius
+        matrix = np.array([[share, 0.0, (1.0 - share) * self.x], [0.0, share, (1.0 - share) * self.y]])
+        return Branch(self.area.transform(matrix), self.x, self.y, radius, self.top_mm)
+
+
+def branch_of(area: Polygons, top_mm: float) -> Branch:
+    """A branch through all places of an area."""
+    points = np.concatenate(contours(area))
+    x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return Branch(area, float(x), float(y), float(np.hypot(points[:, 0] - x, points[:, 1] - y).max()), top_mm)
+
+
+def trunk(x: float, y: float, radius: float, top_mm: float) -> Branch:
+    """A round branch."""
+    around = Polygons.circle(radius / cos(pi / CORNERS), CORNERS)
+    return Branch(around.translate((x, y)), x, y, radius, top_mm, True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +116,6 @@ class Columns:
 class Tree:
     """The branches of a layer; those that are no trunks yet take up what begins in their square."""
 
-    growth: Growth
     branches: tuple[Branch, ...] = ()
 
     @property
@@ -78,11 +139,11 @@ class Tree:
                 branches.append(branch_of(area, top_mm))
             else:
                 branches[k] = branch_of(area, branches[k].top_mm)
-        return Tree(self.growth, tuple(branches))
+        return Tree(tuple(branches))
 
     def lower(self, areas: ReachableAreas, layer: int) -> "Tree":
         """What carries a layer's support in the layer below."""
-        return Tree(self.growth, tuple(lower_branches(self.branches, areas, layer, self.growth))) if self.branches else self
+        return Tree(tuple(lower_branches(self.branches, areas, layer))) if self.branches else self
 
 
 def _cell(x: float, y: float) -> tuple[int, int]:
@@ -102,3 +163,155 @@ def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
             if piece.area() > LEAST_MM2:
                 pieces.setdefault((i, j), []).append(piece)
     return [(cell, Polygons.compose(several)) for cell, several in sorted(pieces.items())]
+
+
+def growth(process: Process, radius_mm: float) -> tuple[float, float]:
+    """Radius of a trunk's places at its top, mm, and its growth per mm downward; radius_mm: how far beads reach round a place."""
+    return max(0.5 * process.support_branch_mm - radius_mm, 0.1 * radius_mm), tan(radians(process.support_branch_growth_deg))
+
+
+def trunk_radius_mm(below_mm: float, least_mm: float, per_mm: float) -> float:
+    """Radius of a trunk so far below its top."""
+    return min(least_mm + per_mm * max(below_mm, 0.0), max(THICKEST_MM, least_mm))
+
+
+def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
+    """The branches of a layer in the layer below: every place of the former is within the lean of one of the latter, or
+    where it may stand.
+    """
+    lean, reachable = float(areas.lean_mm[layer]), areas.reachable[layer - 1]
+    targets = _target_branches(branches, areas, layer)
+    borders = edges(reachable)
+    free = _depths(targets, borders) >= np.array([branch.reach_mm for branch in targets])
+    doubtful = [branch.area for branch, is_free in zip(targets, free, strict=True) if not is_free]
+    bad = union(doubtful) - reachable
+    if bad.area() < LEAST_MM2:
+        return _drop_enclosed(targets)
+    low: list[Branch] = []
+    left: list[Branch] = []
+    for old, new, is_free, depth in zip(branches, targets, free, _depths(branches, borders), strict=True):
+        if is_free or (new.area ^ bad).area() < LEAST_MM2:
+            low.append(new)
+            continue
+        narrow = _narrow(old, reachable, borders, float(depth), lean)
+        if narrow is not None:
+            low.append(narrow)
+        elif not old.full or 2.0 * (old.area - areas.placeable[layer]).area() >= old.area.area():
+            left.append(old)  # less than half of it has come to ground
+    return _drop_enclosed(low + _move_aside(left, areas, layer))
+
+
+def _depths(branches: Sequence[Branch], borders: Floats) -> Floats:
+    """How deep the middles of branches lie inside an area with those edges.
+
+    Of every edge, for there are but some 400 of them and 15 middles: a search tree made anew for every layer (shapely.STRtree)
+    takes 6 to 20 times as long, measured on tree, fan_support and deer.
+    """
+    depths_mm: Floats = signed_distances(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
+    return depths_mm
+
+
+def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
+    """Where the branches would go if nothing was in their way: wide ones shrink, trunks go to meet the nearest trunk."""
+    z_mm, lean = float(areas.heights.tip_mm[layer - 1]), float(areas.lean_mm[layer])
+    rise, (least_mm, per_mm) = float(areas.heights.tip_mm[layer]) - z_mm, growth(areas.process, areas.radius_mm)
+    thick = [trunk_radius_mm(branch.top_mm - z_mm, least_mm, per_mm) for branch in branches]
+    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + EVEN_MM]
+    goals = _goals(np.array([[branches[k].x, branches[k].y] for k in trunks]), z_mm * lean / rise)
+    goal_of = dict(zip(trunks, goals, strict=True))
+    targets = []
+    for k, branch in enumerate(branches):
+        if branch.radius - lean > thick[k]:
+            targets.append(branch.shrink(branch.radius - lean))
+            continue
+        x, y = goal_of.get(k, (branch.x, branch.y))
+        away = hypot(x - branch.x, y - branch.y)
+        share = 1.0 if away <= lean else lean / away
+        x, y = branch.x + share * (x - branch.x), branch.y + share * (y - branch.y)
+        radius = max(least_mm, branch.radius + FATTER * per_mm * rise)
+        targets.append(trunk(x, y, min(thick[k], radius), branch.top_mm))
+    return targets
+
+
+def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
+    """For each trunk half way to the nearest other one, or its own place; reach_mm: how far it can lean down to the ground."""
+    if len(at) < 2:
+        return [(float(x), float(y)) for x, y in at]
+    apart = np.hypot(at[:, None, 0] - at[None, :, 0], at[:, None, 1] - at[None, :, 1])
+    np.fill_diagonal(apart, np.inf)
+    nearest = apart.argmin(axis=1)
+    meet = apart[np.arange(len(at)), nearest] <= 2.0 * MEETING * reach_mm
+    goals = np.where(meet[:, None], 0.5 * (at + at[nearest]), at)
+    return [(float(x), float(y)) for x, y in goals]
+
+
+def _narrow(branch: Branch, reachable: Polygons, borders: Floats, depth_mm: float, lean: float) -> Branch | None:
+    """The branch where it is, as thick as it was or by the lean thinner, if that is free.
+
+    borders: edges of the reached places; depth_mm: how deep inside them the branch's middle lies.
+    """
+    if branch.full and depth_mm >= branch.reach_mm:
+        return branch
+    if branch.radius <= THIN_MM:
+        return None
+    if branch.full or branch.radius - lean <= THIN_MM:
+        thin = trunk(branch.x, branch.y, max(branch.radius - lean, THIN_MM), branch.top_mm)
+        return thin if depth_mm >= thin.reach_mm else None
+    thin = branch.shrink(branch.radius - lean)
+    if depth_mm >= thin.radius:
+        return thin
+    if signed_distances(contours(thin.area)[0][:1], borders)[0] < 0.0:
+        return None
+    return thin if (thin.area - reachable).area() < LEAST_MM2 else None
+
+
+def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
+    """Branches in the way of something: what of them has a place below stays, the rest goes aside, or ends on ground."""
+    if not branches:
+        return []
+    reachable, lean = areas.reachable[layer - 1], float(areas.lean_mm[layer])
+    area = union([branch.area for branch in branches])
+    tidy = layer % TIDY_EVERY == 0
+    area = closing(area, SMOOTH_MM) if tidy else area
+    carrying = carrying_area(area, reachable, areas.placeable[layer], lean)
+    carrying = _draw_in(carrying, lean) if tidy and (area - reachable).is_empty() else carrying
+    below: list[Polygons] = []
+    if tidy:
+        thick = drop_slivers(carrying)
+        below = islands(thick.simplify(FINE_MM) + _widened(carrying - thick, reachable))
+    for island in () if tidy else islands(carrying):  # what is just a thin limb of one can wait
+        below += islands(_widened(island, reachable)) if _sliver(island) else [island.simplify(FINE_MM)]
+    top = max(branch.top_mm for branch in branches)
+    return [branch_of(island, top) for island in below if island.area() >= LEAST_MM2]
+
+
+def _widened(slivers: Polygons, reachable: Polygons) -> Polygons:
+    """Slivers wide enough to be followed down."""
+    return (widen(slivers, THIN_MM) ^ reachable).simplify(FINE_MM)
+
+
+def _sliver(island: Polygons) -> bool:
+    """Whether an island is on average narrower than a sliver, judged by its box."""
+    x0, y0, x1, y1 = island.bounds()
+    return bool(island.area() < 2.0 * SLIVER_MM * hypot(x1 - x0, y1 - y0))
+
+
+def _draw_in(area: Polygons, lean: float) -> Polygons:
+    """The area with its edges drawn in; what is too narrow for that stays."""
+    drawn_in = []
+    for island in islands(area):
+        core = offset(island, -INSET * lean)
+        bits = [] if core.is_empty() else islands(island - dilate(core, lean))
+        drawn_in += [island] if core.is_empty() else [core, *(bit for bit in bits if bit.area() >= lean**2)]
+    return union(drawn_in)
+
+
+def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
+    """Without branches that lie wholly inside a trunk."""
+    if len(branches) < 2:
+        return branches
+    x, y, radius, full = np.array([[b.x, b.y, b.radius, b.full] for b in branches]).T
+    deep = radius[None, :] - radius[:, None] - np.hypot(x[:, None] - x[None, :], y[:, None] - y[None, :])
+    rank = np.arange(len(branches))
+    inside = (deep >= -1e-9) & (full[None, :] > 0) & ((radius[None, :] > radius[:, None]) | (rank[None, :] < rank[:, None]))
+    return [branches[k] for k in np.flatnonzero(~inside.any(axis=1))]

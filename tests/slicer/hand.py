@@ -20,7 +20,7 @@ from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights
 from slicer.paths import KINDS, Kind, SlicedPart
 from slicer.paths import Path as Stroke
-from slicer.sections import Neighbours, Sections
+from slicer.sections import Sections
 from slicer.strokes.strokes import Strokes
 from tests.shapes import from_manifold
 
@@ -58,8 +58,8 @@ def sections_at(mesh: Mesh, cuts_mm: Floats, *settings: str) -> Sections:
     """A mesh on the platform cut at heights, with layers of 0.2 mm around them."""
     outlines = [clean(loops, 0.0) for loops in cross_sections(mesh, cuts_mm)]
     heights = Heights(cuts_mm + 0.1, np.full(len(cuts_mm), 0.2), cuts_mm)
-    plate, around = Polygons.square((400.0, 400.0), True), Neighbours([Polygons()] * len(outlines), [Polygons()])
-    return Sections(whole(mesh), (), (), profile(*settings), mesh, heights, outlines, outlines, outlines, around, None, plate)
+    plate, empty, own = Polygons.square((400.0, 400.0), True), [Polygons()] * len(outlines), profile(*settings)
+    return Sections(whole(mesh), (), (), own, mesh, heights, outlines, outlines, outlines, empty, None, plate, [Polygons()])
 
 
 def section_at(mesh: Mesh, z_mm: float) -> Polygons:

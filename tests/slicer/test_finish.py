@@ -7,8 +7,8 @@ import pytest
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
 from slicer.geometry.polygons import Polygons
-from slicer.interface.compensation import compensate_elephant_foot
 from slicer.paths import Kind, SlicedPart
+from slicer.sectioning import compensate_elephant_foot
 from slicer.slice import slice_part
 from tests.shapes import box, standing
 from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole

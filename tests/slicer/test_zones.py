@@ -15,7 +15,7 @@ from slicer.heights import Heights
 from slicer.parts import slice_parts
 from slicer.paths import Kind, SlicedPart
 from slicer.slice import slice_part
-from slicer.support.blocker import shut_areas
+from slicer.support.blocker import unwanted_areas
 from slicer.zones import no_seam_segments, no_support_areas
 from tests.shapes import box, tee
 from tests.slicer.hand import BARE, cut, of_kind, profile, sections_at, volume_mm3, whole
@@ -103,8 +103,9 @@ def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> N
     marked = replace(block, no_support=Marked.of(block.mesh, [Grown((0.0, 0.0, 4.0), 1.0)]))
     heights = Heights(tips_mm, np.full(100, 0.08), tips_mm - 0.04)
     sections = sections_at(block.mesh, heights.cut_mm, "process.layer_height_mm=0.3", "process.support_bottom_gap_mm=0.3")
+    unwanted = no_support_areas(marked, block.mesh, heights.cut_mm)
     stands = int(np.searchsorted(heights.bottom_mm, 4.3))  # the first layer that support on it would have
-    shut = shut_areas(replace(sections, part=marked), heights)
+    shut = unwanted_areas(replace(sections, part=marked, heights=heights, no_support=unwanted))
     assert (shut[stands].area(), shut[-1].area()) == (pytest.approx(400.0, rel=0.01), 0.0)
 
 

@@ -42,7 +42,7 @@ from mdp.search.orient import orient_and_decompose
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
-from slicer.interface.pins import pin_width_mm, room_around_mm
+from slicer.interface.interlock import pin_width_mm, room_around_mm
 from slicer.parts import SlicingProgress, slice_parts
 from slicer.paths import SlicedPart
 

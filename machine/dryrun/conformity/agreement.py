@@ -14,7 +14,7 @@ from machine.dryrun.placement import unsupported_mm
 from machine.dryrun.strokes import beads_of
 from mdp.mesh import Mesh
 from profiles.profile import Profile
-from slicer.interface.compensation import reach_mm
+from slicer.sectioning import reach_mm
 
 MOST_OUTSIDE = 0.01  # of the extruded length, by more than half a line: seams, brims and thin walls stay far below
 LEAST_FILLED = 0.98  # of the model at 100 % infill

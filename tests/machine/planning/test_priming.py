@@ -12,7 +12,7 @@ from machine.planning.travel import Tip
 from mdp.pose import Pose
 from profiles.profile import Profile, load
 from slicer.bead import Bead
-from slicer.interface.interface import begin_inside
+from slicer.interface.interlock import begin_inside
 from slicer.paths import Kind, Layer, Path
 from slicer.slice import slice_part
 from tests.shapes import box

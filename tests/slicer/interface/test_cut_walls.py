@@ -9,7 +9,7 @@ import pytest
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, contours, offset, strips
-from slicer.interface.plastic import interface_mm3
+from slicer.interface.cut_faces import interface_mm3
 from slicer.overhangs import find_overhangs
 from slicer.paths import Kind
 from slicer.sectioning import section_part

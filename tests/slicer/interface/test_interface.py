@@ -13,18 +13,16 @@ from mdp.mesh import Floats
 from slicer.bead import OUTSIDE, Bead
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean
+from slicer.interface.base_plane import plane_in_frame_of
+from slicer.interface.cut_faces import _nearest_areas, joined
 from slicer.interface.interface import (
-    begin_inside,
     frame_change,
-    interface_edges,
-    plane_in_frame_of,
+    near_parts,
     plastic_below,
     sections_of,
     skin_beside,
-    touching,
 )
-from slicer.interface.model import joined
-from slicer.interface.plastic import _nearest_areas
+from slicer.interface.interlock import begin_inside
 from slicer.paths import Kind, Layer
 from slicer.sectioning import section_part
 from slicer.slice import slice_part
@@ -80,9 +78,9 @@ def test_the_sections_of_a_part_and_of_the_others_are_the_model_s(seed: int, off
 
 def test_parts_touch_that_come_as_near_as_that() -> None:
     low, middle, high = cut(box(20, 20, 40), ((0.0, 0.0, 1.0), 30.0), ((0.0, 0.0, 1.0), 10.0))
-    assert touching(low, [middle, high], 0.5) == [middle]
-    assert touching(low, [middle, high], 20.5) == [middle, high]
-    assert touching(middle, [low, high], 0.5) == [low, high]
+    assert near_parts(low, [middle, high], 0.5) == [middle]
+    assert near_parts(low, [middle, high], 20.5) == [middle, high]
+    assert near_parts(middle, [low, high], 0.5) == [low, high]
 
 
 def test_beneath_a_part_lies_what_earlier_ones_have_at_its_base_and_under_the_first_one_nothing() -> None:
@@ -105,11 +103,11 @@ def test_the_edges_of_an_interface_run_once_round_it_for_the_part_below_and_for_
         (low, section_part(low, profile(), [], [high])),
         (high, section_part(high, profile(), [low], [])),
     ):
-        edges = interface_edges(sections)
+        edges = sections.joints
         assert np.linalg.norm(edges[:, 3:] - edges[:, :3], axis=1).sum() == pytest.approx(round_mm, rel=0.01)
         ends = in_workpiece(part, edges[:, :3])
         assert np.abs(high.base.heights_mm(ends)).max() < 0.15
-    assert interface_edges(section_part(low, profile())).shape == (0, 6)
+    assert section_part(low, profile()).joints.shape == (0, 6)
 
 
 @settings(max_examples=20)

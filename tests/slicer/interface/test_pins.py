@@ -16,10 +16,10 @@ from mdp.mesh import Floats
 from profiles.errors import ProfileError
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, with_part_settings
-from slicer.interface.pins import plan_pins, pour
+from slicer.interface.interlock import fill_pins, plan_pins
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import section_part
-from slicer.sections import Pin, Sections
+from slicer.sections import Sections
 from slicer.slice import slice_part
 from tests.shapes import box, from_manifold
 from tests.slicer.hand import BARE, cut, profile
@@ -62,21 +62,21 @@ def poured_mm3(parts: Sequence[Part], *keys: str) -> float:
     """What the beads that fill pins take."""
     own = profile(*BARE, *PINS, *keys)
     area = bead_area_mm2(own.process.line_width_mm, 0.2) * own.process.interface_flow
-    beads = [bead for pins in plan_pins(parts, own).values() for bead in pour(pins, own, 0.2)]
+    beads = [bead for pins in plan_pins(parts, own).values() for bead in fill_pins(pins, own, 0.2)]
     return sum(bead.length_mm * bead.flow * area for bead in beads)
 
 
-def axis(part: Part, pin: Pin) -> Floats:
+def axis(part: Part, pin: Floats) -> Floats:
     """(2, 3) the ends of a pin's middle line in the workpiece frame."""
-    ends = np.array([[pin.x_mm, pin.y_mm, part.base.offset_mm], [pin.x_mm, pin.y_mm, part.base.offset_mm - DEEP]])
+    ends = np.array([[*pin[:2], part.base.offset_mm], [*pin[:2], part.base.offset_mm - DEEP]])
     return np.asarray(ends @ part.rotation)
 
 
 def test_the_face_of_a_block_has_a_grid_of_pins_clear_of_its_walls() -> None:
     pins = plan_pins(stacked(), profile(*PINS))[2]
-    assert sorted({pin.x_mm for pin in pins}) == pytest.approx([-8.0, -4.0, 0.0, 4.0, 8.0])
+    assert sorted(set(pins[:, 0])) == pytest.approx([-8.0, -4.0, 0.0, 4.0, 8.0])
     assert len(pins) == 25
-    assert [pin.volume_mm3 for pin in pins] == pytest.approx([DISC * DEEP] * 25)
+    assert pins[:, 2] == pytest.approx([DISC * DEEP] * 25)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_the_strokes_push_what_the_layers_below_leave_out(keys: tuple[str, ...])
 @given(st.floats(1.0, 70.0), st.floats(8.0, 24.0))
 def test_a_leaning_part_fills_its_holes_within_two_percent(tilt_deg: float, x: float) -> None:
     parts = leaning(tilt_deg, x)
-    assume(plan_pins(parts, profile(*PINS))[2])
+    assume(len(plan_pins(parts, profile(*PINS))[2]))
     assert poured_mm3(parts) == pytest.approx(removed_mm3(parts), rel=0.02)
 
 
@@ -110,18 +110,18 @@ def test_no_pin_comes_near_the_outside_of_any_star(star: list[tuple[float, float
     assume(solid.status() == m3.Error.NoError and solid.volume() > 100.0)
     parts = cut(from_manifold(solid), (UP, 12.0))
     pins = plan_pins(parts, profile(*PINS))[2]
-    tubes = [m3.Manifold.cylinder(DEEP, 0.5 * WIDE + CLEAR - 0.1).translate((pin.x_mm, pin.y_mm, 12.0 - DEEP)) for pin in pins]
+    tubes = [m3.Manifold.cylinder(DEEP, 0.5 * WIDE + CLEAR - 0.1).translate((x, y, 12.0 - DEEP)) for x, y, _ in pins]
     for tube in tubes:
         assert (tube - solid_of(parts[0].mesh)).volume() < 0.01 * tube.volume()
-    for one, other in combinations(pins, 2):
-        assert np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm) >= WIDE + 2 * WIDTH - 1e-9
+    for one, other in combinations(pins[:, :2], 2):
+        assert np.hypot(*(one - other)) >= WIDE + 2 * WIDTH - 1e-9
 
 
 def test_in_a_stem_that_narrows_below_the_cut_its_narrowest_place_counts() -> None:
     """As deep as a hole and the walls below it, 4.8 mm under the cut of 9 mm radius, the stem has 6.6 mm."""
     cone = m3.Manifold.cylinder(24.0, 3.0, 15.0, 360)
     pins = plan_pins(cut(from_manifold(cone), (UP, 12.0)), profile(*PINS, "process.pin_spacing_mm=1.9"))[2]
-    farthest = max(np.hypot(pin.x_mm, pin.y_mm) for pin in pins)
+    farthest = np.hypot(*pins[:, :2].T).max()
     assert 6.6 - CLEAR - 0.5 * WIDE - 0.7 < farthest <= 6.6 - CLEAR - 0.5 * WIDE + 0.01
 
 
@@ -161,7 +161,7 @@ def test_the_tip_circles_in_the_mouth_before_anything_else_and_never_below_the_l
     base, top = stacked()
     own = profile(*BARE, *PINS, *keys)
     pins, first = plan_pins([base, top], own)[2], slice_part(top, own, [base]).layers[0]
-    middles = np.array([[pin.x_mm, pin.y_mm] for pin in pins])
+    middles = pins[:, :2]
     for path, mm3 in zip(first.paths[:25], first.volumes_mm3[:25], strict=True):
         away = np.hypot(*(path.points[:, None] - middles).transpose(2, 0, 1)).min(axis=1)
         mm2 = mm3 / path.length_mm
@@ -173,15 +173,15 @@ def test_the_tip_circles_in_the_mouth_before_anything_else_and_never_below_the_l
 
 
 def test_a_part_too_slender_or_too_low_below_has_none() -> None:
-    assert plan_pins(cut(box(4.4, 30, 20), (UP, 10.0)), profile(*PINS))[2] == ()
+    assert len(plan_pins(cut(box(4.4, 30, 20), (UP, 10.0)), profile(*PINS))[2]) == 0
     assert len(plan_pins(cut(box(4.8, 30, 20), (UP, 10.0)), profile(*PINS))[2]) > 3
-    assert plan_pins(cut(box(24, 24, 20), (UP, 4.0)), profile(*PINS))[2] == ()
+    assert len(plan_pins(cut(box(24, 24, 20), (UP, 4.0)), profile(*PINS))[2]) == 0
 
 
 @pytest.mark.parametrize("most", [1, 8, 16])
 def test_a_large_face_has_no_more_than_are_wanted_spread_all_over_it(most: int) -> None:
     parts = cut(box(60, 40, 30), (UP, 15.0))
-    places = np.array([(pin.x_mm, pin.y_mm) for pin in plan_pins(parts, profile(*PINS, f"process.most_pins={most}"))[2]])
+    places = plan_pins(parts, profile(*PINS, f"process.most_pins={most}"))[2][:, :2]
     assert most / 2 <= len(places) <= most
     assert places.mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)
     assert most == 1 or np.ptp(places[:, 0]) > 25.0
@@ -189,7 +189,7 @@ def test_a_large_face_has_no_more_than_are_wanted_spread_all_over_it(most: int) 
 
 def test_no_holes_without_the_setting() -> None:
     assert plan_pins(stacked(), profile()) == {}
-    assert [len(pour(pins, profile(), 0.2)) for pins in plan_pins(stacked(), profile()).values()] == []
+    assert [len(fill_pins(pins, profile(), 0.2)) for pins in plan_pins(stacked(), profile()).values()] == []
 
 
 @pytest.mark.parametrize(

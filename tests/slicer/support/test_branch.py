@@ -7,8 +7,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.geometry.polygons import Polygons, islands
-from slicer.support.branch import MEETING, THICKEST_MM, Branch, Growth, _drop_enclosed, _goals, branch_of, trunk
-from slicer.support.tree import CELL_MM, Tree
+from slicer.support.tree import (
+    CELL_MM,
+    MEETING,
+    THICKEST_MM,
+    Branch,
+    Tree,
+    _drop_enclosed,
+    _goals,
+    branch_of,
+    growth,
+    trunk,
+    trunk_radius_mm,
+)
 from tests.slicer.hand import as_shapely, profile, ragged
 
 seeds = st.integers(0, 10**6)
@@ -71,15 +82,14 @@ def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: 
 )
 def test_a_trunk_gets_thicker_downward_by_its_angle_and_no_thicker_than_the_thickest(depth_mm: float, radius: float) -> None:
     process = profile("process.support_branch_mm=2", "process.support_branch_growth_deg=5").process
-    growth = Growth.of(process, 0.45)
-    assert growth.radius_mm(trunk(0.0, 0.0, 1.0, 50.0), 50.0 - depth_mm) == pytest.approx(radius)
+    assert trunk_radius_mm(depth_mm, *growth(process, 0.45)) == pytest.approx(radius)
 
 
 @settings(max_examples=25)
 @given(seeds)
 def test_a_tree_takes_up_all_of_a_contact_that_is_reachable_in_a_branch_for_every_square(seed: int) -> None:
     contact, reachable = ragged(seed), Polygons.square((60.0, 60.0), True) - Polygons.square((9.0, 60.0)).translate((4.0, -30.0))
-    grown = Tree(Growth(0.5, 0.05)).add_contact(contact ^ reachable, reachable, 20.0)
+    grown = Tree().add_contact(contact ^ reachable, reachable, 20.0)
     wanted, area = as_shapely(contact ^ reachable), as_shapely(grown.area)
     assert wanted.difference(area).area < 0.02 * wanted.area
     assert as_shapely(reachable).buffer(1e-6).covers(area)
@@ -89,7 +99,7 @@ def test_a_tree_takes_up_all_of_a_contact_that_is_reachable_in_a_branch_for_ever
 
 
 def test_nothing_that_begins_changes_no_tree_and_no_branches_go_nowhere() -> None:
-    tree = Tree(Growth(0.5, 0.05))
+    tree = Tree()
     assert tree.add_contact(Polygons(), Polygons.square((9.0, 9.0)), 20.0) is tree
     assert tree.lower(None, 3) is tree  # type: ignore[arg-type]
     assert tree.area.is_empty()

@@ -1,6 +1,7 @@
 """Support handed down: it stands on what was printed before it, below every later base plane, and holds what it is for."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import manifold3d as m3
@@ -12,15 +13,16 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.plane import Plane
 from mdp.pose import unit
+from slicer.geometry.polygons import Polygons
 from slicer.interface.interface import frame_change
 from slicer.overhangs import find_overhangs
 from slicer.parts import slice_parts
 from slicer.paths import Kind
 from slicer.sectioning import section_part
-from slicer.support.handed_down import plan_supports
+from slicer.support.handed_down import plan_supports, up_to
 from slicer.support.support import Supports, own_supports
-from tests.shapes import from_manifold, standing, tee
-from tests.slicer.hand import as_shapely, cut, of_kind, profile
+from tests.shapes import box, from_manifold, standing, tee
+from tests.slicer.hand import as_shapely, cut, of_kind, profile, sections_at
 
 STANDS_MM = 0.55  # a layer, a step of a slope and the space beside a line
 ROUNDING_MM = 0.03
@@ -162,3 +164,11 @@ def stands_on(point: Floats, below: Supports) -> bool:
     near = np.flatnonzero((heights.tip_mm > z - STANDS_MM) & (heights.bottom_mm < z + 0.2))
     at = shapely.Point(x, y).buffer(0.4)
     return any(as_shapely(layers[m]).intersects(at) for m in near for layers in (below.areas, below.sections.outlines))
+
+
+def test_layers_added_on_top_have_what_later_parts_have_there() -> None:
+    beside, above = [Polygons.square((k, k)) for k in (1, 2)], [Polygons.square((k, k)) for k in (3, 4, 5)]
+    sections = replace(sections_at(box(10, 10, 1), np.array([0.1, 0.3])), beside=beside, above=above)
+    higher = up_to(sections, 0.8)
+    assert [area.area() for area in higher.beside] == pytest.approx([1.0, 4.0, 9.0, 16.0])
+    assert [area.area() for area in higher.above] == pytest.approx([25.0, 0.0, 0.0])

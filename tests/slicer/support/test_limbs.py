@@ -10,11 +10,11 @@ from mdp.decomposition import Decomposition
 from mdp.plane import Plane
 from profiles.profile import load
 from slicer.heights import Heights
-from slicer.interface.limb import AROUND_MM, head_room, shadow_of
+from slicer.interface.base_plane import AROUND_MM, shadow_of
 from slicer.parts import slice_parts
 from slicer.paths import Kind, SlicedPart
 from slicer.sectioning import section_part
-from slicer.support.blocker import above_base_planes
+from slicer.support.blocker import above_base_planes, head_room
 from tests.limbs import decomposed, limb, posts
 from tests.shapes import from_manifold
 

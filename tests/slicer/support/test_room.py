@@ -33,7 +33,7 @@ GAPS = ("process.support_gap_mm=0.4", "process.support_bottom_gap_mm=0.6", "proc
 @pytest.mark.parametrize("layer", [0, 1, 2, 3, 4, 50, 99])
 def test_support_keeps_its_gaps_to_the_layers_above_and_below(layer: int) -> None:
     room = areas(*GAPS)
-    top, bottom, count = room.top_mm, room.bottom_mm, len(room.top_mm)
+    top, bottom, count = room.heights.tip_mm, room.heights.bottom_mm, len(room.heights.tip_mm)
     above = [k for k in range(count) if k > layer and bottom[k] >= top[layer] + 0.4 - 1e-6]
     assert room.next_above(layer) == min(above, default=count)
     assert room.next_below(layer) == sum(top[j] <= bottom[layer] - 0.6 + 1e-6 for j in range(layer))

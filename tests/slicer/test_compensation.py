@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from profiles.process import Process
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import MITRE, Polygons, clean, half_plane, offset
-from slicer.interface.compensation import compensate, compensate_elephant_foot, compensated, reach_mm
 from slicer.interface.interface import sections_of
+from slicer.sectioning import compensate, compensate_elephant_foot, compensated, reach_mm
 from tests.shapes import box
 from tests.slicer.hand import as_shapely, cut, profile
 
