@@ -6,8 +6,8 @@ and constants come from (numba looks at the file alone), and the target. It does
 
 import os
 import re
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -46,19 +46,15 @@ def trouble() -> str:
     return _troubles[0] if _troubles else ""
 
 
-def _note_unwritten(folder: Path, error: OSError) -> None:
-    _note(f"{folder} cannot be written: {(error.strerror or str(error)).lower()}")
-
-
-def _note_lost() -> None:
-    """Note that kernels that are compiled now are not there for the next run, where the folder goes with this one."""
+@contextmanager
+def _writing() -> Iterator[None]:
+    """Write to the folder of the kernels compiled here; note why what is written is not there for the next run."""
+    try:
+        yield
+    except OSError as error:
+        _troubles.append(f"{home()} cannot be written: {(error.strerror or str(error)).lower()}")
     if home().parent == lost_at_end():
-        _note(f"no folder of this user can be written: set XDG_CACHE_HOME, or NUMBA_CACHE_DIR in place of {home()}")
-
-
-def _note(reason: str) -> None:
-    if reason not in _troubles:
-        _troubles.append(reason)
+        _troubles.append(f"no folder of this user can be written: set XDG_CACHE_HOME, or NUMBA_CACHE_DIR in place of {home()}")
 
 
 @cache
@@ -139,11 +135,8 @@ class KernelCache(FunctionCache):
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        try:
+        with _writing():
             super().save_overload(sig, data)
-            _note_lost()
-        except OSError as error:
-            _note_unwritten(home(), error)
 
 
 def mark(purpose: str) -> Path:
@@ -158,15 +151,10 @@ def is_cached(purpose: str) -> bool:
 
 def keep(purpose: str) -> None:
     """Note for later runs that the kernels for a purpose are all cached, where they are."""
-    _note_lost()
-    if trouble():
-        return
-    cached = mark(purpose)
-    try:
-        cached.parent.mkdir(parents=True, exist_ok=True)
-        cached.touch()
-    except OSError as error:
-        _note_unwritten(cached.parent, error)
+    if not trouble():
+        with _writing():
+            home().mkdir(parents=True, exist_ok=True)
+            mark(purpose).touch()
 
 
 def _clear(parent: Path, names: str) -> None:
