@@ -3,10 +3,10 @@
     python tools/one_folder.py -o dist/tiltprint-linux [--wheel FILE.whl]
 
 Copies the Python that runs this script, without what no program needs, installs the wheel (built first where none is given) and
-its libraries into it, and lays the system's libraries that its modules are linked to beside it. `tiltprint` in the folder starts
-the program; the folder may be moved. LICENSES has the licence texts of all that is bundled. It runs where the C library is as new
-as here, or newer. The program starts interpreters of its own (the workbench's workers, prints, compilers), so it is a Python
-in a folder and not a program that PyInstaller or Briefcase freeze: those have no interpreter to start.
+its libraries into it, lays the system's libraries that its modules are linked to beside it, and compiles the kernels.
+`tiltprint` in the folder starts the program; the folder may be moved. LICENSES has the licence texts of all that is bundled. It
+runs where the C library is as new as here, or newer. The program starts interpreters of its own (the workbench's workers, prints,
+compilers), so it is a Python in a folder and not a program that PyInstaller or Briefcase freeze: those have none to start.
 """
 
 import argparse
@@ -65,6 +65,7 @@ def main() -> None:
     subprocess.run(pip, check=True)
     shutil.rmtree(packages / "bin", ignore_errors=True)
     _copy_libraries(given.out)
+    subprocess.run([given.out / "bin" / VERSION, "-I", ROOT / "tools" / "ship_kernels.py"], check=True)
     _write_licences(given.out, packages)
     launcher = given.out / "tiltprint"
     launcher.write_text(LAUNCHER)

@@ -8,14 +8,12 @@ Arguments that would be more than six go together in a NamedTuple.
 """
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
-from numba import config, njit
+from numba import njit
 from numba.core import event
 
-from mdp.kernels.cache import folder, note_unwritten
-from mdp.kernels.loading import load_quickly
+from mdp.kernels.cache import KernelCache
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -27,7 +25,6 @@ class Compile(Protocol):
     def __call__(self, function: Callable[P, R], /) -> Callable[P, R]: ...
 
 
-KERNEL = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 part: Compile = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=True)
 # A part that makes no array, gives none back and calls no part but its like works on arrays that its kernel holds: who holds them
 # is not counted, which takes a lock on all cores each time.
@@ -38,32 +35,10 @@ inlined: Compile = njit(error_model="numpy", inline="always", no_cpython_wrapper
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function for calls from Python and cache it, in a folder below the one that NUMBA_CACHE_DIR names or our own."""
-    own = folder(Path(function.__code__.co_filename))
-    if own is None:  # numba would look for other places, where it never sees that a part has changed
-        uncached: Callable[P, R] = njit(**KERNEL | {"cache": False})(function)
-        return uncached
-    given, config.CACHE_DIR = config.CACHE_DIR, str(own)
-    try:
-        compiled: Callable[P, R] = njit(**KERNEL)(function)
-        _forgive(compiled, own.parent)
-        load_quickly(compiled)
-        return compiled
-    finally:
-        config.CACHE_DIR = given
-
-
-def _forgive(compiled: Any, folder: Path) -> None:
-    """A kernel that cannot be cached, on a full disk, is used all the same."""
-    save = compiled._cache.save_overload
-
-    def save_if_possible(*overload: Any) -> None:
-        try:
-            save(*overload)
-        except OSError as error:
-            note_unwritten(folder, error)
-
-    compiled._cache.save_overload = save_if_possible
+    """Compile a function for calls from Python, outside Python's lock, and cache it."""
+    compiled: Any = njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+    compiled._cache = KernelCache(function)
+    return cast(Callable[P, R], compiled)
 
 
 def on_compiled(call: Callable[[], None]) -> None:

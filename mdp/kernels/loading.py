@@ -42,13 +42,7 @@ class LoadedLibrary(JITCodeLibrary):
         return int(super().get_pointer_to_function(name))
 
 
-def load_quickly(kernel: Any) -> None:
-    """Have a kernel loaded from its cache this way."""
-    cache, load = kernel._cache, kernel._cache._load_overload
-
-    def load_overload(signature: Any, context: Any) -> Any:
-        rtsys.initialize(context)
-        context.codegen()._library_class = LoadedLibrary
-        return load(signature, context)
-
-    cache.load_overload = load_overload
+def prepare_loading(context: Any) -> None:
+    """What numba's target context needs before it loads machine code."""
+    rtsys.initialize(context)
+    context.codegen()._library_class = LoadedLibrary

@@ -14,7 +14,7 @@ from threading import Condition, Thread
 
 from machine.app.pipeline.precompile import DONE, KERNEL
 from machine.app.terminal.progress import Report, reporting, say
-from mdp.kernels.cache import keep, mark, trouble
+from mdp.kernels.cache import is_cached, keep, trouble
 from mdp.kernels.threads import THREADS
 from profiles.profile import Profile
 
@@ -37,7 +37,7 @@ class Compilers:
 
     def begin(self, bundles: Iterable[str]) -> None:
         """Have the bundles compiled that are not cached yet, the first ones first."""
-        new = [bundle for bundle in bundles if bundle not in self._asked and not trouble() and not mark(bundle).exists()]
+        new = [bundle for bundle in bundles if bundle not in self._asked and not trouble() and not is_cached(bundle)]
         with self._changed:
             self._asked.update(new)
             self._waiting.extend(new)

@@ -1,6 +1,5 @@
 """Where compiled kernels are cached: a program of two files, edited between runs of the interpreter."""
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,40 +7,7 @@ from pathlib import Path
 import pytest
 
 from mdp.kernels import cache
-
-KERNEL_FILE = (
-    "from mdp.kernels.kernel import kernel\nfrom mdp.far import PART, far\n\n\n@kernel\ndef near(x):\n    return far(x) + PART\n"
-)
-PART_FILE = "from mdp.kernels.kernel import part\n\nPART = 1.0\n\n\n@part\ndef far(x):\n    return 10.0 * x\n"
-
-
-@pytest.fixture
-def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with the packages' kernel page and two files of a program, and a cache of its own."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cached"))
-    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")  # Python knows an edited file by its size and the second of its date
-    packages = tmp_path / "program" / "mdp"
-    packages.mkdir(parents=True)
-    shutil.copytree(cache.PACKAGES / "mdp" / "kernels", packages / "kernels")
-    profiles = packages.parent / "profiles"
-    profiles.mkdir()
-    for name in ("__init__.py", "errors.py", "folders.py"):
-        shutil.copy(cache.PACKAGES / "profiles" / name, profiles)
-    (packages / "__init__.py").touch()
-    (packages / "near.py").write_text(KERNEL_FILE, encoding="utf-8")
-    (packages / "far.py").write_text(PART_FILE, encoding="utf-8")
-    return packages
-
-
-def output_of(program: Path, code: str) -> str:
-    """What a new interpreter prints."""
-    done = subprocess.run([sys.executable, "-c", code], cwd=program.parent, capture_output=True, text=True, check=True)
-    return done.stdout.strip()
-
-
-def result_and_compilations(program: Path) -> str:
-    """What a new interpreter works out for near(2.0), and how often it had to compile."""
-    return output_of(program, "from mdp.near import near; print(near(2.0), sum(near.stats.cache_misses.values()))")
+from tests.mdp.kernels.small_program import PART_FILE, result_and_compilations
 
 
 def test_a_kernel_is_compiled_once_and_again_when_a_part_or_a_constant_in_another_file_changes(program: Path) -> None:

@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from tests.mdp.kernels.test_cache import output_of, program
-
-__all__ = ["program"]
+from tests.mdp.kernels.small_program import output_of
 
 CALLER = (
     "from mdp.kernels.kernel import kernel\nfrom mdp.near import near\n\n\n@kernel\ndef twice(x):\n    return 2.0 * near(x)\n"

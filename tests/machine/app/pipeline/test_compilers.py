@@ -12,8 +12,7 @@ from mdp.kernels.cache import mark
 @pytest.fixture
 def unmarked(monkeypatch, tmp_path):
     """Nothing is said to be cached, and what is noted is noted elsewhere."""
-    for module in ("mdp.kernels.cache", "machine.app.pipeline.compilers"):
-        monkeypatch.setattr(f"{module}.mark", lambda bundle: tmp_path / bundle)
+    monkeypatch.setattr("mdp.kernels.cache.mark", lambda bundle: tmp_path / bundle)
     return tmp_path
 
 

@@ -1,0 +1,109 @@
+"""Ship kernels: lay compiled kernels beside the packages, so that a first run need not compile for a minute.
+
+    python tools/ship_kernels.py -o dist      a wheel of this checkout with kernels
+    PYTHON tools/ship_kernels.py              the packages that this PYTHON imports get them
+
+They fit the Python, numba and llvmlite that run this script, on processors of the same kind (mdp.kernels.target); with others the
+program compiles as it does without them. What lies in the folder that NUMBA_CACHE_DIR names is not compiled again.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = ("profiles", "mdp", "slicer", "machine", "pyproject.toml", "README.md", "LICENSE")
+# Beside the bundles of a first run: what calls the kernels of some models and settings only.
+RUNS = (
+    "print demo:tree --port sim --set machine.arcs=true",
+    "export demo:figure -o a.gcode --set process.adaptive_cusp_mm=0.05 --set process.seam=random --set search.simplify_faces=500",
+    "simulate a.gcode --baud 115200",
+)
+
+
+def main() -> None:
+    """Make the wheel, or ship with the packages that are imported here."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("-o", "--out", type=Path, metavar="FOLDER", help="make a wheel there")
+    given = options.parse_args()
+    with TemporaryDirectory() as folder:
+        if given.out:
+            print(_wheel(Path(folder), given.out.resolve()))
+        else:
+            os.environ.setdefault("NUMBA_CACHE_DIR", folder)
+            _compile()
+            _ship()
+
+
+def _wheel(copy: Path, out: Path) -> str:
+    """The wheel of a copy of the checkout, which stays as it is."""
+    for name in PROJECT:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "compiled"))
+        else:
+            shutil.copy(ROOT / name, copy)
+    subprocess.run([sys.executable, __file__], check=True, env=os.environ | {"PYTHONPATH": str(copy)})
+    subprocess.run([sys.executable, "-m", "build", "--quiet", "--wheel", "--outdir", str(out), str(copy)], check=True)
+    wheel = max(out.glob("tiltprint-*.whl"), key=lambda path: path.stat().st_mtime)
+    return f"{wheel}: {wheel.stat().st_size / 2**20:.1f} MiB"
+
+
+def _compile() -> None:
+    """Compile by doing what calls the kernels; what is in the cache already is not compiled again."""
+    from machine.app.cli import main as tiltprint
+    from machine.app.pipeline.compilers import wait_for
+    from machine.app.pipeline.precompile import BUNDLES
+    from mdp.kernels.cache import SHIPPED
+
+    shutil.rmtree(SHIPPED, ignore_errors=True)
+    wait_for(BUNDLES)  # in processes, which may fail
+    for bundle in (*BUNDLES.values(), _fine_model, _limb):
+        bundle()
+    with TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
+        os.environ.update(XDG_STATE_HOME=folder, XDG_CONFIG_HOME=folder)
+        os.chdir(folder)
+        for run in RUNS:
+            if tiltprint(run.split()):
+                sys.exit(f"ship_kernels.py: failed: tiltprint {run}")
+
+
+def _fine_model() -> None:
+    """Of more than 20,000 faces."""
+    import manifold3d as m3
+
+    from mdp.cost.hidden import hidden_shares
+    from mdp.cut import mesh_of
+
+    hidden_shares(mesh_of(m3.Manifold.sphere(10.0, 260)))
+
+
+def _limb() -> None:
+    """Cut off while others stand beside it, which travels pass over."""
+    import numpy as np
+
+    from mdp.clearance import Standing
+    from profiles.profile import load
+
+    Standing.of(np.ones((2, 3)), 0.0, load().machine).least_tip_mm(np.zeros((1, 2)))
+
+
+def _ship() -> None:
+    """Copy the kernels that fit the packages as they are."""
+    from mdp.kernels.cache import HAS_KERNELS, PACKAGES, SHIPPED, folder_name, home
+
+    files = [file for package in PROJECT[:4] for file in sorted((PACKAGES / package).rglob("*.py"))]
+    files = [file for file in files if HAS_KERNELS in file.read_bytes() and b"\n@kernel\n" in file.read_bytes()]
+    missing = [str(file.relative_to(PACKAGES)) for file in files if not (home() / folder_name(file)).exists()]
+    if missing:
+        sys.exit(f"ship_kernels.py: no kernels were compiled of {', '.join(missing)}: a line of RUNS should call them")
+    for file in files:
+        shutil.copytree(home() / folder_name(file), SHIPPED / folder_name(file))
+
+
+if __name__ == "__main__":
+    main()
