@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, larger, offset, opening, union
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
 BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
@@ -117,8 +117,7 @@ def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, pr
         return left
     skin = opening(union(near) ^ inside, 0.5 * THIN * width_mm)
     left = opening(left if skin.is_empty() else left - offset(skin, 0.5 * width_mm), width_mm)
-    large = [island for island in islands(left) if island.area() >= FEW_MM2 * width_mm**2]
-    return Polygons.compose(large) if large else Polygons()
+    return larger(left, FEW_MM2 * width_mm**2)
 
 
 def shell_layers(process: Process) -> tuple[int, int]:
@@ -141,11 +140,7 @@ def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Pro
 
 def _large(sparse: Polygons, process: Process) -> Polygons:
     """The sparse pieces that are worth leaving sparse; without infill all are."""
-    if process.infill_density <= 0.0 or sparse.is_empty():
-        return sparse
-    pieces = islands(sparse)
-    large = [piece for piece in pieces if piece.area() >= process.solid_below_mm2]
-    return sparse if len(large) == len(pieces) else Polygons.compose(large) if large else Polygons()
+    return larger(sparse, process.solid_below_mm2) if process.infill_density > 0.0 else sparse
 
 
 def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, process: Process) -> Region:

@@ -115,6 +115,15 @@ def islands(polygons: Polygons) -> list[Polygons]:
     return whole
 
 
+def larger(polygons: Polygons, least_mm2: float) -> Polygons:
+    """The connected pieces that have at least that area."""
+    if polygons.area() < least_mm2:
+        return Polygons()
+    pieces = islands(polygons)
+    large = [piece for piece in pieces if piece.area() >= least_mm2]
+    return polygons if len(large) == len(pieces) else Polygons.compose(large) if large else Polygons()
+
+
 def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
     """The upright rectangle round polygons, farther out by the reach."""
     x0, y0, x1, y1 = polygons.bounds()
@@ -177,11 +186,13 @@ def edges_of(loops: Sequence[Floats]) -> Floats:
     """(n, 4) edges of loops (k, 2), loop after loop."""
     if not loops:
         return np.zeros((0, 4))
-    points = np.concatenate(loops)
-    ends = np.cumsum([len(loop) for loop in loops])
-    after = np.arange(1, len(points) + 1)
-    after[ends - 1] = np.concatenate([[0], ends[:-1]])
-    return np.hstack([points, points[after]])
+    out = np.empty((sum(map(len, loops)), 4))
+    n = 0
+    for loop in loops:
+        end = n + len(loop)
+        out[n:end, :2], out[n : end - 1, 2:], out[end - 1, 2:] = loop, loop[1:], loop[0]
+        n = end
+    return out
 
 
 def area_mm2(loop: Floats) -> float:
