@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from slicer.bead import WALLS, Bead, simplify_bead, with_line_width
-from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area, infill_bridge_beads
+from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area
 from slicer.fill.infill import infill_beads
 from slicer.fill.ironing import ironing_beads
 from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_beads
@@ -42,7 +42,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     if layer and process.infill_density < DENSE:
         area = infill_bridge_area(region.solid, shells.layers[layer - 1].region.sparse, width)
         if not area.is_empty():
-            beads += infill_bridge_beads(area, lines, process.infill_bridge_flow)
+            beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
             region = region.without(area, width)
     beads += skin_beads(region.solid, Kind.SKIN, lines)
     top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)

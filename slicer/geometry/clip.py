@@ -1,6 +1,5 @@
 """Clip: open lines clipped to the inside of polygons, each piece with the edges of the border on which it ends."""
 
-from dataclasses import dataclass
 from math import cos, radians, sin
 from typing import NamedTuple
 
@@ -18,8 +17,7 @@ Indices = NDArray[np.int64]
 EDGES_A_BAND = 4  # the border is sorted into bands of about so many edges, which is what a segment is compared with
 
 
-@dataclass(frozen=True, eq=False)
-class Border:
+class Border(NamedTuple):
     """edges: (m, 4) mm, x0 y0 x1 y1, contour after contour; offsets: (contours + 1,) where each contour begins."""
 
     edges: Floats
@@ -30,9 +28,8 @@ class Border:
         return np.ascontiguousarray((self.edges.reshape(-1, 2) @ rotation_2d(angle_deg)).reshape(-1, 4))
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
-    """points: (n, 2) mm; starts: (k,) first point of each piece; ends: (k, 2) edges on which its two ends lie."""
+class Pieces(NamedTuple):
+    """points: (n, 2) mm; starts: (k + 1,) first point of each piece, and n; ends: (k, 2) edges on which its two ends lie."""
 
     points: Floats
     starts: Indices
@@ -47,15 +44,7 @@ class _Bands(NamedTuple):
     number: int
 
 
-class _Buffers(NamedTuple):
-    """What a kernel fills in: as in Pieces, with room for more."""
-
-    points: Floats
-    starts: Indices
-    ends: Indices
-
-
-NO_PIECES = Pieces(np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros((0, 2), np.int64))
+NO_PIECES = Pieces(np.zeros((0, 2)), np.zeros(1, np.int64), np.zeros((0, 2), np.int64))
 
 
 def border_of(polygons: Polygons) -> Border:
@@ -82,18 +71,18 @@ def clip_lines(points: Floats, starts: Indices, edges: Floats) -> Pieces:
     bounds, bands = np.append(starts, len(points)), _Bands(low, max((high - low) / count, 1e-9), count)
     n, room = -1, 4 * len(points) + 2 * len(edges) + 64
     while n < 0:
-        out = _Buffers(np.empty((room, 2)), np.empty(room, np.int64), np.empty((room, 2), np.int64))
+        out = Pieces(np.empty((room, 2)), np.empty(room + 1, np.int64), np.empty((room, 2), np.int64))
         n, pieces = _clip(points, bounds, edges, bands, out)
         room *= 4
-    return Pieces(out.points[:n].copy(), out.starts[:pieces].copy(), out.ends[:pieces].copy())
+    return Pieces(out.points[:n].copy(), out.starts[: pieces + 1].copy(), out.ends[:pieces].copy())
 
 
 def merge_pieces(several: list[Pieces]) -> Pieces:
     """Pieces of several bundles of lines as one bundle."""
     if len(several) < 2:
         return several[0] if several else NO_PIECES
-    before = np.cumsum([0, *(len(pieces.points) for pieces in several[:-1])])
-    starts = np.concatenate([pieces.starts + shift for pieces, shift in zip(several, before, strict=True)])
+    sizes = np.concatenate([np.diff(pieces.starts) for pieces in several])
+    starts = np.concatenate([[0], np.cumsum(sizes)])
     return Pieces(np.concatenate([p.points for p in several]), starts, np.concatenate([p.ends for p in several]))
 
 
@@ -125,7 +114,7 @@ def _crossing(segment: Segment, side: Segment) -> float:
 
 
 @kernel
-def _clip(points: Floats, bounds: Indices, edges: Floats, bands: _Bands, out: _Buffers) -> tuple[int, int]:
+def _clip(points: Floats, bounds: Indices, edges: Floats, bands: _Bands, out: Pieces) -> tuple[int, int]:
     """Fills in the pieces; returns the number of points and of pieces, -1 where there is no room for them."""
     offsets, listed = _sort_edges(edges, bands)
     seen, shares, crossed = longs(len(edges), -1), floats(len(edges), 0.0), longs(len(edges), 0)
@@ -165,4 +154,5 @@ def _clip(points: Floats, bounds: Indices, edges: Floats, bands: _Bands, out: _B
                 n += 1
         if within:
             n = out.starts[count]
+    out.starts[count] = n
     return n, count
