@@ -10,7 +10,7 @@ from mdp.mesh import Floats
 from slicer.bead import Bead, spacing_mm
 from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.monotonic import monotonic_lines
-from slicer.fill.pattern import MARGIN_MM, Box, LinePattern, Lines, clip_pattern, horizontal_lines
+from slicer.fill.pattern import MARGIN_MM, Box, Draw, Lines, clip_pattern, horizontal_lines
 from slicer.geometry.clip import border_of
 from slicer.geometry.polygons import Polygons, islands, larger, offset, opening, strips
 from slicer.geometry.polyline import length_mm
@@ -70,7 +70,7 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     if inner.is_empty():
         return []
     border = border_of(inner)
-    pieces = clip_pattern(border, _even(solid.angle_deg, solid.spacing_mm))
+    pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
     joint_mm = JOIN * solid.spacing_mm
     if solid.in_order:
         lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm)
@@ -91,7 +91,7 @@ def angle_of_layer_deg(infill_angle_deg: float, layer: int) -> float:
     return infill_angle_deg + 90.0 * (layer % 2)
 
 
-def _even(angle_deg: float, spacing: float) -> LinePattern:
+def _even(spacing: float) -> Draw:
     """Lines spread evenly over the whole extent, at most a spacing apart."""
 
     def draw(box: Box) -> Lines:
@@ -100,4 +100,4 @@ def _even(angle_deg: float, spacing: float) -> LinePattern:
         ends = (low + edge, high - edge) if between > 0 else (0.5 * (low + high),) * 2
         return horizontal_lines(np.linspace(*ends, max(between, 0) + 1, dtype=np.float64), box)
 
-    return LinePattern(angle_deg, draw)
+    return draw
