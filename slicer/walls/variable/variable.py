@@ -139,6 +139,8 @@ def _clipped(line: Wall, borders: Floats, rule: Rule) -> Wall:
 
 def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
     """The first and the last point of a line (n, 2) with that much room that has its bead; last < first: none has."""
+    if room.min() > rule.least - SLACK_MM:
+        return 0, len(room) - 1
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     fits = np.flatnonzero(room > rule.least - SLACK_MM)
     narrow = np.flatnonzero(room <= FEATURE * rule.least - SLACK_MM)
