@@ -78,25 +78,20 @@ def _waves(box: Box, period: float, height: float, along_x: bool) -> Lines:
     unit = period / (2.0 * pi)
     low, high = np.floor(box[0] / period * GYROID_STEPS) - 1, np.ceil(box[2] / period * GYROID_STEPS) + 1
     run = np.arange(low, high + 1) * (2.0 * pi / GYROID_STEPS)
-    rising, falling = _graphs(run, height) if along_x else _graphs_of_x(run, height)
+    if along_x:  # cos z sin y + sin x cos y = -sin z cos x
+        graphs = _solutions(np.full_like(run, cos(height)), np.sin(run), sin(height) * np.cos(run))
+    else:  # cos y sin x + sin z cos x = -sin y cos z, for -x
+        graphs = [-x for x in _solutions(np.cos(run), np.full_like(run, sin(height)), np.sin(run) * cos(height))]
     first, last = np.floor(box[1] / period) - 2, np.ceil(box[3] / period) + 2
-    lines = [graph + 2.0 * pi * k for k in np.arange(first, last + 1) for graph in (rising, falling)]
+    lines = [graph + 2.0 * pi * k for k in np.arange(first, last + 1) for graph in graphs]
     points = np.stack([np.stack([run, line], axis=1) for line in lines]) * unit
     return np.ascontiguousarray(points.reshape(-1, 2)), np.arange(len(lines)) * len(run)
 
 
-def _graphs(x: Floats, z: float) -> tuple[Floats, Floats]:
-    """The two y(x) of one period: sin x cos y + cos z sin y = -sin z cos x."""
-    amplitude, phase = np.hypot(np.sin(x), cos(z)), np.arctan2(np.full_like(x, cos(z)), np.sin(x))
-    away = np.arccos(np.clip(-sin(z) * np.cos(x) / amplitude, -1.0, 1.0))
-    return phase + away, phase - away
-
-
-def _graphs_of_x(y: Floats, z: float) -> tuple[Floats, Floats]:
-    """The two -x(y) of one period: cos y sin x + sin z cos x = -sin y cos z."""
-    amplitude, phase = np.hypot(np.cos(y), sin(z)), np.unwrap(np.arctan2(np.cos(y), np.full_like(y, sin(z))))
-    away = np.arccos(np.clip(-np.sin(y) * cos(z) / amplitude, -1.0, 1.0))
-    return -(phase + away), -(phase - away)
+def _solutions(a: Floats, b: Floats, c: Floats) -> list[Floats]:
+    """The two solutions u of a sin u + b cos u = -c in one period."""
+    phase, away = np.unwrap(np.arctan2(a, b)), np.arccos(np.clip(-c / np.hypot(b, a), -1.0, 1.0))
+    return [phase + away, phase - away]
 
 
 def infill_cell_mm(process: Process) -> float:

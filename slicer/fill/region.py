@@ -65,7 +65,8 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
     first = len(cover.below)
     above = _common(stacked, top)[first + 1 :] if top else insides
     below = _common(stacked[::-1], bottom)[::-1][first - 1 :] if bottom else insides
-    hollow = _without_footings([_sparse(i, cover, above[i], below[i], process) for i in range(len(insides))], cover, process)
+    sparse_areas = [sparse_area(*row, process) for row in zip(cover.insides, above, below, strict=False)]
+    hollow = _without_footings(sparse_areas, cover, process)
     layers = []
     for i, inside in enumerate(insides):
         if inside.is_empty():
@@ -76,11 +77,6 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
         next_section = stacked[first + i + 1] if first + i + 1 < len(stacked) else empty
         layers.append(_region(inside, sparse, uncut, next_section if top else inside, process))
     return layers
-
-
-def _sparse(layer: int, cover: Cover, above: Polygons, below: Polygons, process: Process) -> Polygons:
-    inside = cover.insides[layer]
-    return Polygons() if process.infill_density >= 1.0 or inside.is_empty() else sparse_area(inside, above, below, process)
 
 
 def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process) -> list[Polygons]:
@@ -129,6 +125,8 @@ def shell_layers(process: Process) -> tuple[int, int]:
 
 def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
     """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
+    if process.infill_density >= 1.0 or inside.is_empty():
+        return Polygons()
     width_mm = process.line_width_mm
     covered = inside ^ above ^ below
     sparse = inside
