@@ -44,8 +44,9 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     faces = faces_by_layer(mesh, cuts_mm, risky)
     for i in range(int(sections.on_platform), len(outlines)):
         below = outlines[i - 1] if i else offset(sections.plastic_below or Polygons(), RIM_MM)
-        floating, triangles = _floating(outlines[i], below), faces.get(i, [])
-        hanging = (outlines[i] - below) ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
+        beyond, triangles = outlines[i] - below, faces.get(i, [])
+        floating = _floating(outlines[i], below, beyond.area())
+        hanging = beyond ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
         hanging = hanging if floating.is_empty() else hanging + floating
         if not hanging.is_empty():
             all_need = len(needing.get(i, ())) == len(triangles)
@@ -59,10 +60,13 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     return overhangs
 
 
-def _floating(outline: Polygons, below: Polygons) -> Polygons:
-    """The pieces of a layer that begin over nothing, however steep they are: a bell's rim that gets thick enough for a line."""
-    begun = [] if outline.is_empty() else [piece for piece in islands(outline) if (piece ^ below).is_empty()]
-    return union(begun)
+def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons:
+    """The pieces of a layer that begin over nothing, however steep they are: a bell's rim that gets thick enough for a line.
+
+    beyond_mm2: how much of the layer lies beyond the one below, which such a piece does all.
+    """
+    small = [piece for piece in islands(outline) if piece.area() < beyond_mm2 + LEAST_MM2]
+    return union([piece for piece in small if (piece ^ below).is_empty()])
 
 
 def _sort_islands(

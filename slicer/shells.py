@@ -8,7 +8,7 @@ import numpy as np
 from mdp.kernels.processes import in_order
 from profiles.process import Process
 from slicer.bead import WALLS, Bead, first_layer_process, interface_process, simplify_bead, with_line_width
-from slicer.fill.bridge import Bridge, bridge_area, bridge_beads, find_bridges, infill_bridge_area, infill_bridge_beads
+from slicer.fill.bridge import Bridge, bridge_area, bridge_beads, find_bridges, infill_bridge_area
 from slicer.fill.infill import infill_beads, pattern_density
 from slicer.fill.ironing import ironed_areas, ironing_beads
 from slicer.fill.region import Region, regions
@@ -27,7 +27,6 @@ from slicer.walls.gap import gaps
 from slicer.walls.walls import Walls, wall_beads
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
-
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
 
 
@@ -159,7 +158,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     if layer and process.infill_density < DENSE:
         area = infill_bridge_area(region.solid, shells.layers[layer - 1].region.sparse, width)
         if not area.is_empty():
-            beads += infill_bridge_beads(area, lines, process.infill_bridge_flow)
+            beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
             region = region.without(area, width)
     beads += skin_beads(region.solid, Kind.SKIN, lines)
     top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)

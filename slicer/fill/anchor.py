@@ -17,19 +17,6 @@ from slicer.geometry.clip import Border, Indices, Pieces
 TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
 
 
-class _Pieces(NamedTuple):
-    """points: (n, 2) mm; bounds: (k + 1,) first point of each piece; ends: (k, 2) edges on which its two ends lie.
-
-    contour: (2 k,) contour on which each end lies; group: (k,) only pieces of one group are joined.
-    """
-
-    points: Floats
-    bounds: Indices
-    ends: Indices
-    contour: Indices
-    group: Indices
-
-
 class Limits(NamedTuple):
     """hook_mm: length of a hook; most_mm: longest joint along the border; apart_mm: what a hook keeps from the next end or hook,
     else it is shorter."""
@@ -37,14 +24,6 @@ class Limits(NamedTuple):
     hook_mm: float
     most_mm: float
     apart_mm: float
-
-
-class _Border(NamedTuple):
-    """edges: (m, 4) mm; offsets: (contours + 1,) first edge of each contour; way: (m + 1,) mm along all contours to each edge."""
-
-    edges: Floats
-    offsets: Indices
-    way: Floats
 
 
 class _BorderPoint(NamedTuple):
@@ -60,32 +39,40 @@ def anchor_lines(pieces: Pieces, border: Border, limits: Limits, group: Indices 
 
     group: (k,) only pieces of one group are joined.
     """
-    if not len(pieces.starts):
+    if not len(pieces.ends):
         return []
-    bounds = np.append(pieces.starts, len(pieces.points))
-    contour = np.searchsorted(border.offsets, pieces.ends.ravel(), side="right") - 1
     own = np.zeros(len(pieces.ends), np.int64) if group is None else group
     out = np.empty((len(pieces.points) + 2 * len(border.edges) + 4 * len(pieces.ends) + 8, 2))
     starts = np.empty(len(pieces.ends), np.int64)
-    n, count = _lay_lines(
-        _Pieces(pieces.points, bounds, pieces.ends, contour, own),
-        _Border(border.edges, border.offsets, _way(border.edges)),
-        limits,
-        out,
-        starts,
-    )
+    n, count = _lay_lines(pieces, border, own, limits, out, starts)
     return np.split(out[:n].copy(), starts[1:count])
 
 
+@part
 def _way(edges: Floats) -> Floats:
     """(m + 1,) way along all contours to the beginning of each edge, mm."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(edges[:, 2] - edges[:, 0], edges[:, 3] - edges[:, 1]))])
+    way: Floats = floats(len(edges) + 1, 0.0)
+    for e in range(len(edges)):
+        way[e + 1] = way[e] + np.hypot(edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1])
+    return way
 
 
 @part
-def _ways_along_border(pieces: _Pieces, border: _Border) -> Floats:
+def _contours(pieces: Pieces, border: Border) -> Indices:
+    """(2 k,) contour on which each end lies."""
+    of, contour = longs(len(border.edges), 0), longs(2 * len(pieces.ends), 0)
+    for c in range(len(border.offsets) - 1):
+        for e in range(border.offsets[c], border.offsets[c + 1]):
+            of[e] = c
+    for end in range(len(contour)):
+        contour[end] = of[pieces.ends[end // 2, end % 2]]
+    return contour
+
+
+@part
+def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
     """(2 k,) way along all contours to each end."""
-    points, bounds, ends, edges, way = pieces.points, pieces.bounds, pieces.ends, border.edges, border.way
+    points, bounds, ends = pieces
     along_border: Floats = floats(2 * len(ends), 0.0)
     for k in range(len(ends)):
         for side in range(2):
@@ -96,7 +83,7 @@ def _ways_along_border(pieces: _Pieces, border: _Border) -> Floats:
 
 
 @part
-def _next_ends(along_border: Floats, contour: Indices, border: _Border) -> tuple[Indices, Floats]:
+def _next_ends(along_border: Floats, contour: Indices, offsets: Indices, way: Floats) -> tuple[Indices, Floats]:
     """Of each end the next one on its contour, which may be itself, and how far it is."""
     order = argsort(along_border)
     after, gap = longs(len(along_border), 0), floats(len(along_border), 0.0)
@@ -110,7 +97,7 @@ def _next_ends(along_border: Floats, contour: Indices, border: _Border) -> tuple
             after[here] = there
             gap[here] = along_border[there] - along_border[here]
             if k + 1 == j:
-                gap[here] += border.way[border.offsets[c + 1]] - border.way[border.offsets[c]]
+                gap[here] += way[offsets[c + 1]] - way[offsets[c]]
         i = j
     return after, gap
 
@@ -176,13 +163,13 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
 
 
 @borrower
-def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: _Border) -> int:
+def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: Border, way: Floats) -> int:
     """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
 
     Also its last point; returns the new n.
     """
-    edges, way = border.edges, border.way
-    e, first, end = since.edge, border.offsets[since.contour], border.offsets[since.contour + 1]
+    edges, offsets = border
+    e, first, end = since.edge, offsets[since.contour], offsets[since.contour + 1]
     left, forward = abs(length), length > 0.0
     at = since.way_mm - way[e] if forward else way[e + 1] - since.way_mm
     step = way[e + 1] - way[e]
@@ -202,9 +189,9 @@ def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border:
 
 
 @borrower
-def _append_piece(out: Floats, n: int, pieces: _Pieces, end: int) -> int:
+def _append_piece(out: Floats, n: int, pieces: Pieces, end: int) -> int:
     """Appends the points of a piece, beginning at one of its ends; returns the new n."""
-    first, last = pieces.bounds[end // 2], pieces.bounds[end // 2 + 1] - 1
+    first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
     for i in range(last - first + 1):
         p = first + i if end % 2 == 0 else last - i
         out[n, 0], out[n, 1] = pieces.points[p, 0], pieces.points[p, 1]
@@ -221,11 +208,12 @@ def _reverse(out: Floats, first: int, end: int) -> None:
 
 
 @kernel
-def _lay_lines(pieces: _Pieces, border: _Border, limits: Limits, out: Floats, starts: Indices) -> tuple[int, int]:
+def _lay_lines(pieces: Pieces, border: Border, group: Indices, limits: Limits, out: Floats, starts: Indices) -> tuple[int, int]:
     """Fills in the lines and where each begins; returns the number of points and of lines."""
-    along_border = _ways_along_border(pieces, border)
-    after, gap = _next_ends(along_border, pieces.contour, border)
-    partner, sense = _join_ends(after, gap, pieces.group, limits.most_mm)
+    way, contour = _way(border.edges), _contours(pieces, border)
+    along_border = _ways_along_border(pieces, border.edges, way)
+    after, gap = _next_ends(along_border, contour, border.offsets, way)
+    partner, sense = _join_ends(after, gap, group, limits.most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, limits))
     done = flags(len(pieces.ends))
     n = count = 0
@@ -238,16 +226,16 @@ def _lay_lines(pieces: _Pieces, border: _Border, limits: Limits, out: Floats, st
         starts[count] = n
         count += 1
         if runs[end] != 0.0:
-            since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], along_border[end])
-            first, n = n, _append_run(out, n, since, runs[end], border)
+            since = _BorderPoint(pieces.ends[end // 2, end % 2], contour[end], along_border[end])
+            first, n = n, _append_run(out, n, since, runs[end], border, way)
             _reverse(out, first, n)
         while True:
             done[end // 2] = True
             n = _append_piece(out, n, pieces, end)
             end ^= 1
             if runs[end] != 0.0:
-                since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], along_border[end])
-                n = _append_run(out, n, since, runs[end], border)
+                since = _BorderPoint(pieces.ends[end // 2, end % 2], contour[end], along_border[end])
+                n = _append_run(out, n, since, runs[end], border, way)
             if partner[end] < 0:
                 break
             n -= 1  # the run's last point is the partner itself

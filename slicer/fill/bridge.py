@@ -182,9 +182,10 @@ def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
     return wide if wide.is_empty() else offset(wide, REACH * width_mm) ^ inside
 
 
-def bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:
-    """The lines of a bridge with its own flow."""
-    return [replace(bead, flow=bead.flow * flow) for bead in skin_beads(area, Kind.BRIDGE, lines)]
+def bridge_beads(area: Polygons, lines: SolidLines, flow: float, over_infill: bool = False) -> list[Bead]:
+    """The lines of a bridge with its own flow. over_infill: the first solid ones over sparse infill, across the lines below
+    wherever those have one direction."""
+    return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in skin_beads(area, Kind.BRIDGE, lines)]
 
 
 def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float) -> Polygons:
@@ -199,8 +200,3 @@ def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float)
         return Polygons()
     wide = opening(spanned, 0.5 * NARROW * width_mm)
     return wide if wide.is_empty() else offset(wide, REACH * width_mm) ^ solid
-
-
-def infill_bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:
-    """The first solid lines over sparse infill, across the lines below wherever those have one direction."""
-    return [replace(bead, over_infill=True) for bead in bridge_beads(area, lines, flow)]

@@ -37,7 +37,7 @@ TURN_DEG = 60.0  # a third of the half turn after which lines are themselves aga
 def honeycomb(layer: PatternLayer) -> LinePattern:
     """Zigzags of the density."""
     side = side_mm(layer.spacing_mm, min(layer.density, 1.0))
-    return LinePattern(layer.angle_deg + TURN_DEG * (layer.number % 3), lambda box: _rows(box, side, layer.spacing_mm))
+    return layer.angle_deg + TURN_DEG * (layer.number % 3), lambda box: _rows(box, side, layer.spacing_mm)
 
 
 def side_mm(spacing_mm: float, density: float) -> float:
@@ -70,7 +70,7 @@ def gyroid(layer: PatternLayer) -> LinePattern:
     period = GYROID_LENGTH * layer.spacing_mm / layer.density
     height = 2.0 * pi * layer.z_mm / period
     along_x = abs(cos(height)) > abs(sin(height))
-    return LinePattern(layer.angle_deg + (0.0 if along_x else 90.0), lambda box: _waves(box, period, height, along_x))
+    return layer.angle_deg + (0.0 if along_x else 90.0), lambda box: _waves(box, period, height, along_x)
 
 
 def _waves(box: Box, period: float, height: float, along_x: bool) -> Lines:
@@ -78,25 +78,20 @@ def _waves(box: Box, period: float, height: float, along_x: bool) -> Lines:
     unit = period / (2.0 * pi)
     low, high = np.floor(box[0] / period * GYROID_STEPS) - 1, np.ceil(box[2] / period * GYROID_STEPS) + 1
     run = np.arange(low, high + 1) * (2.0 * pi / GYROID_STEPS)
-    rising, falling = _graphs(run, height) if along_x else _graphs_of_x(run, height)
+    if along_x:  # cos z sin y + sin x cos y = -sin z cos x
+        graphs = _solutions(np.full_like(run, cos(height)), np.sin(run), sin(height) * np.cos(run))
+    else:  # cos y sin x + sin z cos x = -sin y cos z, for -x
+        graphs = [-x for x in _solutions(np.cos(run), np.full_like(run, sin(height)), np.sin(run) * cos(height))]
     first, last = np.floor(box[1] / period) - 2, np.ceil(box[3] / period) + 2
-    lines = [graph + 2.0 * pi * k for k in np.arange(first, last + 1) for graph in (rising, falling)]
+    lines = [graph + 2.0 * pi * k for k in np.arange(first, last + 1) for graph in graphs]
     points = np.stack([np.stack([run, line], axis=1) for line in lines]) * unit
     return np.ascontiguousarray(points.reshape(-1, 2)), np.arange(len(lines)) * len(run)
 
 
-def _graphs(x: Floats, z: float) -> tuple[Floats, Floats]:
-    """The two y(x) of one period: sin x cos y + cos z sin y = -sin z cos x."""
-    amplitude, phase = np.hypot(np.sin(x), cos(z)), np.arctan2(np.full_like(x, cos(z)), np.sin(x))
-    away = np.arccos(np.clip(-sin(z) * np.cos(x) / amplitude, -1.0, 1.0))
-    return phase + away, phase - away
-
-
-def _graphs_of_x(y: Floats, z: float) -> tuple[Floats, Floats]:
-    """The two -x(y) of one period: cos y sin x + sin z cos x = -sin y cos z."""
-    amplitude, phase = np.hypot(np.cos(y), sin(z)), np.unwrap(np.arctan2(np.cos(y), np.full_like(y, sin(z))))
-    away = np.arccos(np.clip(-np.sin(y) * cos(z) / amplitude, -1.0, 1.0))
-    return -(phase + away), -(phase - away)
+def _solutions(a: Floats, b: Floats, c: Floats) -> list[Floats]:
+    """The two solutions u of a sin u + b cos u = -c in one period."""
+    phase, away = np.unwrap(np.arctan2(a, b)), np.arccos(np.clip(-c / np.hypot(b, a), -1.0, 1.0))
+    return [phase + away, phase - away]
 
 
 def infill_cell_mm(process: Process) -> float:
@@ -118,7 +113,7 @@ def infill_beads(area: Polygons, process: Process, *, density: float, layer: int
     else:
         drawn = PatternLayer(layer, z_mm, process.infill_angle_deg, spacing, density)
         border = border_of(inner)
-        pieces = merge_pieces([clip_pattern(border, pattern) for pattern in PATTERNS[process.infill_pattern](drawn)])
+        pieces = merge_pieces([clip_pattern(border, *pattern) for pattern in PATTERNS[process.infill_pattern](drawn)])
         lines = anchor_lines(pieces, border, Limits(process.infill_anchor_mm, process.infill_joint_mm, width))
     return [Bead(Kind.INFILL, line, width, RANK) for line in lines if length_mm(line) > width]
 
@@ -149,25 +144,10 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     return drawn
 
 
-def _rectilinear(layer: PatternLayer) -> list[LinePattern]:
-    """Lines in one direction, turned by 90 degrees from layer to layer."""
-    return [parallel_lines(layer.angle_deg + 90.0 * (layer.number % 2), layer.spacing_mm / layer.density)]
-
-
-def _grid(layer: PatternLayer) -> list[LinePattern]:
-    """Two crossing directions in every layer."""
-    return [parallel_lines(layer.angle_deg + 90.0 * k, 2.0 * layer.spacing_mm / layer.density) for k in range(2)]
-
-
-def _triangles(layer: PatternLayer) -> list[LinePattern]:
-    """Three directions in every layer."""
-    return [parallel_lines(layer.angle_deg + 60.0 * k, 3.0 * layer.spacing_mm / layer.density) for k in range(3)]
-
-
-def _cubic(layer: PatternLayer) -> list[LinePattern]:
-    """Cubes that stand on a corner: their faces, three families of planes, move sideways by z / sqrt(2)."""
-    apart_mm, shift_mm = 3.0 * layer.spacing_mm / layer.density, layer.z_mm / sqrt(2.0)
-    return [parallel_lines(layer.angle_deg + 120.0 * k, apart_mm, shift_mm) for k in range(3)]
+def _straight(layer: PatternLayer, turns_deg: Sequence[float], shift_mm: float = 0.0) -> list[LinePattern]:
+    """Families of parallel lines in several directions, which share the density."""
+    apart_mm = len(turns_deg) * layer.spacing_mm / layer.density
+    return [parallel_lines(layer.angle_deg + turn_deg, apart_mm, shift_mm) for turn_deg in turns_deg]
 
 
 def _concentric(inner: Polygons, spacing_mm: float, density: float) -> list[Floats]:
@@ -180,10 +160,11 @@ def _concentric(inner: Polygons, spacing_mm: float, density: float) -> list[Floa
 
 
 PATTERNS: dict[str, Callable[[PatternLayer], list[LinePattern]]] = {
-    "rectilinear": _rectilinear,
-    "grid": _grid,
-    "triangles": _triangles,
-    "cubic": _cubic,
+    "rectilinear": lambda layer: _straight(layer, [90.0 * (layer.number % 2)]),
+    "grid": lambda layer: _straight(layer, [0.0, 90.0]),
+    "triangles": lambda layer: _straight(layer, [0.0, 60.0, 120.0]),
+    # cubes that stand on a corner: their faces, three families of planes, move sideways by z / sqrt(2)
+    "cubic": lambda layer: _straight(layer, [0.0, 120.0, 240.0], layer.z_mm / sqrt(2.0)),
     "gyroid": lambda layer: [gyroid(layer)],
     "honeycomb": lambda layer: [honeycomb(layer)],
 }

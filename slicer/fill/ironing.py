@@ -7,7 +7,7 @@ from profiles.process import Process
 from slicer.bead import Bead, width_for_mm
 from slicer.fill.region import Region
 from slicer.fill.skin import SolidLines, skin_beads
-from slicer.geometry.polygons import Polygons, islands, offset, opening
+from slicer.geometry.polygons import Polygons, larger, offset, opening
 from slicer.paths import Kind, bead_area_mm2
 
 RANK = 100  # after all else of an island
@@ -26,13 +26,7 @@ def ironed_areas(regions: Sequence[Region], beside: Sequence[Polygons], process:
         region.bare if above.is_empty() else region.bare - offset(above, width)
         for region, above in zip(regions, beside[1:], strict=True)
     ]
-    return [_worth_it(opening(top, 0.5 * width)) for top in tops]
-
-
-def _worth_it(area: Polygons) -> Polygons:
-    """The pieces of an area that are worth the way."""
-    pieces = [piece for piece in islands(area) if piece.area() >= LEAST_MM2] if not area.is_empty() else []
-    return Polygons.compose(pieces) if pieces else Polygons()
+    return [larger(opening(top, 0.5 * width), LEAST_MM2) for top in tops]
 
 
 def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:

@@ -27,7 +27,7 @@ class Cells:
 
 def monotonic_lines(pieces: Pieces, border: Border, angle_deg: float, spacing_mm: float, most_mm: float) -> list[Floats]:
     """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart."""
-    if not len(pieces.starts):
+    if not len(pieces.ends):
         return []
     cells = find_cells(pieces, angle_deg, spacing_mm)
     lines = anchor_lines(pieces, border, Limits(0.0, most_mm, 0.0), cells.of)

@@ -12,7 +12,9 @@ from slicer.geometry.polygons import Polygons
 from slicer.geometry.scanlines import join_lines, scan_lines
 
 Box = tuple[float, float, float, float]
-Lines = tuple[Floats, Indices]
+Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
+Draw = Callable[[Box], Lines]  # for a box x0 y0 x1 y1
+LinePattern = tuple[float, Draw]  # the angle of the frame, deg, in which it is drawn
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
 
 
@@ -27,23 +29,15 @@ class PatternLayer:
     density: float
 
 
-@dataclass(frozen=True, eq=False)
-class LinePattern:
-    """draw gives, for a box x0 y0 x1 y1 of the turned frame, points (n, 2) and the start of each line, mm."""
-
-    angle_deg: float
-    draw: Callable[[Box], Lines]
-
-
-def clip_pattern(border: Border, pattern: LinePattern) -> Pieces:
-    """What of a pattern lies inside a border, in the border's own frame."""
+def clip_pattern(border: Border, angle_deg: float, draw: Draw) -> Pieces:
+    """What of a pattern, drawn in a frame turned by an angle, lies inside a border, in the border's own frame."""
     if not len(border.edges):
         return NO_PIECES
-    edges = border.turned(pattern.angle_deg)
+    edges = border.turned(angle_deg)
     x0, y0 = edges[:, :2].min(axis=0)
     x1, y1 = edges[:, :2].max(axis=0)
-    pieces = clip_lines(*pattern.draw((x0 - MARGIN_MM, y0 - MARGIN_MM, x1 + MARGIN_MM, y1 + MARGIN_MM)), edges)
-    return Pieces(pieces.points @ rotation_2d(pattern.angle_deg).T, pieces.starts, pieces.ends)
+    pieces = clip_lines(*draw((x0 - MARGIN_MM, y0 - MARGIN_MM, x1 + MARGIN_MM, y1 + MARGIN_MM)), edges)
+    return Pieces(pieces.points @ rotation_2d(angle_deg).T, pieces.starts, pieces.ends)
 
 
 def grid_numbers(low: float, high: float, apart_mm: float) -> Floats:
@@ -81,4 +75,4 @@ def parallel_lines(angle_deg: float, apart_mm: float, shift_mm: float = 0.0) -> 
     def draw(box: Box) -> Lines:
         return horizontal_lines((grid_numbers(box[1] - shift_mm, box[3] - shift_mm, apart_mm) + 0.5) * apart_mm + shift_mm, box)
 
-    return LinePattern(angle_deg, draw)
+    return angle_deg, draw

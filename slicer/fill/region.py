@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, larger, offset, opening, union
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
 BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
@@ -65,7 +65,8 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
     first = len(cover.below)
     above = _common(stacked, top)[first + 1 :] if top else insides
     below = _common(stacked[::-1], bottom)[::-1][first - 1 :] if bottom else insides
-    hollow = _without_footings([_sparse(i, cover, above[i], below[i], process) for i in range(len(insides))], cover, process)
+    sparse_areas = [sparse_area(*row, process) for row in zip(cover.insides, above, below, strict=False)]
+    hollow = _without_footings(sparse_areas, cover, process)
     layers = []
     for i, inside in enumerate(insides):
         if inside.is_empty():
@@ -76,11 +77,6 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
         next_section = stacked[first + i + 1] if first + i + 1 < len(stacked) else empty
         layers.append(_region(inside, sparse, uncut, next_section if top else inside, process))
     return layers
-
-
-def _sparse(layer: int, cover: Cover, above: Polygons, below: Polygons, process: Process) -> Polygons:
-    inside = cover.insides[layer]
-    return Polygons() if process.infill_density >= 1.0 or inside.is_empty() else sparse_area(inside, above, below, process)
 
 
 def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process) -> list[Polygons]:
@@ -117,8 +113,7 @@ def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, pr
         return left
     skin = opening(union(near) ^ inside, 0.5 * THIN * width_mm)
     left = opening(left if skin.is_empty() else left - offset(skin, 0.5 * width_mm), width_mm)
-    large = [island for island in islands(left) if island.area() >= FEW_MM2 * width_mm**2]
-    return Polygons.compose(large) if large else Polygons()
+    return larger(left, FEW_MM2 * width_mm**2)
 
 
 def shell_layers(process: Process) -> tuple[int, int]:
@@ -130,6 +125,8 @@ def shell_layers(process: Process) -> tuple[int, int]:
 
 def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
     """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
+    if process.infill_density >= 1.0 or inside.is_empty():
+        return Polygons()
     width_mm = process.line_width_mm
     covered = inside ^ above ^ below
     sparse = inside
@@ -141,11 +138,7 @@ def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Pro
 
 def _large(sparse: Polygons, process: Process) -> Polygons:
     """The sparse pieces that are worth leaving sparse; without infill all are."""
-    if process.infill_density <= 0.0 or sparse.is_empty():
-        return sparse
-    pieces = islands(sparse)
-    large = [piece for piece in pieces if piece.area() >= process.solid_below_mm2]
-    return sparse if len(large) == len(pieces) else Polygons.compose(large) if large else Polygons()
+    return larger(sparse, process.solid_below_mm2) if process.infill_density > 0.0 else sparse
 
 
 def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, process: Process) -> Region:

@@ -10,9 +10,9 @@ from mdp.mesh import Floats
 from slicer.bead import Bead, spacing_mm
 from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.monotonic import monotonic_lines
-from slicer.fill.pattern import MARGIN_MM, Box, LinePattern, Lines, clip_pattern, horizontal_lines
+from slicer.fill.pattern import MARGIN_MM, Box, Draw, Lines, clip_pattern, horizontal_lines
 from slicer.geometry.clip import border_of
-from slicer.geometry.polygons import Polygons, islands, offset, opening, strips
+from slicer.geometry.polygons import Polygons, islands, larger, offset, opening, strips
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 from slicer.walls.gap import LEAST_GAP, gaps
@@ -55,13 +55,7 @@ def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
     spacing, width_mm = solid.spacing_mm, solid.width_mm
     beads: list[Bead] = []
     for island in islands(area):
-        border = border_of(offset(island, -(0.5 * spacing - solid.overlap * width_mm)))
-        pieces = clip_pattern(border, _even(solid.angle_deg, spacing))
-        if solid.in_order:
-            lines = monotonic_lines(pieces, border, solid.angle_deg, spacing, JOIN * spacing)
-        else:
-            lines = anchor_lines(pieces, border, Limits(0.0, JOIN * spacing, 0.0))
-        lines = [line for line in lines if length_mm(line) > 0.5 * width_mm]
+        lines = _lines(offset(island, -(0.5 * spacing - solid.overlap * width_mm)), solid)
         rest = uncovered_area(island, lines, width_mm)
         beads += gaps(rest, width_mm, solid.height_mm)
         total = sum(length_mm(line) for line in lines)
@@ -71,13 +65,25 @@ def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
     return beads
 
 
+def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
+    """The centrelines that fill a piece; inner: as far as they reach."""
+    if inner.is_empty():
+        return []
+    border = border_of(inner)
+    pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
+    joint_mm = JOIN * solid.spacing_mm
+    if solid.in_order:
+        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm)
+    else:
+        lines = anchor_lines(pieces, border, Limits(0.0, joint_mm, 0.0))
+    return [line for line in lines if length_mm(line) > 0.5 * solid.width_mm]
+
+
 def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> Polygons:
     """What of an area lines of that width do not cover, as far as plastic fits into it."""
-    rest = area - strips(lines, 0.5 * width_mm) if lines else area
-    if rest.area() < FEW_MM2 * width_mm**2:
-        return Polygons()
-    pieces = [piece for piece in islands(opening(rest, 0.5 * LEAST_GAP * width_mm)) if piece.area() >= FEW_MM2 * width_mm**2]
-    return Polygons.compose(pieces) if pieces else Polygons()
+    few_mm2 = FEW_MM2 * width_mm**2
+    rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
+    return larger(opening(larger(rest, few_mm2), 0.5 * LEAST_GAP * width_mm), few_mm2)
 
 
 def angle_of_layer_deg(infill_angle_deg: float, layer: int) -> float:
@@ -85,7 +91,7 @@ def angle_of_layer_deg(infill_angle_deg: float, layer: int) -> float:
     return infill_angle_deg + 90.0 * (layer % 2)
 
 
-def _even(angle_deg: float, spacing: float) -> LinePattern:
+def _even(spacing: float) -> Draw:
     """Lines spread evenly over the whole extent, at most a spacing apart."""
 
     def draw(box: Box) -> Lines:
@@ -94,4 +100,4 @@ def _even(angle_deg: float, spacing: float) -> LinePattern:
         ends = (low + edge, high - edge) if between > 0 else (0.5 * (low + high),) * 2
         return horizontal_lines(np.linspace(*ends, max(between, 0) + 1, dtype=np.float64), box)
 
-    return LinePattern(angle_deg, draw)
+    return draw

@@ -45,13 +45,28 @@ def cells_of(polygons: Polygons) -> Cells:
     """The edges of all contours in cells, about one edge a cell."""
     loops = contours(polygons)
     begins = np.cumsum([0, *(len(loop) for loop in loops)]).astype(np.int64)
-    edges = edges_of(loops)
-    loop = np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins))
-    low = edges.reshape(-1, 2).min(axis=0, initial=1e9) - 1.0
-    wide, deep = np.maximum(edges.reshape(-1, 2).max(axis=0, initial=-1e9) + 1.0 - low, 1.0)
+    cells: Cells = _cells_of(edges_of(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
+    return cells
+
+
+@kernel
+def _cells_of(edges: Floats, loop: Indices, begins: Indices) -> Cells:
+    return sort_edges(edges, loop, begins)
+
+
+@part
+def sort_edges(edges: Floats, loop: Indices, begins: Indices) -> Cells:
+    """The cells of edges."""
+    x0, y0, x1, y1 = 1e9, 1e9, -1e9, -1e9
+    for e in range(len(edges)):
+        x0, x1 = min(x0, edges[e, 0], edges[e, 2]), max(x1, edges[e, 0], edges[e, 2])
+        y0, y1 = min(y0, edges[e, 1], edges[e, 3]), max(y1, edges[e, 1], edges[e, 3])
+    x0, y0 = x0 - 1.0, y0 - 1.0
+    wide, deep = max(x1 + 1.0 - x0, 1.0), max(y1 + 1.0 - y0, 1.0)
     size = max(sqrt(wide * deep / max(len(edges), 1)), max(wide, deep) / 1000.0)
-    grid = Grid(float(low[0]), float(low[1]), float(size), int(wide / size) + 1, int(deep / size) + 1)
-    return Cells(edges, loop, begins, grid, *_sort_edges(edges, grid))
+    grid = Grid(x0, y0, size, int(wide / size) + 1, int(deep / size) + 1)
+    first, items = _into_cells(edges, grid)
+    return Cells(edges, loop, begins, grid, first, items)
 
 
 @part
@@ -77,8 +92,8 @@ def _rows(grid: Grid, y0: float, y1: float) -> tuple[int, int]:
     return max(first, 0), min(last, grid.rows - 1)
 
 
-@kernel
-def _sort_edges(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
+@part
+def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
     """first and items of Cells. An edge is a run of cells in every row that it touches."""
     many = 0
     for e in range(len(edges)):
@@ -126,7 +141,7 @@ def crossings(cells: Cells, segment: Segment, shares: Floats, crossed: Indices) 
             if n == len(shares):
                 return -1
             i = n
-            while i > 0 and shares[i - 1] > share:
+            while i > 0 and (shares[i - 1] > share or (shares[i - 1] == share and crossed[i - 1] > e)):
                 shares[i], crossed[i] = shares[i - 1], crossed[i - 1]
                 i -= 1
             shares[i], crossed[i] = share, e

@@ -5,6 +5,7 @@ Outer contours run counter-clockwise, holes clockwise. Only the Positive fill ru
 
 import copyreg
 from collections.abc import Sequence
+from math import pi
 from typing import TypeAlias
 
 import numpy as np
@@ -19,6 +20,8 @@ RESOLUTION_MM = 0.004  # finer detail no printer shows; keeps outer walls within
 CLOSING_MM = 0.018  # so far plastic may reach over a section, 4 % of a usual line, where a slit of twice that is closed
 MITRE = 3.0  # times the distance: corners sharper than 39 degrees are cut off
 ARC_SEGMENTS = 32  # of a full turn: a corner of half a line, 0.2 mm, is round to a micrometre
+ROUNDING_MM2 = 1e-9  # an offset inward that leaves less leaves nothing
+NEAR_MM, LEAST_MM2 = 1e-6, 1e-6  # a contour that is higher by more than this, and larger, is so for Clipper2 too
 
 
 def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
@@ -65,14 +68,32 @@ def _moved(polygons: Polygons, distance_mm: float, corners: JoinType, mitre: flo
     is a hole which touches its outer contour there, or a speck whose sign has been rounded away, nothing is left. A square
     beyond it settles the question.
     """
+    area_mm2, (x0, y0, x1, y1) = polygons.area(), polygons.bounds()
+    if polygons.is_empty() or (distance_mm < 0.0 and not _has_room(area_mm2, min(x1 - x0, y1 - y0), -distance_mm)):
+        return Polygons()
     moved = polygons.offset(distance_mm, corners, mitre, segments)
-    if polygons.is_empty() or moved.area() >= (polygons.area() if distance_mm > 0.0 else 1e-9):
+    if moved.area() >= (area_mm2 if distance_mm > 0.0 else ROUNDING_MM2) or _is_outer_highest(polygons):
         return moved
-    x0, _, _, y1 = polygons.bounds()
     reach = 2.0 * mitre * abs(distance_mm) + 1.0
     square = Polygons.square((reach, reach)).translate((x0, y1 + 2.0 * reach))
     beyond = Polygons.square((3.0 * reach, 3.0 * reach)).translate((x0 - reach, y1 + reach))
     return (polygons + square).offset(distance_mm, corners, mitre, segments) - beyond
+
+
+def _has_room(area_mm2: float, narrow_mm: float, radius_mm: float) -> bool:
+    """Whether a disc may lie in polygons of that area whose upright rectangle is so narrow."""
+    return bool(area_mm2 >= pi * radius_mm**2 and narrow_mm >= 2.0 * radius_mm)
+
+
+def _is_outer_highest(polygons: Polygons) -> bool:
+    """Whether the contour that reaches farthest along y is surely one that runs round plastic."""
+    if polygons.num_contour() == 1:
+        return bool(polygons.area() > LEAST_MM2)
+    loops = contours(polygons)
+    heights = [float(loop[:, 1].max()) for loop in loops]
+    highest = max(range(len(loops)), key=heights.__getitem__, default=-1)
+    alone = sum(height > heights[highest] - NEAR_MM for height in heights) == 1
+    return alone and area_mm2(loops[highest]) > LEAST_MM2
 
 
 def opening(polygons: Polygons, radius_mm: float) -> Polygons:
@@ -110,6 +131,15 @@ def islands(polygons: Polygons) -> list[Polygons]:
             at = max(range(len(whole)), key=lambda k: (filled ^ whole[k]).area())
             whole[at] = whole[at] - filled
     return whole
+
+
+def larger(polygons: Polygons, least_mm2: float) -> Polygons:
+    """The connected pieces that have at least that area."""
+    if polygons.area() < least_mm2:
+        return Polygons()
+    pieces = islands(polygons)
+    large = [piece for piece in pieces if piece.area() >= least_mm2]
+    return polygons if len(large) == len(pieces) else Polygons.compose(large) if large else Polygons()
 
 
 def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
@@ -174,11 +204,13 @@ def edges_of(loops: Sequence[Floats]) -> Floats:
     """(n, 4) edges of loops (k, 2), loop after loop."""
     if not loops:
         return np.zeros((0, 4))
-    points = np.concatenate(loops)
-    ends = np.cumsum([len(loop) for loop in loops])
-    after = np.arange(1, len(points) + 1)
-    after[ends - 1] = np.concatenate([[0], ends[:-1]])
-    return np.hstack([points, points[after]])
+    out = np.empty((sum(map(len, loops)), 4))
+    n = 0
+    for loop in loops:
+        end = n + len(loop)
+        out[n:end, :2], out[n : end - 1, 2:], out[end - 1, 2:] = loop, loop[1:], loop[0]
+        n = end
+    return out
 
 
 def area_mm2(loop: Floats) -> float:

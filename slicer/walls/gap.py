@@ -22,6 +22,8 @@ def gaps(places: Polygons, line_width_mm: float, height_mm: float) -> list[Bead]
 
     They are as wide as the place. What is narrower than LEAST_GAP of a line stays empty.
     """
+    if places.is_empty():
+        return []
     spacing, widest_mm = spacing_mm(line_width_mm, height_mm), MOST_WIDTH * line_width_mm
     rule = Rule(ROUNDS, MOST_WIDTH / SPLIT * spacing, spacing, 0.0, LEAST_GAP * line_width_mm, spacing_mm(widest_mm, height_mm))
     courses = [wall.course for wall in variable_walls(places, rule)]

@@ -6,7 +6,12 @@ from numpy.typing import NDArray
 from mdp.kernels.arrays import flags, floats, longs
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
-from slicer.geometry.segments import Segment, nearest_share, squared_distance
+from slicer.geometry.polyline import PATH_RESOLUTION_MM
+from slicer.geometry.segments import Segment, nearest_share
+
+TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
+SEEN_RESOLUTION_MM = 0.004  # of outer walls, whose points are close where ribs are
+WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
 
 
 @kernel
@@ -49,8 +54,9 @@ def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> F
 
 
 @kernel
-def corners(points: Floats, widths: Floats, tolerance_mm: float, width_tolerance_mm: float) -> NDArray[np.bool_]:
-    """(n,) points that a polyline keeps when it is simplified (Douglas and Peucker 1973), in place and in width."""
+def corners(points: Floats, widths: Floats, level: int) -> NDArray[np.bool_]:
+    """(n,) points that the wall of a level keeps when it is simplified (Douglas and Peucker 1973), in place and in width."""
+    tolerance_mm = PATH_RESOLUTION_MM if level else SEEN_RESOLUTION_MM
     keep = flags(len(points))
     keep[0], keep[len(points) - 1] = True, True
     stack = longs(2 * len(points), 0)
@@ -61,11 +67,13 @@ def corners(points: Floats, widths: Floats, tolerance_mm: float, width_tolerance
         chord = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
         worst, at = 1.0, -1
         for k in range(a + 1, b):
-            share = nearest_share(chord, points[k, 0], points[k, 1])
-            wider = (widths[a] + share * (widths[b] - widths[a]) - widths[k]) / width_tolerance_mm
-            away = squared_distance(chord, points[k, 0], points[k, 1]) / (tolerance_mm * tolerance_mm)
-            if max(away, wider * wider) > worst:
-                worst, at = max(away, wider * wider), k
+            x, y = points[k, 0], points[k, 1]
+            share = nearest_share(chord, x, y)
+            dx, dy = x - chord.x0 - share * (chord.x1 - chord.x0), y - chord.y0 - share * (chord.y1 - chord.y0)
+            wider = (widths[a] + share * (widths[b] - widths[a]) - widths[k]) / WIDTH_STEP_MM
+            far = max((dx * dx + dy * dy) / (tolerance_mm * tolerance_mm), wider * wider)
+            if far > worst:
+                worst, at = far, k
         if at >= 0:
             keep[at] = True
             stack[waiting], stack[waiting + 1], stack[waiting + 2], stack[waiting + 3] = a, at, at, b

@@ -11,19 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, longs, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats
+from slicer.geometry.polyline import length_between
 from slicer.geometry.triangulation import Triangulation
 from slicer.walls.variable.counts import Counts
+from slicer.walls.variable.course import TRANSITION, corners, smoothed
 from slicer.walls.variable.rule import Rule, depth_of, loops_of, spacing_of
 from slicer.walls.variable.skeleton import Skeleton, after, before
 
 MITRE = 100.0  # deg: round a sharper corner of a hole the loop is cut off
 SMOOTH = 0.05  # radians: no mitre for less
-PER_CORNER = 6  # points that a corner of a triangle gives at most
+PER_CORNER = 3  # points that a corner of a triangle gives at most: that on its rib, and two of a mitre
+SHORTEST = 1.0  # nominal spacings: a shorter loop is none
 
 
-class Ribs(NamedTuple):
+class _Ribs(NamedTuple):
     """Points of loops. feet: (n, 2); ways: (n, 2) what is added to a foot for every mm of depth; reach: (n,) half thickness.
 
     depth, spacing: (n,) of the loop there; starts: (k + 1,) where each loop begins.
@@ -38,8 +41,48 @@ class Ribs(NamedTuple):
 
 
 @kernel
-def trace_loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> Ribs:
-    """All loops of a level, 0 outermost."""
+def lay_loops(
+    triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """All loops of a level, 0 outermost, their widths smoothed where counts change.
+
+    Returns points (n, 2), the first of each loop repeated at its end, widths (n,) and where each loop begins (k + 1,).
+    """
+    ribs = _trace(triangulation, skeleton, counts, rule, level)
+    loops, reach_mm = len(ribs.starts) - 1, TRANSITION * rule.inner
+    points, widths = table(len(ribs.reach) + loops, 2), floats(len(ribs.reach) + loops, 0.0)
+    starts = longs(loops + 1, 0)
+    n = count = 0
+    for loop in range(loops):
+        a, size = ribs.starts[loop], ribs.starts[loop + 1] - ribs.starts[loop]
+        way, width = table(size + 1, 2), floats(size + 1, 0.0)
+        for k in range(size + 1):
+            i = a + k % size
+            for axis in range(2):
+                way[k, axis] = ribs.feet[i, axis] + ribs.ways[i, axis] * ribs.depth[i]
+        if length_between(way, 0, size + 1) < SHORTEST * rule.inner:
+            continue
+        depth = smoothed(way[:size], ribs.depth[a : a + size], reach_mm, True)
+        spacing = smoothed(way[:size], ribs.spacing[a : a + size], reach_mm, True)
+        for k in range(size + 1):
+            i = a + k % size
+            deep = min(depth[k % size], ribs.reach[i])
+            width[k] = spacing[k % size] + rule.round if level else 2.0 * deep
+            for axis in range(2):
+                way[k, axis] = ribs.feet[i, axis] + ribs.ways[i, axis] * deep
+        keep = corners(way, width, level)
+        for k in range(size + 1):
+            if keep[k]:
+                points[n, 0], points[n, 1], widths[n] = way[k, 0], way[k, 1], width[k]
+                n += 1
+        count += 1
+        starts[count] = n
+    return points[:n].copy(), widths[:n].copy(), starts[: count + 1].copy()
+
+
+@part
+def _trace(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> _Ribs:
+    """The ribs of all loops of a level."""
     across = triangulation.across
     many = len(skeleton.radii)
     depth, active, seen = floats(many, 0.0), flags(many), flags(3 * many)
@@ -49,7 +92,7 @@ def trace_loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts
             depth[t] = depth_of(rule, counts.beads[t], counts.radii[t], level)
             active[t] = skeleton.radii[t] > depth[t]
             room += 3 * PER_CORNER if active[t] else 0
-    out = Ribs(table(room, 2), table(room, 2), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(room + 1, 0))
+    out = _Ribs(table(room, 2), table(room, 2), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(room + 1, 0))
     n = loops = 0
     for start in range(3 * many):
         if seen[start] or not active[start // 3]:
@@ -74,11 +117,11 @@ def trace_loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts
                 out.depth[k], out.spacing[k] = depth[t], spacing
         loops += 1
         out.starts[loops] = n
-    return Ribs(out.feet[:n], out.ways[:n], out.reach[:n], out.depth[:n], out.spacing[:n], out.starts[: loops + 1])
+    return _Ribs(out.feet[:n], out.ways[:n], out.reach[:n], out.depth[:n], out.spacing[:n], out.starts[: loops + 1])
 
 
 @borrower
-def _add(out: Ribs, n: int, foot: tuple[float, float], way: tuple[float, float], reach: float) -> int:
+def _add(out: _Ribs, n: int, foot: tuple[float, float], way: tuple[float, float], reach: float) -> int:
     out.feet[n, 0], out.feet[n, 1] = foot
     out.ways[n, 0], out.ways[n, 1] = way
     out.reach[n] = reach
@@ -86,7 +129,7 @@ def _add(out: Ribs, n: int, foot: tuple[float, float], way: tuple[float, float],
 
 
 @borrower
-def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: Ribs, n: int) -> int:
+def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: _Ribs, n: int) -> int:
     """Adds the place on the rib of a corner; in the tip of a triangle in a corner of the polygon, that on its bisector."""
     points, tails, across = triangulation
     x, y = skeleton.centres[h // 3, 0], skeleton.centres[h // 3, 1]
@@ -99,20 +142,21 @@ def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: Ribs, n:
 
 
 @borrower
-def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], out: Ribs, n: int) -> int:
+def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], out: _Ribs, n: int) -> int:
     """Adds the mitre between two ribs from one point, where the polygon's outline turns into it."""
     points, tails, _ = triangulation
     a, b = corners
     p = tails[b]
     ax, ay = skeleton.centres[a // 3, 0] - skeleton.feet[a, 0], skeleton.centres[a // 3, 1] - skeleton.feet[a, 1]
     bx, by = skeleton.centres[b // 3, 0] - skeleton.feet[b, 0], skeleton.centres[b // 3, 1] - skeleton.feet[b, 1]
-    turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
-    if turn > -SMOOTH:
+    cross, along = ax * by - ay * bx, ax * bx + ay * by
+    if cross > 0.0 or np.arctan2(cross, along) > -SMOOTH:
         return n
+    turn = np.arctan2(cross, along)
     reach = min(np.hypot(ax, ay), np.hypot(bx, by))
     begin = np.arctan2(ay, ax)
     many = int(np.ceil(abs(np.degrees(turn)) / MITRE))
-    for k in range(min(many, PER_CORNER - 2)):
+    for k in range(many):
         angle = begin + turn * (k + 0.5) / many
         stretch = 1.0 / np.cos(0.5 * turn / many)
         n = _add(out, n, (points[p, 0], points[p, 1]), (stretch * np.cos(angle), stretch * np.sin(angle)), reach / stretch)
@@ -120,7 +164,7 @@ def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, 
 
 
 @borrower
-def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, out: Ribs, n: int) -> int:
+def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, out: _Ribs, n: int) -> int:
     """Adds the place where the loop crosses the axis on the way to a node beyond it."""
     t, beyond = nodes
     here, there = skeleton.radii[t], skeleton.radii[beyond]

@@ -59,19 +59,26 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
     out = Skeleton(table(count, 2), floats(count, 0.0), table(len(tails), 2), flags(len(tails)))
     for t in range(count):
         _put_at_circumcentre(triangulation, t, out)
-        for turn in range(3):
-            near = far = 3 * t
+        centred = in_middle = False
+        while True:
+            near, far, least, most = 3 * t, 3 * t, np.inf, -1.0
             for h in range(3 * t, 3 * t + 3):
-                _foot(points, (preceding[tails[h]], tails[h], following[tails[h]]), h, out)
-                near = h if _away(out, h) < _away(out, near) else near
-                far = h if _away(out, h) > _away(out, far) else far
-            out.radii[t] = _away(out, near) if turn < 2 else 0.0
-            if turn == 0:
-                _centre(out, near, far)
-            elif not _leaves(triangulation, t, out.centres[t, 0], out.centres[t, 1]):
+                away = _foot(points, (preceding[tails[h]], tails[h], following[tails[h]]), h, out)
+                if away < least:
+                    near, least = h, away
+                if away > most:
+                    far, most = h, away
+            out.radii[t] = 0.0 if in_middle else least
+            if in_middle:
                 break
-            else:
-                _put_in_middle(triangulation, t, out)
+            if not centred:
+                centred = True
+                if _centre(out, (near, far), least, most):
+                    continue
+            if not _leaves(triangulation, t, out.centres[t, 0], out.centres[t, 1]):
+                break
+            _put_in_middle(triangulation, t, out)
+            in_middle = True
     for h in range(len(tails)):
         twin = across[h]
         if twin > h:
@@ -125,8 +132,8 @@ def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
 
 
 @borrower
-def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -> None:
-    """Fills in the foot of a corner, on the two sides that meet there."""
+def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -> float:
+    """Fills in the foot of a corner, on the two sides that meet there; returns how far it is from its node."""
     x, y = out.centres[h // 3, 0], out.centres[h // 3, 1]
     least = np.inf
     for k in range(2):
@@ -138,23 +145,24 @@ def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -
         if away < least - TIE_MM:
             least = away
             out.feet[h, 0], out.feet[h, 1] = fx, fy
+    return least
 
 
 @borrower
-def _away(out: Skeleton, h: int) -> float:
-    """How far the foot of a corner is from its node."""
-    return float(np.hypot(out.feet[h, 0] - out.centres[h // 3, 0], out.feet[h, 1] - out.centres[h // 3, 1]))
+def _centre(out: Skeleton, ends: tuple[int, int], short: float, long: float) -> bool:
+    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other.
 
-
-@borrower
-def _centre(out: Skeleton, near: int, far: int) -> None:
-    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other."""
-    t, short, long = near // 3, _away(out, near), _away(out, far)
+    ends: the corners with the nearest and the farthest foot; short, long: how far these are. Returns whether it moved.
+    """
+    near, far = ends
+    t = near // 3
     ax, ay = out.feet[near, 0] - out.centres[t, 0], out.feet[near, 1] - out.centres[t, 1]
     bx, by = out.feet[far, 0] - out.centres[t, 0], out.feet[far, 1] - out.centres[t, 1]
-    if short > 0.0 and ax * bx + ay * by < OPPOSITE * short * long:
-        share = 0.5 * (long - short) / short
-        out.centres[t, 0], out.centres[t, 1] = out.centres[t, 0] - share * ax, out.centres[t, 1] - share * ay
+    if short <= 0.0 or ax * bx + ay * by >= OPPOSITE * short * long:
+        return False
+    share = 0.5 * (long - short) / short
+    out.centres[t, 0], out.centres[t, 1] = out.centres[t, 0] - share * ax, out.centres[t, 1] - share * ay
+    return True
 
 
 @borrower

@@ -27,21 +27,17 @@ import numpy as np
 from mdp.mesh import Floats
 from slicer.bead import Course
 from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, close_loop, contours, edges
-from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm
-from slicer.geometry.triangulation import Triangulation, triangulate
+from slicer.geometry.polygons import Polygons, contours, edges
+from slicer.geometry.polyline import length_mm
+from slicer.geometry.triangulation import triangulate
 from slicer.walls.variable.counts import Counts, count_beads
-from slicer.walls.variable.course import corners, smoothed
+from slicer.walls.variable.course import TRANSITION, corners, smoothed
 from slicer.walls.variable.lines import Line, lines_of, trace_chains
-from slicer.walls.variable.loops import trace_loops
+from slicer.walls.variable.loops import lay_loops
 from slicer.walls.variable.rule import FEATURE, Rule
 from slicer.walls.variable.skeleton import Skeleton, skeleton_of
 
 STEP = 0.42  # nominal spacings: sampling of the boundary
-SHORTEST = 1.0  # nominal spacings: a shorter loop is none
-TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
-SEEN_RESOLUTION_MM = 0.004  # of outer walls, whose points are close where ribs are
-WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
 DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
 DASH = 0.25  # of its width, and as much longer
 SLACK_MM = 0.01  # by which a place may be narrower than the least bead
@@ -51,23 +47,20 @@ THIN = 4.0  # least widths: what is narrower than one and longer than this is a 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """points: (n, 2) mm; widths: (n,) mm; level: 0 outermost; closed: runs on from the last point to the first.
+    """course: its way and widths; level: 0 outermost; closed: it runs round, and its course ends where it begins.
 
     free: sides on which no bead lies beside it.
     """
 
-    points: Floats
-    widths: Floats
+    course: Course
     level: int
     closed: bool
     free: int
 
     @property
-    def course(self) -> Course:
-        """The whole way, back to the first point where it is closed."""
-        if self.closed:
-            return Course(close_loop(self.points), np.append(self.widths, self.widths[0]))
-        return Course(self.points, self.widths)
+    def points(self) -> Floats:
+        """(n, 2) mm, of one that runs round without its first repeated."""
+        return self.course.points[:-1] if self.closed else self.course.points
 
 
 def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
@@ -79,32 +72,17 @@ def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
     counts = count_beads(triangulation.across, skeleton, rule)
     walls: list[Wall] = []
     for level in range(rule.walls):
-        loops = _loops(triangulation, skeleton, counts, rule, level)
+        points, widths, starts = lay_loops(triangulation, skeleton, counts, rule, level)
+        loops = [Course(points[a:b], widths[a:b]) for a, b in pairwise(starts.tolist())]
         if not loops:
             break
-        walls += loops
+        walls += [Wall(loop, level, True, int(level == 0)) for loop in loops]
     lines = [_along(line, rule) for line in lines_of(trace_chains(triangulation.across, skeleton, counts, rule))]
     lines += [_dash(*dot, rule) for dot in _dots(skeleton, counts)]
     borders = edges(polygons) if any(line.level == 0 for line in lines) else np.zeros((0, 4))
     clipped = (_clipped(line, borders, rule) for line in lines)
     walls += [_simplified(line) for line in clipped if len(line.points) > 1]
     return [wall for wall in walls if length_mm(wall.course.points) > 0.0]  # points may fall on each other when they are smoothed
-
-
-def _loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> list[Wall]:
-    """The loops of a level."""
-    ribs = trace_loops(triangulation, skeleton, counts, rule, level)
-    loops = []
-    for a, b in pairwise(ribs.starts.tolist()):
-        rough = ribs.feet[a:b] + ribs.ways[a:b] * ribs.depth[a:b, None]
-        if length_mm(close_loop(rough)) < SHORTEST * rule.inner:
-            continue
-        depth, spacing = (smoothed(rough, values[a:b], TRANSITION * rule.inner, True) for values in (ribs.depth, ribs.spacing))
-        depth = np.minimum(depth, ribs.reach[a:b])
-        points = ribs.feet[a:b] + ribs.ways[a:b] * depth[:, None]
-        widths = spacing + rule.round if level else 2.0 * depth
-        loops.append(_simplified(Wall(points, widths, level, True, int(level == 0))))
-    return loops
 
 
 def _along(line: Line, rule: Rule) -> Wall:
@@ -114,11 +92,12 @@ def _along(line: Line, rule: Rule) -> Wall:
     x, y = (smoothed(line.points, np.ascontiguousarray(row), 0.5 * TRANSITION * rule.inner, closed) for row in line.points.T)
     points, free = np.column_stack([x, y]), 2 * int(line.level == 0)
     if closed:
-        return Wall(points[:-1], widths[:-1], line.level, True, free)
-    points[0], points[-1] = line.points[0], line.points[-1]
-    if line.level == 0 and length_mm(points) < DOT * widths.max():
-        return _dash(points[0], points[-1], float(widths.mean()), rule)
-    return Wall(points, widths, line.level, False, free)
+        points[-1], widths[-1] = points[0], widths[0]
+    else:
+        points[0], points[-1] = line.points[0], line.points[-1]
+        if line.level == 0 and length_mm(points) < DOT * widths.max():
+            return _dash(points[0], points[-1], float(widths.mean()), rule)
+    return Wall(Course(points, widths), line.level, closed, free)
 
 
 def _dots(skeleton: Skeleton, counts: Counts) -> Iterator[tuple[Floats, Floats, float]]:
@@ -138,7 +117,7 @@ def _dash(begin: Floats, end: Floats, width: float, rule: Rule) -> Wall:
     length = float(np.hypot(*step))
     way = step / length if length > 1e-6 else np.array([1.0, 0.0])
     middle, half = 0.5 * (begin + end), 0.5 * (length + max(width - thinner, SHORT * width))
-    return Wall(np.array([middle - half * way, middle + half * way]), np.full(2, thinner), 0, False, 2)
+    return Wall(Course(np.array([middle - half * way, middle + half * way]), np.full(2, thinner)), 0, False, 2)
 
 
 def _clipped(line: Wall, borders: Floats, rule: Rule) -> Wall:
@@ -149,16 +128,19 @@ def _clipped(line: Wall, borders: Floats, rule: Rule) -> Wall:
     """
     if line.level > 0:
         return line
-    room = 2.0 * distances(line.points, borders)
-    widths = np.maximum(np.minimum(line.widths, room), rule.least)
-    first, last = _fitting(line.points, room, rule)
+    points = line.course.points
+    room = 2.0 * distances(points, borders)
+    widths = np.maximum(np.minimum(line.course.widths, room), rule.least)
+    first, last = _fitting(points, room, rule)
     if line.closed and last >= first:
         first, last = 0, len(room) - 1
-    return replace(line, points=line.points[first : last + 1], widths=widths[first : last + 1])
+    return replace(line, course=Course(points[first : last + 1], widths[first : last + 1]))
 
 
 def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
     """The first and the last point of a line (n, 2) with that much room that has its bead; last < first: none has."""
+    if room.min() > rule.least - SLACK_MM:
+        return 0, len(room) - 1
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     fits = np.flatnonzero(room > rule.least - SLACK_MM)
     narrow = np.flatnonzero(room <= FEATURE * rule.least - SLACK_MM)
@@ -177,9 +159,5 @@ def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
 
 
 def _simplified(wall: Wall) -> Wall:
-    points, widths = wall.points, wall.widths
-    if wall.closed:
-        points, widths = close_loop(points), np.append(widths, widths[0])
-    keep = np.flatnonzero(corners(points, widths, PATH_RESOLUTION_MM if wall.level else SEEN_RESOLUTION_MM, WIDTH_STEP_MM))
-    keep = keep[:-1] if wall.closed else keep
-    return replace(wall, points=points[keep], widths=widths[keep])
+    keep = corners(wall.course.points, wall.course.widths, wall.level)
+    return replace(wall, course=Course(wall.course.points[keep], wall.course.widths[keep]))

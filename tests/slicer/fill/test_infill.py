@@ -87,8 +87,8 @@ def test_grid_lines_lie_on_each_other_in_all_layers() -> None:
 @pytest.mark.parametrize("height", [0.4, 3.0, 7.7, 12.1])
 def test_gyroid_lines_lie_on_the_minimal_surface(height: float) -> None:
     unit = GYROID_LENGTH * 0.4 / 0.2 / (2 * np.pi)
-    pattern = gyroid(PatternLayer(0, height, 0.0, 0.4, 0.2))
-    x, y = (pattern.draw((-20, -20, 20, 20))[0] @ rotation_2d(pattern.angle_deg).T / unit).T
+    turned_deg, draw = gyroid(PatternLayer(0, height, 0.0, 0.4, 0.2))
+    x, y = (draw((-20, -20, 20, 20))[0] @ rotation_2d(turned_deg).T / unit).T
     z = height / unit
     assert np.abs(np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)).max() < 1e-9
 
@@ -107,7 +107,7 @@ def test_cubic_lines_lie_on_planes_at_right_angles() -> None:
 
 
 def test_honeycomb_cells_are_regular_hexagons_of_the_density() -> None:
-    points, starts = honeycomb(PatternLayer(0, 0.0, 0.0, 0.4, 0.1)).draw((0, 0, 40, 40))
+    points, starts = honeycomb(PatternLayer(0, 0.0, 0.0, 0.4, 0.1))[1]((0, 0, 40, 40))
     line = points[: starts[1]]
     steps = np.diff(line, axis=0)
     flat, slanted = steps[0::2], steps[1::2]
@@ -126,12 +126,11 @@ def test_clipping_agrees_with_shapely(points: list[tuple[float, float]], angle: 
     hull = m3.CrossSection.hull_points(np.array(points))
     assume(hull.area() > 1.0)
     area = hull - Polygons.circle(4.0, 20).translate((3, 1)) - Polygons.square((30, 1.5)).rotate(33)
-    waves = gyroid(PatternLayer(0, 1.7, angle, 0.4, 0.4 / apart))
-    pieces = clip_pattern(border_of(area), waves)
-    bounds = np.append(pieces.starts, len(pieces.points))
-    clipped_mm = sum(length_mm(pieces.points[a:b]) for a, b in pairwise(bounds))
-    drawn, starts = waves.draw((-60, -60, 60, 60))
-    lines = shapely.MultiLineString([line @ rotation_2d(waves.angle_deg).T for line in np.split(drawn, starts[1:])])
+    turned_deg, draw = gyroid(PatternLayer(0, 1.7, angle, 0.4, 0.4 / apart))
+    pieces = clip_pattern(border_of(area), turned_deg, draw)
+    clipped_mm = sum(length_mm(pieces.points[a:b]) for a, b in pairwise(pieces.starts))
+    drawn, starts = draw((-60, -60, 60, 60))
+    lines = shapely.MultiLineString([line @ rotation_2d(turned_deg).T for line in np.split(drawn, starts[1:])])
     assert clipped_mm == pytest.approx(as_shapely(area).intersection(lines).length, rel=1e-6, abs=1e-4)
 
 

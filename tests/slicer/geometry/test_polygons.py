@@ -23,6 +23,7 @@ from slicer.geometry.polygons import (
     edges,
     half_plane,
     islands,
+    larger,
     offset,
     offset_round,
     opening,
@@ -195,3 +196,19 @@ def test_a_strip_reaches_as_far_as_each_of_its_segments_tells() -> None:
     line = np.array([[0.0, 0.0], [4.0, 0.0], [10.0, 0.0]])
     narrow, wide = shapely.box(-0.5, -0.5, 4.5, 0.5), shapely.box(3.0, -1.0, 11.0, 1.0)
     assert differs_mm2(strips([line], np.array([0.5, 1.0])), narrow | wide) < 1e-9
+
+
+def test_a_speck_whose_area_is_rounding_leaves_nothing_when_it_is_moved_inward() -> None:
+    x = np.array([-8.572013482451439, -8.5720134973526, -8.652947783470154, -8.814816400408745])  # what a boolean once left
+    y = np.array([-16.172413803637028, -16.172413803637028, -16.179024517536163, -16.192245960235596])
+    assert offset(Polygons([np.column_stack([x, y])]), -0.136).is_empty()
+
+
+def test_larger_keeps_the_pieces_of_at_least_that_area_with_their_holes() -> None:
+    pieces = [
+        Polygons.square((2.0, 2.0)) - Polygons.square((1.0, 1.0)).translate((0.5, 0.5)),
+        Polygons.square((1.0, 1.0)).translate((5.0, 0.0)),
+    ]
+    assert larger(Polygons.compose(pieces), 2.0).area() == 3.0
+    assert larger(Polygons.compose(pieces), 1.0).area() == 4.0
+    assert larger(Polygons.compose(pieces), 3.5).is_empty()

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import ROUND_SIDES, Bead
+from slicer.bead import ROUND_SIDES, Bead, Course
 from slicer.geometry.distance import distances
 from slicer.geometry.polygons import Polygons, close_loop, edges
 from slicer.geometry.polyline import length_mm
@@ -22,7 +22,7 @@ from slicer.strokes.pieces import in_pieces
 from slicer.strokes.strokes import strokes_of
 from slicer.walls.layer_walls import bead_rule, layer_walls
 from slicer.walls.variable.counts import count_beads
-from slicer.walls.variable.loops import trace_loops
+from slicer.walls.variable.loops import lay_loops
 from slicer.walls.variable.rule import FEATURE
 from slicer.walls.variable.skeleton import skeleton_of
 from slicer.walls.variable.variable import STEP, Wall, variable_walls
@@ -93,8 +93,8 @@ def test_outer_walls_of_a_thin_plate_are_walls_of_half_its_thickness() -> None:
     (loop,) = variable_walls(plate(0.8), RULE)
     assert loop.closed
     assert loop.level == 0
-    assert loop.widths == pytest.approx(0.4 + 0.5 * HEIGHT * ROUND_SIDES, abs=0.01)
-    assert np.abs(loop.points[:, 1] - 0.4).max() == pytest.approx(0.4 - 0.5 * loop.widths[0], abs=0.005)
+    assert loop.course.widths == pytest.approx(0.4 + 0.5 * HEIGHT * ROUND_SIDES, abs=0.01)
+    assert np.abs(loop.points[:, 1] - 0.4).max() == pytest.approx(0.4 - 0.5 * loop.course.widths[0], abs=0.005)
 
 
 def test_a_wall_of_one_bead_is_an_outer_wall_that_does_not_run_round() -> None:
@@ -144,7 +144,7 @@ def test_a_ring_of_one_bead_runs_round() -> None:
     (bead,) = variable_walls(Polygons.circle(6, 128) - Polygons.circle(5.4, 128), RULE)
     assert bead.closed
     assert length_mm(bead.course.points) == pytest.approx(2 * np.pi * 5.7, rel=0.01)
-    assert bead.widths == pytest.approx(0.6, abs=0.02)
+    assert bead.course.widths == pytest.approx(0.6, abs=0.02)
 
 
 @pytest.mark.parametrize("diameter", np.arange(0.3, 2.4, 0.1).round(1).tolist())
@@ -160,10 +160,10 @@ def test_a_pin_is_filled_by_rings_or_a_dash_inside_it(diameter: float) -> None:
 def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: Points, hole: float, aside: float) -> None:
     section = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
     walls = variable_walls(section, RULE)
-    wider = [wall for wall in walls if wall.level > 0 or wall.closed or wall.widths.min() > RULE.least + 1e-9]
+    wider = [wall for wall in walls if wall.level > 0 or wall.closed or wall.course.widths.min() > RULE.least + 1e-9]
     assert farthest_out_mm(wider, section) < 0.05 * WIDTH
     assert farthest_out_mm(walls, section) < 0.05 * WIDTH + 0.5 * (1.0 - FEATURE) * RULE.least  # where a wall is that thin
-    widths = np.concatenate([wall.widths for wall in walls]) if walls else np.array([WIDTH])
+    widths = np.concatenate([wall.course.widths for wall in walls]) if walls else np.array([WIDTH])
     assert widths.min() > 0.6 * NOZZLE - 1e-9
     assert widths.max() < 2.0 * NOZZLE + 1e-9
 
@@ -251,15 +251,14 @@ def test_two_corners_that_all_but_meet_throw_no_wall_out_of_a_plate(x: float, as
     triangulation = triangulate([corners], STEP * RULE.inner)
     assert triangulation is not None
     skeleton = skeleton_of(triangulation)
-    ribs = trace_loops(triangulation, skeleton, count_beads(triangulation.across, skeleton, RULE), RULE, 0)
-    points = ribs.feet + ribs.ways * ribs.depth[:, None]
+    points, _, _ = lay_loops(triangulation, skeleton, count_beads(triangulation.across, skeleton, RULE), RULE, 0)
     assert (points.min(axis=0) >= 0.0).all()
     assert (points.max(axis=0) <= (10.0, 5.0)).all()
 
 
 def test_a_wall_whose_points_fall_on_each_other_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     def fallen(line: Wall, *_: object) -> Wall:
-        return replace(line, points=line.points[[0, 0]], widths=line.widths[[0, 0]])
+        return replace(line, course=Course(line.course.points[[0, 0]], line.course.widths[[0, 0]]))
 
     fin, rule = Polygons.square((8.0, 0.5)), bead_rule(2, profile().process, 0.2, 0.4)
     assert [wall.closed for wall in variable_walls(fin, rule)] == [False]
