@@ -18,7 +18,7 @@ def length_mm(points: Floats) -> float:
 
 @kernel
 def _length(points: Floats) -> float:
-    return _between(points, 0, len(points))
+    return length_between(points, 0, len(points))
 
 
 @kernel
@@ -26,13 +26,13 @@ def lengths_mm(points: Floats, starts: Indices) -> Floats:
     """(k,) lengths, seen from above, of polylines one after the other; points: (n, 2 or more); starts: (k + 1,)."""
     out: Floats = floats(len(starts) - 1, 0.0)
     for k in range(len(out)):
-        out[k] = _between(points, starts[k], starts[k + 1])
+        out[k] = length_between(points, starts[k], starts[k + 1])
     return out
 
 
 @borrower
-def _between(points: Floats, first: int, end: int) -> float:
-    """Length of the polyline of some of the points."""
+def length_between(points: Floats, first: int, end: int) -> float:
+    """Length of the polyline of some of the points, seen from above."""
     total = 0.0
     for i in range(first + 1, end):
         total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])

@@ -9,14 +9,15 @@ from hypothesis import strategies as st
 
 from machine.kinematics.collision import hull
 from machine.kinematics.table import machine_points
-from machine.planning.reorient import Speeds, Sweep, Turn, poses_between, route, stands, way_s
+from machine.planning.limits import speeds_of
+from machine.planning.reorient import Sweep, Turn, poses_between, route, stands, way_s
 from mdp.head import bodies, corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.machine import CradleBox, Machine
 from profiles.profile import load
 
-SPEEDS = Speeds(10.0, 150.0)
+SPEEDS = speeds_of(load())._replace(lift_mm_s=10.0, travel_mm_s=150.0)
 PRINT = corners((-20.0, -15.0, 0.0), (20.0, 15.0, 50.0))
 AT, TARGET = np.array([10.0, 5.0, 50.2]), np.array([0.0, -40.0, 30.0])
 TURN = Pose(60.0, 50.0)
