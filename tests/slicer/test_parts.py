@@ -4,11 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
 from profiles.errors import SliceError
-from slicer.parts import SlicingProgress, _process_count, slice_parts
+from slicer.parts import SlicingProgress, slice_parts
+from slicer.paths import SlicedPart
+from slicer.slice import slice_supported
 from tests.shapes import box
 from tests.slicer.hand import content, cut, profile
 
@@ -55,6 +58,8 @@ def test_a_part_that_gives_no_path_and_needs_no_floor_is_told_from_any_process(p
 SLICING = """
 import os
 import slicer.parts
+from slicer.paths import SlicedPart
+from slicer.slice import slice_supported
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
@@ -84,6 +89,18 @@ def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -
         assert parent.returncode == -ended_by
 
 
-def test_a_single_part_and_few_layers_are_sliced_here() -> None:
-    assert _process_count(1, 10**6) == 1
-    assert _process_count(5, 10) == 1
+@pytest.mark.parametrize(("planes", "fewest", "here"), [((), 1, 1), (PLANES, 10**6, 3), (PLANES, 1, 0)])
+def test_a_single_part_and_few_layers_are_sliced_here_and_many_elsewhere(
+    planes: tuple[tuple[tuple[float, float, float], float], ...], fewest: int, here: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[int] = []
+
+    def slice_here(*given: Any) -> SlicedPart:
+        seen.append(os.getpid())  # in another process, that process's list
+        return slice_supported(*given)
+
+    monkeypatch.setattr("mdp.kernels.threads.THREADS", 2)
+    monkeypatch.setattr("slicer.parts.FEWEST_LAYERS", fewest)
+    monkeypatch.setattr("slicer.parts.slice_supported", slice_here)
+    assert len(slice_parts(cut(box(10, 10, 24), *planes), profile())) == 1 + len(planes)
+    assert len(seen) == here

@@ -1,5 +1,7 @@
 """Branches by themselves: what shrinking, joining and meeting do to their places, judged by shapely and by all pairs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -7,16 +9,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.geometry.polygons import Polygons, islands
-from slicer.support.branch import MEETING, THICKEST_MM, Branch, Growth, _drop_enclosed, _goals, branch_of, trunk
+from slicer.support.branch import MEETING, THICKEST_MM, Branch, Growth, branch_of, lower_branches, trunk
+from slicer.support.reachable import ReachableAreas
 from slicer.support.tree import CELL_MM, Tree
-from tests.slicer.hand import as_shapely, profile, ragged
+from tests.shapes import box
+from tests.slicer.hand import as_shapely, profile, ragged, sections_at
 
 seeds = st.integers(0, 10**6)
 
 
+def in_the_open(lean_mm: float) -> ReachableAreas:
+    """Two layers of 0.2 mm with nothing in the way of branches."""
+    wide, cuts_mm = Polygons.square((200.0, 200.0), True), np.array([0.1, 0.3])
+    return ReachableAreas(sections_at(box(1, 1, 1), cuts_mm), np.full(2, lean_mm), (Polygons(), Polygons()), (wide, wide))
+
+
 def some_trunks(seed: int, count: int) -> list[Branch]:
+    """Trunks that have come down from different heights, so that they are of different radii."""
     rng = np.random.default_rng(seed)
-    return [trunk(x, y, radius, 20.0) for x, y, radius in rng.uniform((-15, -15, 0.3), (15, 15, 8.0), (count, 3)).tolist()]
+    return [trunk(x, y, 0.3, top_mm) for x, y, top_mm in rng.uniform((-9, -9, 0.5), (9, 9, 40.0), (count, 3)).tolist()]
 
 
 @settings(max_examples=25)
@@ -46,9 +57,12 @@ def test_a_trunk_has_every_place_within_its_radius_and_reaches_little_further(ra
 def test_a_branch_is_dropped_where_a_trunk_has_all_its_places_and_of_equal_ones_one_stays(seed: int, count: int) -> None:
     trunks = some_trunks(seed, count)
     trunks += trunks[: count // 3]
-    left = _drop_enclosed(trunks)
-    discs = [shapely.Point(b.x, b.y).buffer(b.radius, quad_segs=64) for b in trunks]
-    assert shapely.union_all(discs).difference(shapely.union_all([discs[trunks.index(b)] for b in left])).area < 1e-6
+    growth = Growth(0.3, 100.0 / 0.2)  # each is at once as thick as it may be
+    left = lower_branches([replace(b, top_mm=0.2 + b.top_mm * 1e-4) for b in trunks], in_the_open(1e-9), 1, growth)
+    radii = [growth.radius_mm(replace(b, top_mm=0.2 + b.top_mm * 1e-4), 0.2) for b in trunks]
+    discs = [shapely.Point(b.x, b.y).buffer(radius, quad_segs=64) for b, radius in zip(trunks, radii, strict=True)]
+    kept = shapely.union_all([shapely.Point(b.x, b.y).buffer(b.radius, quad_segs=64) for b in left])
+    assert shapely.union_all(discs).difference(kept).area < 1e-6
     pairs = [(a, b) for a in left for b in left if a is not b]
     assert all(np.hypot(a.x - b.x, a.y - b.y) > a.radius - b.radius for a, b in pairs)
     assert len({(b.x, b.y, b.radius) for b in left}) == len(left)
@@ -63,7 +77,9 @@ def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: 
         others = sorted((float(np.hypot(*(own - neighbour))), j) for j, neighbour in enumerate(at) if j != k)
         meets = others and others[0][0] <= 2.0 * MEETING * reach
         expected.append(tuple(0.5 * (own + at[others[0][1]])) if meets else tuple(own))
-    assert np.array(_goals(at, reach)).reshape(-1, 2) == pytest.approx(np.array(expected).reshape(-1, 2))
+    lower = lower_branches([trunk(x, y, 0.3, 0.4) for x, y in at.tolist()], in_the_open(reach), 1, Growth(0.3, 0.0))
+    places = {tuple(np.round(place, 6)) for place in expected}  # of two that have met one is left
+    assert {(round(b.x, 6), round(b.y, 6)) for b in lower} == places
 
 
 @pytest.mark.parametrize(
