@@ -130,6 +130,14 @@ def test_strokes_are_slowed_to_what_the_hot_end_melts() -> None:
     assert max(speeds) * ((0.45 - 0.2) * 0.2 + pi * 0.01) == pytest.approx(1.0)
 
 
+def test_strokes_are_slowed_to_what_the_extruder_pushes() -> None:
+    profile = load(settings=["machine.extruder_speed_mm_s=0.5", "machine.purge_mm=0"])
+    decomposition = post_and_arm(profile.machine)
+    program = plan(decomposition, [squares(decomposition.parts[0], profile)], profile)
+    speeds = {move.speed_mm_s for move in moves_of(program) if isinstance(move, Stroke)}
+    assert max(speeds) * ((0.45 - 0.2) * 0.2 + pi * 0.01) == pytest.approx(0.5 * pi * 1.75**2 / 4)
+
+
 def test_layers_are_numbered_from_one_in_every_part() -> None:
     numbers = [(move.part, move.index) for move in moves_of(printed()[3]) if isinstance(move, BeginLayer)]
     assert numbers == [(1, 1), (1, 2), (1, 3), (2, 1), (2, 2), (2, 3)]

@@ -79,6 +79,16 @@ def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
     assert checked >= 14
 
 
+def test_ways_across_have_the_travel_speed_and_those_straight_up_and_down_the_lift_speed() -> None:
+    words = ("process.lift_mm=0.4", "process.lift_speed_mm_s=5", "process.travel_speed_mm_s=120")
+    travels = [move for move in moves_of(_towers(*words)[0]) if isinstance(move, Travel)][
+        2:
+    ]  # two stand for the way to the start
+    upright = {move.speed_mm_s for move in travels if not np.ptp(move.points_mm[:, :2], axis=0).any()}
+    level = {move.speed_mm_s for move in travels if not np.ptp(move.points_mm[:, 2])}
+    assert (upright, level) == ({5.0}, {120.0})
+
+
 def test_coasting_pushes_nothing_over_the_last_stretch_before_a_retraction() -> None:
     moves = moves_of(_towers("material.coast_mm=0.5", "process.infill_density=1")[0])
     coasted = [a for a, b in pairwise(moves) if isinstance(a, Stroke) and isinstance(b, Wipe) and a.filament_mm[-1] == 0]
@@ -132,6 +142,12 @@ def test_a_wipe_longer_than_its_stroke_goes_on_over_the_way_and_the_strokes_befo
     before = np.array([[9.0, 0.5, 0.2], [0.0, 0.5, 0.2]])
     way = _wiped(_short(0.15, ((10.0, 0.5),)), before)
     assert way == pytest.approx(np.array([[10.15, 0, 0.2], [10, 0, 0.2], [10, 0.5, 0.2], [9, 0.5, 0.2], [8.65, 0.5, 0.2]]))
+
+
+def test_a_wipe_goes_back_over_all_places_that_the_way_to_its_stroke_passed() -> None:
+    way = _wiped(_short(0.15, ((9.4, 0.5), (10.0, 0.5))), np.array([[9.4, 0.9, 0.2], [0.0, 0.9, 0.2]]))
+    places = [[10.15, 0], [10, 0], [10, 0.5], [9.4, 0.5], [9.4, 0.9], [9.05, 0.9]]
+    assert way == pytest.approx(np.insert(places, 2, 0.2, axis=1))
 
 
 def test_a_wipe_never_goes_back_to_the_layer_below() -> None:
