@@ -172,7 +172,9 @@ def test_sparse_is_what_each_of_so_many_layers_below_covers(count: int) -> None:
         expected = layers[i]
         for layer in layers[max(i - count, 0) : i]:
             expected = expected ^ layer
-        assert region.sparse.area() == pytest.approx(expected.area() if i >= count else 0.0)
+        expected = expected if i >= count else Polygons()
+        assert (region.sparse - expected).area() < 1e-6
+        assert (offset(expected, -2.0 * WIDTH) - region.sparse).area() < 1e-6  # beside walls that begin it is solid
 
 
 def test_opening_drops_what_is_too_narrow_only() -> None:
