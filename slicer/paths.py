@@ -147,13 +147,14 @@ class Layer:
     @property
     def points_mm(self) -> Floats:
         """(n, 3) points in the part's frame; a stroke climbs evenly from one below_mm to the other."""
-        heights = np.full(len(self.points), self.z_mm)
+        placed = np.empty((len(self.points), 3))
+        placed[:, :2], placed[:, 2] = self.points, self.z_mm
         for k in np.flatnonzero(self.below_mm.any(axis=1)).tolist():
             a, b = self.starts[k], self.starts[k + 1]
             done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points[a:b], axis=0).T))])
             begin, end = self.below_mm[k]
-            heights[a:b] += -begin + (begin - end) * done / max(float(done[-1]), 1e-12)
-        return np.column_stack([self.points, heights])
+            placed[a:b, 2] += -begin + (begin - end) * done / max(float(done[-1]), 1e-12)
+        return placed
 
     @property
     def volumes_mm3(self) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from machine.dryrun import dry_run
 from machine.dryrun.dryrun import DryRun
 from machine.gcode.writer import write_gcode
-from machine.planning.moves import BeginLayer, MachineProgram, Reorient, Stroke, Travel, Wipe
+from machine.planning.moves import BeginLayer, MachineProgram, Reorient
 from machine.planning.plan import plan
 from machine.planning.stops import Stop
 from mdp.decomposition import Decomposition
@@ -20,7 +20,7 @@ from mdp.search.problem import Problem
 from profiles.profile import Profile, load
 from slicer.parts import slice_parts
 from slicer.paths import SlicedPart
-from tests.machine.hand import moves_of
+from tests.machine.moves import Stroke, Travel, Wipe, moves_of
 from tests.shapes import from_manifold
 
 UP = (0.0, 0.0, 1.0)

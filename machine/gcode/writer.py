@@ -17,7 +17,7 @@ from machine.gcode.pen import UNKNOWN, Pen, angle, number
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
 from machine.gcode.words import PAUSE_REMARK
-from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, rows
+from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, straight_moves
 from machine.planning.timing import move_times
 from mdp.mesh import Floats, Indices
 from mdp.pose import level
@@ -53,10 +53,10 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
     Counted with the waits for hotter layers after turns of the table.
     """
     machine = profile.machine
-    straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
-    stop = np.zeros(len(straight.speed), dtype=np.bool_)
-    times = move_times(straight.end - straight.start, straight.speed, stop, machine, straight.acceleration)
-    seconds = np.bincount(straight.move, weights=times, minlength=len(program))
+    start, end, move = straight_moves(program, level(machine))
+    stop = np.zeros(len(move), dtype=np.bool_)
+    times = move_times(end - start, program.speed[move], stop, machine, program.acceleration_mm_s2[move])
+    seconds = np.bincount(move, weights=times, minlength=len(program))
     heat_c = profile.material.first_layer_nozzle_c
     for k, (row, mark) in enumerate(zip(program.mark_rows.tolist(), program.marks, strict=True)):
         if isinstance(mark, Reorient):
@@ -64,7 +64,7 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
         elif isinstance(mark, BeginLayer):
             heat_c = _nozzle_c(mark, profile)
     elapsed: Floats = np.concatenate([[0.0], np.cumsum(seconds)])
-    return elapsed, float(straight.end[:, 5].max(initial=0.0))
+    return elapsed, float(end[:, 5].max(initial=0.0))
 
 
 def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen) -> Iterator[str]:

@@ -1,16 +1,33 @@
 """Limits: what every axis allows; a program outside is refused before any text is written, a speed is lowered to fit."""
 
+from math import inf
+from typing import NamedTuple
+
 import numpy as np
 
-from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Rows
+from machine.planning.moves import REORIENT, BeginLayer, BeginPart, MachineProgram, Reorient
+from machine.planning.timing import along, axis_speeds
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats, Indices
 from profiles.errors import MoveError
 from profiles.frozen import Limits
 from profiles.machine import Machine
+from profiles.profile import Profile
+from slicer.strokes.speed import travel_mm_s2
 
 ROUNDING = 5e-4
+
+
+class Speeds(NamedTuple):
+    """What moves without extruding may have at most: mm/s straight up and down, across, and of the filament alone; mm/s2, inf
+    where the axes decide; (3,) mm/s of X, Y and Z."""
+
+    lift_mm_s: float
+    travel_mm_s: float
+    filament_mm_s: float
+    acceleration_mm_s2: float
+    axes_mm_s: Floats
 
 
 def axis_limits(machine: Machine) -> dict[str, Limits]:
@@ -24,20 +41,22 @@ def axis_limits(machine: Machine) -> dict[str, Limits]:
     }
 
 
-def check(program: MachineProgram, rows: Rows, machine: Machine) -> None:
-    """Raise MoveError when an end of a straight move lies outside an axis's limits; the first one in print order is named."""
+def check(program: MachineProgram, machine: Machine) -> None:
+    """Raise MoveError when a point or a turn lies outside an axis's limits; the first one in print order is named."""
     limits = axis_limits(machine)
-    least, most = (np.array([pair[k] for pair in limits.values()]) for k in (0, 1))
-    outside = (rows.end[:, :5] < least - ROUNDING) | (rows.end[:, :5] > most + ROUNDING)
+    least, most = np.array(list(limits.values())).T
+    reached = np.full((len(program.points_mm), 5), np.nan)
+    reached[:, :3] = program.points_mm
+    poses = [(mark.pose.tilt_deg, mark.pose.turn_deg) for mark in program.marks if isinstance(mark, Reorient)]
+    reached[program.starts[:-1][program.what == REORIENT], 3:] = np.array(poses).reshape(-1, 2)
+    outside = (reached < least - ROUNDING) | (reached > most + ROUNDING)
     if not outside.any():
         return
-    row, axis = (int(k) for k in np.argwhere(outside)[0])
-    letter = list(limits)[axis]
-    worst = rows.end[row, axis]
+    point, axis = (int(k) for k in np.argwhere(outside)[0])
     unit = "mm" if axis < 3 else "deg"
     raise MoveError(
-        f"{location(program, int(rows.move[row]))}: {letter} would go to {worst:.3f} {unit}, "
-        f"allowed is {least[axis]:g} to {most[axis]:g} {unit} on {machine.name}"
+        f"{location(program, int(np.searchsorted(program.starts, point, side='right')) - 1)}: {list(limits)[axis]} would go to "
+        f"{reached[point, axis]:.3f} {unit}, allowed is {least[axis]:g} to {most[axis]:g} {unit} on {machine.name}"
     )
 
 
@@ -53,35 +72,39 @@ def location(program: MachineProgram, index: int) -> str:
     return f"part {part.index}, layer {layer.index}"
 
 
-def travel_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, machine: Machine) -> Floats:
-    """(k,) speeds lowered to what X, Y and Z allow along paths one after the other; points_mm: (n, 3); starts: (k + 1,)."""
-    most = np.array([machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s])
-    lowered: Floats = np.minimum(speeds_mm_s, np.where(speeds_mm_s <= most.min(), np.inf, _fastest(points_mm, starts, most)))
-    return lowered
-
-
-def travel_speed(points_mm: Floats, speed_mm_s: float, machine: Machine) -> float:
-    """The speed along (n, 3) machine points lowered to what X, Y and Z allow."""
-    if speed_mm_s <= min(machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s):
-        return speed_mm_s
-    return float(travel_speeds(points_mm, np.array([0, len(points_mm)]), np.array([speed_mm_s]), machine)[0])
+def speeds_of(profile: Profile) -> Speeds:
+    """What the process asks for, as far as the axes and the extruder allow it."""
+    process, machine, material = profile.process, profile.machine, profile.material
+    return Speeds(
+        lift_mm_s=min(process.lift_speed_mm_s, machine.z.speed_mm_s),
+        travel_mm_s=min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s),
+        filament_mm_s=min(material.retract_speed_mm_s, machine.extruder_speed_mm_s),
+        acceleration_mm_s2=travel_mm_s2(profile) or inf,
+        axes_mm_s=axis_speeds(machine)[:3],
+    )
 
 
 @kernel
-def _fastest(points_mm: Floats, starts: Indices, most_mm_s: Floats) -> Floats:
-    """(k,) the greatest speed along each path at which no axis is faster than its most."""
-    out: Floats = floats(len(starts) - 1, np.inf)
-    for path in range(len(out)):
-        for k in range(starts[path], starts[path + 1] - 1):
-            squared = 0.0
-            for axis in range(3):
-                squared += (points_mm[k + 1, axis] - points_mm[k, axis]) ** 2
-            length = np.sqrt(squared)
-            for axis in range(3):
-                step = abs(points_mm[k + 1, axis] - points_mm[k, axis])
-                if length > 1e-9 and step > 0.0:
-                    out[path] = min(out[path], most_mm_s[axis] / (step / length))
-    return out
+def path_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, axes_mm_s: Floats) -> Floats:
+    """(k,) speeds lowered to what X, Y and Z allow along paths one after the other; points_mm: (n, 3 or
+    more); starts: (k + 1,)."""
+    lowered: Floats = floats(len(speeds_mm_s), 0.0)
+    for k in range(len(lowered)):
+        lowered[k] = path_speed(points_mm, starts[k], starts[k + 1], speeds_mm_s[k], axes_mm_s)
+    return lowered
+
+
+@borrower
+def path_speed(points_mm: Floats, first: int, end: int, speed_mm_s: float, axes_mm_s: Floats) -> float:
+    """The same along the path of some of the points."""
+    for k in range(first + 1, end):
+        squared = 0.0
+        for axis in range(3):
+            squared += (points_mm[k, axis] - points_mm[k - 1, axis]) ** 2
+        for axis in range(3):
+            step = points_mm[k, axis] - points_mm[k - 1, axis]
+            speed_mm_s = min(speed_mm_s, along(axes_mm_s[axis], step, np.sqrt(squared)))
+    return speed_mm_s
 
 
 def turn_speed(tilt_deg: float, turn_deg: float, machine: Machine) -> float:

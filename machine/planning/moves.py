@@ -1,18 +1,18 @@
-"""Moves: the machine program between the slicer and the G-code text, in machine coordinates, and its straight moves as arrays."""
+"""Moves: the machine program between the slicer and the G-code text, a row for each move, in machine coordinates."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel
+from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.pose import Pose
-from slicer.paths import KINDS, NUMBER, Kind, Unsupported
+from slicer.paths import KINDS, Unsupported
 
 
 @dataclass(frozen=True)
@@ -40,48 +40,6 @@ class BeginLayer:
     nozzle_add_c: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Stroke:
-    """Extruding: points_mm (n, 3) machine coordinates, the first is where the tip already stands; filament_mm (n - 1,).
-
-    fan: 0..1 where it differs from the layer's. acceleration_mm_s2: where it differs from what the axes allow.
-    """
-
-    kind: Kind
-    points_mm: Floats
-    filament_mm: Floats
-    speed_mm_s: float
-    width_mm: float
-    fan: float | None = None
-    acceleration_mm_s2: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Travel:
-    """Moving without extruding through points_mm (n, 3), machine coordinates, the first is where the tip stands."""
-
-    points_mm: Floats
-    speed_mm_s: float
-    acceleration_mm_s2: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Wipe:
-    """Moving over what was just printed while filament is pulled back: points_mm (n, 3), filament_mm (n - 1,) above 0."""
-
-    points_mm: Floats
-    filament_mm: Floats
-    speed_mm_s: float
-
-
-@dataclass(frozen=True)
-class Retract:
-    """Pull filament back (positive) or push it forward again (negative): a prime."""
-
-    filament_mm: float
-    speed_mm_s: float
-
-
 @dataclass(frozen=True)
 class Reorient:
     """Turn the table to `pose` at the slowest axis's pace; the tip stands still at a safe place."""
@@ -100,8 +58,18 @@ class Pause:
 
 
 Mark = BeginPart | BeginLayer | Pause | Reorient
-Move = Mark | Stroke | Travel | Wipe | Retract
 TRAVEL, WIPE, RETRACT, REORIENT, MARK = range(len(KINDS), len(KINDS) + 5)  # behind the numbers of strokes, those of KINDS
+
+
+POINTS, SPEED = 1, 2  # columns of Moves.rows
+
+
+class Moves(NamedTuple):
+    """Moves one after the other. ways (n, 4): X Y Z of their points and the filament pushed on the way to each, 0 at the first
+    point of a path. rows (m, 6): what each is, how many points it has, speed, width, fan, acceleration, as in MachineProgram."""
+
+    ways: Floats
+    rows: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +77,10 @@ class MachineProgram:
     """All moves of a print in order, one row each, and the model's name for the file's head.
 
     points_mm: (n, 3) machine coordinates; starts: (m + 1,) where the points of each move begin; filament_mm: (n,) pushed on the
-    way to each point, 0 at the first one of a path. A retraction and a turn of the table have one point, where the tip stands;
-    other marks have none. Columns, (m,) each: what: index in KINDS of a stroke, else one of TRAVEL ... MARK; speed: mm/s, deg/s
-    of turns; width_mm, fan: NaN where a move has none; acceleration_mm_s2: inf where the axes decide. marks: the values of the
-    rows that are turns and marks, in order.
+    way to each point, 0 at the first one of a path, where the tip already stands. Wipes and retractions push less than 0. A
+    retraction and a turn of the table have one point, where the tip stands; other marks have none. Columns, (m,) each: what:
+    index in KINDS of a stroke, else one of TRAVEL ... MARK; speed: mm/s, deg/s of turns; width_mm; fan: 0..1, NaN for the
+    layer's; acceleration_mm_s2: inf where the axes decide. marks: the values of the rows that are turns and marks, in order.
     """
 
     name: str
@@ -127,51 +95,21 @@ class MachineProgram:
     marks: tuple[Mark, ...]
 
     @classmethod
-    def of(cls, name: str, moves: Iterable[Move]) -> "MachineProgram":
-        """The table of moves."""
-        points: list[Floats] = [np.zeros((0, 3))]
-        filament: list[Floats] = [np.zeros(0)]
-        counts: list[int] = []
-        rows: list[tuple[int, float, float | None, float | None, float | None]] = []
-        marks: list[Mark] = []
-        tip, still = np.zeros((1, 3)), np.zeros(1)
-        for move in moves:
-            pushed: tuple[Floats, ...]
-            if isinstance(move, Stroke):
-                way, pushed = move.points_mm, (still, move.filament_mm)
-                rows.append((NUMBER[move.kind], move.speed_mm_s, move.width_mm, move.fan, move.acceleration_mm_s2))
-            elif isinstance(move, Travel):
-                way, pushed = move.points_mm, (np.zeros(len(move.points_mm)),)
-                rows.append((TRAVEL, move.speed_mm_s, None, None, move.acceleration_mm_s2))
-            elif isinstance(move, Wipe):
-                way, pushed = move.points_mm, (still, -move.filament_mm)
-                rows.append((WIPE, move.speed_mm_s, None, None, None))
-            elif isinstance(move, Retract):
-                way, pushed = tip, (np.array([-move.filament_mm]),)
-                rows.append((RETRACT, move.speed_mm_s, None, None, None))
-            elif isinstance(move, Reorient):
-                way, pushed = tip, (still,)
-                rows.append((REORIENT, move.speed_deg_s, None, None, None))
-                marks.append(move)
-            else:
-                way, pushed = tip[:0], ()
-                rows.append((MARK, 0.0, None, None, None))
-                marks.append(move)
-            points.append(way)
-            filament.extend(pushed)
-            counts.append(len(way))
-            tip = way[-1:] if len(way) else tip
-        what, speed, width_mm, fan, acceleration = zip(*rows, strict=True) if rows else ((),) * 5
+    def of(cls, name: str, pieces: Sequence[Moves], marks: Sequence[Mark]) -> "MachineProgram":
+        """The table of moves one piece after the other."""
+        ways = np.concatenate([np.zeros((0, 4)), *(piece.ways for piece in pieces)])
+        rows = np.concatenate([np.zeros((0, 6)), *(piece.rows for piece in pieces)])
+        what, points, speed, width_mm, fan, acceleration = np.ascontiguousarray(rows.T)
         return cls(
             name=name,
-            points_mm=np.concatenate(points),
-            starts=np.cumsum([0, *counts]),
-            filament_mm=np.concatenate(filament),
-            what=np.array(what, dtype=np.int8),
-            speed=np.array(speed, dtype=np.float64),
-            width_mm=np.array(width_mm, dtype=np.float64),
-            fan=np.array(fan, dtype=np.float64),
-            acceleration_mm_s2=np.array([inf if value is None else value for value in acceleration]),
+            points_mm=np.ascontiguousarray(ways[:, :3]),
+            starts=np.concatenate([[0], np.cumsum(points.astype(np.int64))]),
+            filament_mm=np.ascontiguousarray(ways[:, 3]),
+            what=what.astype(np.int8),
+            speed=speed,
+            width_mm=width_mm,
+            fan=fan,
+            acceleration_mm_s2=acceleration,
             marks=tuple(marks),
         )
 
@@ -189,43 +127,27 @@ class MachineProgram:
         return np.flatnonzero(self.what >= REORIENT)
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """start, end: (n, 6) X Y Z tilt turn E of each straight move (mm, deg, mm); speed: (n,) mm/s, deg/s for pure turns.
+def straight_moves(program: MachineProgram, start: Pose) -> tuple[Floats, Floats, Indices]:
+    """(n, 6) beginning and end of each straight move, X Y Z tilt turn E, and (n,) the row of the program that it belongs to.
 
-    move: (n,) the row of the program that it belongs to. acceleration: (n,) mm/s2, inf where the axes decide.
+    start: how the table stands before the first one.
     """
-
-    start: Floats
-    end: Floats
-    speed: Floats
-    move: Indices
-    acceleration: Floats
-
-
-def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
-    """All straight moves of a program that begins with the table at (tilt_deg, turn_deg)."""
     counts = np.diff(program.starts)
     move = np.repeat(np.arange(len(program)), counts)
     ends = np.ones(len(move), np.bool_)
     ends[program.starts[:-1][(counts > 0) & (program.what <= WIPE)]] = False  # a path has one more point than it has steps
     at = np.flatnonzero(ends)
-    stands = program.what[move[at]] > WIPE
-    places = program.points_mm[np.where(stands, at, at - 1)]
-    angles = [
-        (tilt_deg, turn_deg),
-        *((mark.pose.tilt_deg, mark.pose.turn_deg) for mark in program.marks if isinstance(mark, Reorient)),
-    ]
-    turns = np.cumsum(program.what == REORIENT)[move[at]]
-    before = turns - (program.what[move[at]] == REORIENT)
-    table = np.array(angles)
-    sums = _sums(program.filament_mm[at], np.bincount(move[at], minlength=len(program)))
-    return Rows(
-        np.column_stack([places, table[before], sums[:-1]]),
-        np.column_stack([program.points_mm[at], table[turns], sums[1:]]),
-        program.speed[move[at]],
-        move[at],
-        program.acceleration_mm_s2[move[at]],
+    move = move[at]
+    places = program.points_mm[np.where(program.what[move] > WIPE, at, at - 1)]
+    poses = [start, *(mark.pose for mark in program.marks if isinstance(mark, Reorient))]
+    angles = np.array([(pose.tilt_deg, pose.turn_deg) for pose in poses])
+    turns = program.what == REORIENT
+    after = np.cumsum(turns)[move]
+    sums = _sums(program.filament_mm[at], np.bincount(move, minlength=len(program)))
+    return (
+        np.column_stack([places, angles[after - turns[move]], sums[:-1]]),
+        np.column_stack([program.points_mm[at], angles[after], sums[1:]]),
+        move,
     )
 
 
@@ -241,3 +163,18 @@ def _sums(pushed_mm: Floats, counts: Indices) -> Floats:
             row += 1
             sums[row] = before + within
     return sums
+
+
+@borrower
+def add_point(out: Moves, done: Indices, x: float, y: float, z: float, pushed_mm: float) -> None:
+    """Write the next point. done (2,): how many points and rows are written."""
+    out.ways[done[0], 0], out.ways[done[0], 1], out.ways[done[0], 2], out.ways[done[0], 3] = x, y, z, pushed_mm
+    done[0] += 1
+
+
+@borrower
+def add_row(out: Moves, done: Indices, what: int, points: int, speed: float, acceleration_mm_s2: float) -> None:
+    """Write the next row, the move of the last points, which has neither width nor fan."""
+    row = out.rows[done[1]]
+    row[0], row[1], row[2], row[3], row[4], row[5] = what, points, speed, np.nan, np.nan, acceleration_mm_s2
+    done[1] += 1

@@ -39,7 +39,7 @@ def find_park_position(
     most = machine.z.limits_mm[1]
     top = obstacle_top_mm(machine, printed, pose) + machine.lift_mm
     height = min(max(top, z + min(machine.lift_mm, most - z)), most)
-    while not _path_is_clear(machine, pose, np.array([x, y, z]), np.array([x, y, height])):
+    while not is_way_clear(machine, pose, np.array([x, y, z]), np.array([x, y, height]), parts=PARTS):
         height = z + (height - z) / 2.0
         if height - z < min(1.0, machine.clearance_mm):
             return None
@@ -48,7 +48,7 @@ def find_park_position(
         return Park(lift, lift)
     for point in sorted([*stands, *_corners(machine)], key=lambda point: abs(point[0] - x) + abs(point[1] - y)):
         stand = (*point, height)
-        if height >= top - 1e-9 or _path_is_clear(machine, pose, np.array(lift), np.array(stand), printed):
+        if height >= top - 1e-9 or is_way_clear(machine, pose, np.array(lift), np.array(stand), printed, PARTS):
             return Park(lift, stand)
     return Park(lift, lift)
 
@@ -79,16 +79,17 @@ def _corners(machine: Machine) -> list[tuple[float, float]]:
     return [(x, y) for x in (left + ASIDE_MM, right - ASIDE_MM) for y in (front + ASIDE_MM, back - ASIDE_MM)]
 
 
-def _path_is_clear(machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None) -> bool:
-    """True when each body keeps what it must from the solids, piece by piece of the way."""
-    normal = rotation(machine, pose) @ UP
-    tried = np.vstack([UP, normal, directions(normal)])
-    shares = np.linspace(0.0, 1.0, PARTS + 1)
-    begins = start + shares[:-1, None] * (end - start)
-    ends = start + shares[1:, None] * (end - start)
+def is_way_clear(
+    machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None, parts: int = 1
+) -> bool:
+    """True when each body keeps what it must from table, cradle and print while the tip goes from start to end, tried as a whole
+    or in so many parts, for which there are more directions that may prove it."""
+    tried = directions(rotation(machine, pose) @ UP)
+    shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
+    places = start + shares * (end - start)
     for _, reach_of in solids(machine, pose, printed):
         reach = reach_of(tried)
         for body in bodies(machine):
-            if float(sweep_gaps(body, begins, ends, tried, reach).min()) < body.need_mm - 1e-6:
+            if float(sweep_gaps(body, places[:-1], places[1:], tried, reach).min()) < body.need_mm - 1e-6:
                 return False
     return True

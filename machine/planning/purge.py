@@ -7,8 +7,9 @@ from math import sqrt
 import numpy as np
 
 from machine.kinematics.table import machine_points, part_shift, workpiece_points
+from machine.planning.limits import axis_limits
 from machine.planning.moves import MachineProgram
-from machine.planning.reorient import is_way_clear
+from machine.planning.park_position import is_way_clear
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.pose import level
@@ -37,13 +38,14 @@ def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Pr
     if length_mm <= 0.0:
         return None
     low, width_mm, z_mm = _low_strokes(parts, sliced, machine), purge_width_mm(profile), profile.process.first_layer_height_mm
-    pose = level(machine)
+    pose, (least, most) = level(machine), np.array(list(axis_limits(machine).values())[:3]).T
     for count, outward in product(range(1, MOST_LANES + 1), OUTWARD):
         lanes = _lanes(machine, outward, count, length_mm / count, width_mm)
         if lanes is None or (count > 1 and length_mm / count < SHORTEST_MM) or _touches(low, lanes, 0.5 * width_mm + GAP_MM):
             continue
         points = machine_points(machine, pose, np.column_stack([lanes, np.full(len(lanes), z_mm)]))
-        if _in_reach(machine, points) and all(is_way_clear(machine, pose, a, b) for a, b in pairwise(points)):
+        reached = bool(((points >= least) & (points <= most)).all())
+        if reached and all(is_way_clear(machine, pose, a, b) for a, b in pairwise(points)):
             return points
     return None
 
@@ -95,8 +97,3 @@ def _touches(beads: Floats, lanes: Floats, gap_mm: float) -> bool:
     enter = np.where(parallel, np.where(inside, -np.inf, np.inf), np.minimum(first, last)).max(axis=1, initial=-np.inf)
     leave = np.where(parallel, np.where(inside, np.inf, -np.inf), np.maximum(first, last)).min(axis=1, initial=np.inf)
     return bool(((enter <= leave) & (enter <= 1.0) & (leave >= 0.0)).any())
-
-
-def _in_reach(machine: Machine, points: Floats) -> bool:
-    limits = np.array([machine.x.limits_mm, machine.y.limits_mm, machine.z.limits_mm])
-    return bool(((points >= limits[:, 0]) & (points <= limits[:, 1])).all())

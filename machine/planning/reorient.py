@@ -9,12 +9,14 @@ cradle and print, swept: between two poses that are tried each direction's reach
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise, product
 from math import ceil, hypot, inf, radians
 
 import numpy as np
 
-from machine.kinematics.collision import Printed, solids, sweep_gaps, swing_mm
-from machine.planning.park_position import obstacle_top_mm
+from machine.kinematics.collision import Printed, solids, swing_mm
+from machine.planning.limits import Speeds
+from machine.planning.park_position import is_way_clear
 from machine.planning.timing import move_times
 from mdp.directions.spread import spread
 from mdp.head import bodies, directions
@@ -30,14 +32,6 @@ STANDS = 7
 FIELD = 60
 TRIED = 12
 COARSE = 16
-
-
-@dataclass(frozen=True)
-class Speeds:
-    """mm/s that the process asks for: straight up and down, and across."""
-
-    lift_mm_s: float
-    travel_mm_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,23 +178,28 @@ def stands(machine: Machine, turn: Turn) -> Iterator[tuple[float, float]]:
     there = here if turn.target_mm is None else turn.target_mm[:2]
     for point in (here, there, 0.5 * (here + there)):
         yield float(point[0]), float(point[1])
-    xs, ys = (np.linspace(*axis.limits_mm, STANDS) for axis in (machine.x, machine.y))
-    for x in xs:
-        for y in ys:
-            yield float(x), float(y)
+    xs, ys = (np.linspace(*axis.limits_mm, STANDS).tolist() for axis in (machine.x, machine.y))
+    yield from product(xs, ys)
 
 
 def way_s(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float], machine: Machine, speeds: Speeds) -> float:
-    """Seconds of a route: up to the first of z_mm, to `over`, (turn,) at the second across, down; it stops between its moves."""
-    (turning, across), at, target = z_mm, turn.at_mm, turn.target_mm
-    places = [at, [*at[:2], turning], [*over, turning]]
-    if target is not None:
-        places += [[*over, across], [*target[:2], across], target]
-    steps = np.zeros((len(places) - 1, 6))
-    steps[:, :3] = np.diff(np.array(places), axis=0)
+    """Seconds of a route; it stops between its moves."""
+    before, after = _places(turn, over, z_mm)
+    steps = np.zeros((len(before) + len(after) - 2, 6))
+    steps[:, :3] = np.diff(np.array([*before, *after[1:]]), axis=0)
     upright = np.hypot(steps[:, 0], steps[:, 1]) < 1e-9
     speed = np.where(upright, speeds.lift_mm_s, speeds.travel_mm_s)
     return float(move_times(steps, speed, np.ones(len(steps), dtype=np.bool_), machine).sum())
+
+
+def _places(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float]) -> tuple[list[Floats], list[Floats]]:
+    """Where the tip goes: up to the first of z_mm and to `over`; from there, turned, to the second of them, across, and down."""
+    at, target = turn.at_mm, turn.target_mm
+    stand = np.array([*over, z_mm[0]])
+    before = [at, np.array([*at[:2], z_mm[0]]), stand]
+    if target is None:
+        return before, [stand]
+    return before, [stand, np.array([*over, z_mm[1]]), np.array([*target[:2], z_mm[1]]), target]
 
 
 def _ways_clear(candidate: Route, turn: Turn, machine: Machine) -> bool:
@@ -209,29 +208,6 @@ def _ways_clear(candidate: Route, turn: Turn, machine: Machine) -> bool:
     What is printed need not be tested: in either pose the ways across lie above it, and nothing is under the head where the tip
     goes straight up or down.
     """
-    start, end, at, target = turn.start, turn.end, turn.at_mm, turn.target_mm
-    stand = np.array([*candidate.over_mm, candidate.z_mm])
-    ways = [(start, at, np.array([*at[:2], candidate.z_mm])), (start, np.array([*at[:2], candidate.z_mm]), stand)]
-    if target is not None:
-        raised, over = np.array([*candidate.over_mm, candidate.across_z_mm]), np.array([*target[:2], candidate.across_z_mm])
-        ways += [(end, stand, raised), (end, raised, over), (end, over, target)]
+    halves = _places(turn, candidate.over_mm, (candidate.z_mm, candidate.across_z_mm))
+    ways = [(pose, a, b) for pose, places in zip((turn.start, turn.end), halves, strict=True) for a, b in pairwise(places)]
     return all(is_way_clear(machine, pose, a, b) for pose, a, b in ways if float(np.linalg.norm(b - a)) > 1e-9)
-
-
-def is_way_clear(machine: Machine, pose: Pose, start: Floats, end: Floats) -> bool:
-    """True when each body keeps what it must from table and cradle while the tip goes from start to end."""
-    normal = rotation(machine, pose) @ UP
-    for tried in (np.array([UP, normal]), directions(normal)):
-        reaches = [reach_of(tried) for _, reach_of in solids(machine, pose)]
-        if all(
-            float(sweep_gaps(body, start[None], end[None], tried, reach)[0]) >= body.need_mm - 1e-6
-            for body in bodies(machine)
-            for reach in reaches
-        ):
-            return True
-    return False
-
-
-def top_z(machine: Machine, pose: Pose) -> float:
-    """Machine Z at which the tip is lift_mm above all of table and cradle at a pose, wherever it stands."""
-    return obstacle_top_mm(machine, None, pose) + machine.lift_mm

@@ -109,11 +109,16 @@ def _allowed(
     for k in range(len(deltas)):
         cruise[k] = speed[k]
         for axis in range(6):
-            share = abs(deltas[k, axis]) / max(length[k], TINY)
-            if share > 0.0:
-                cruise[k] = min(cruise[k], most_speed[axis] / share)
-                acceleration[k] = min(acceleration[k], most_acceleration[axis] / share)
+            cruise[k] = min(cruise[k], along(most_speed[axis], deltas[k, axis], length[k]))
+            acceleration[k] = min(acceleration[k], along(most_acceleration[axis], deltas[k, axis], length[k]))
     return cruise, acceleration
+
+
+@borrower
+def along(most: float, step: float, length: float) -> float:
+    """What a move of some length may have when one axis, which makes a step of it, may have at most so much."""
+    share = abs(step) / max(length, TINY)
+    return most / share if share > 0.0 else np.inf
 
 
 @borrower

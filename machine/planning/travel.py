@@ -1,109 +1,105 @@
-"""Travel: how the tip gets from one stroke to the next: pulling back with a wipe, lifting, crossing, priming."""
+"""Travel: how the tip gets about between strokes: pulling back with a wipe, lifting, crossing."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import dist
+from functools import cached_property
+from math import inf, nan
+from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning import limits
 from machine.planning.lift import clear_height_mm
-from machine.planning.moves import Move, Retract, Travel, Wipe
+from machine.planning.limits import Speeds, path_speed, path_speeds, speeds_of
+from machine.planning.moves import MARK, REORIENT, RETRACT, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
 from mdp.clearance import Standing
-from mdp.mesh import Floats
+from mdp.kernels.arrays import longs, table
+from mdp.kernels.kernel import borrower, kernel, part
+from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
 from mdp.pose import Pose
 from profiles.errors import MoveError
 from profiles.profile import Profile
-from slicer.geometry.polyline import length_mm
-from slicer.paths import Layer, Path
-from slicer.strokes.speed import travel_mm_s2
-from slicer.strokes.wiping import STANDING_MM, first_length, runs_round, wipe_trail
+from slicer.geometry.polyline import length_between
+from slicer.strokes.wiping import STANDING_MM, distance, first_length, runs_round, wipe_trail
 
 TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
+NOWHERE = np.zeros((0, 3))
 
 
 @dataclass
 class Tip:
-    """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back.
+    """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back, and all moves so far.
 
-    trail: (n, 3) a way that a wipe may go over; printed: strokes (n, 3) after it, each with its layer, its row there and the
-    shift from the part frame, none from before a retraction. run_in_mm: filament that the next strokes inside are to push beyond
-    their own. limb: while a limb is printed, its part number and what stands beside it.
+    trail: (n, 3) the way of a wipe over what has been printed since the last retraction. run_in_mm: filament that the next
+    strokes inside are to push beyond their own. limb: while a limb is printed, its part number and what stands beside it.
     """
 
+    profile: Profile
     at_mm: Floats
     pose: Pose
     retracted_mm: float = 0.0
     prime_extra_mm: float = 0.0
     run_in_mm: float = 0.0
-    trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    printed: list[tuple[Floats, Layer, int, Floats]] = field(default_factory=list)
+    trail: Floats = field(default_factory=lambda: NOWHERE)
     limb: tuple[int, Standing] | None = None
+    moves: list[Moves] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
 
-    def forget(self) -> None:
-        """Nothing of what was printed is to be wiped over any more."""
-        self.trail = self.trail[:0]
-        self.printed.clear()
+    @cached_property
+    def speeds(self) -> Speeds:
+        """What its moves between strokes may have."""
+        return speeds_of(self.profile)
 
-    def way_back(self, wipe_mm: float) -> Floats:
-        """The way (n, 3) that a wipe may go from here, that long where there is as much."""
-        trail, since = self.trail, list[tuple[Floats, Path, Floats]]()
-        for points, layer, k, shift in reversed(self.printed):
-            since.append((points, layer.path(k), shift))
-            if _suffices(*since[-1][:2], wipe_mm):
-                break
-        for points, path, shift in reversed(since):
-            trail = trail_after(points, path, trail, shift, wipe_mm)
-        return trail
+    def add(self, moves: Moves) -> None:
+        """Moves that begin where it stands."""
+        self.moves.append(moves)
+        if len(moves.ways):
+            self.at_mm = moves.ways[-1, :3]
+
+    def move(self, what: int, way_mm: Floats, pushed_mm: Floats | float, speed: float, acceleration_mm_s2: float = inf) -> None:
+        """One move that is not a stroke, along (n, 3) points."""
+        ways = np.empty((len(way_mm), 4))
+        ways[:, :3], ways[:, 3] = way_mm, pushed_mm
+        self.add(Moves(ways, np.array([[what, len(way_mm), speed, nan, nan, acceleration_mm_s2]])))
+
+    def mark(self, mark: Mark) -> None:
+        """A mark, or a turn of the table, after which nothing of what was printed is to be wiped over any more."""
+        self.marks.append(mark)
+        if isinstance(mark, Reorient):
+            self.move(REORIENT, self.at_mm[None], 0.0, mark.speed_deg_s)
+            self.pose, self.trail = mark.pose, NOWHERE
+        else:
+            self.move(MARK, NOWHERE, 0.0, 0.0)
 
 
-def to_path(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats, profile: Profile) -> Iterator[Move]:
-    """To a stroke's start: up to the layer first, then along the approach (k, 2); or pulled back and lifted, straight.
+def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats) -> float:
+    """Z at which the tip crosses along an approach (k, 2) to a stroke's start, pulled back where it `retracts`.
 
     Within a limb the filament is pulled back and the tip lifted wherever the head would meet what stands beside the limb.
     """
-    if dist(start.tolist(), tip.at_mm.tolist()) <= STANDING_MM:
-        return
     if retracts:
-        yield from retract(tip, profile)
-    lift = profile.process.lift_mm if retracts else 0.0
-    over = max(float(start[2]), min(float(start[2]) + lift, profile.machine.z.limits_mm[1]))
-    if tip.limb is not None:
-        clear = _over_standing(tip, approach, start, shift, over, profile)
-        if clear > over and not retracts:
-            yield from retract(tip, profile)  # a wipe moves the tip
-            clear = _over_standing(tip, approach, start, shift, over, profile)
-        over = clear
-    if abs(over - float(tip.at_mm[2])) > STANDING_MM:
-        yield from go(tip, [*tip.at_mm[:2], over], profile)
-    points = _way(tip, approach, start, over)
-    if len(points) > 1:
-        tip.at_mm = points[-1]
-        yield Travel(points, travel_speed(profile), travel_mm_s2(profile))
-    yield from go(tip, list(start), profile)
-    tip.at_mm = start
+        retract(tip)
+    lift, level = tip.profile.process.lift_mm if retracts else 0.0, float(start[2])
+    over = max(level, min(level + lift, tip.profile.machine.z.limits_mm[1]))
+    if tip.limb is None:
+        return over
+    clear = _over_standing(tip, approach, start, shift, over)
+    if clear > over and not retracts:
+        retract(tip)  # a wipe moves the tip
+        clear = _over_standing(tip, approach, start, shift, over)
+    return clear
 
 
-def _way(tip: Tip, approach: Floats, start: Floats, over: float) -> Floats:
-    """(n, 3) from the tip along the approach to above a path's start; a single point where the tip is there already."""
-    if len(approach):
-        between = np.column_stack([approach, np.full(len(approach), over)])
-        points = np.array([tip.at_mm, *between, [*start[:2], over]])
-        moving: Floats = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])]
-        return moving
-    points = np.array([tip.at_mm.tolist(), [*start[:2].tolist(), over]])
-    return points if dist(*points.tolist()) > STANDING_MM else points[:1]
-
-
-def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float, profile: Profile) -> float:
+def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float) -> float:
     """Z at which the head clears what stands beside a limb on the way to a path's start: `over` where that is enough, else the
     least height that is, with the clearance beneath the nozzle, too."""
     assert tip.limb is not None
-    (part, standing), way = tip.limb, _way(tip, approach, start, over)
-    z_mm = clear_height_mm(standing, way[:, :2] - shift[:2], over - float(shift[2])) + float(shift[2])
+    (part, standing), machine = tip.limb, tip.profile.machine
+    way = np.vstack([tip.at_mm[:2], approach, start[:2]])
+    z_mm = clear_height_mm(standing, way - shift[:2], over - float(shift[2])) + float(shift[2])
     if z_mm <= over + STANDING_MM:
         return over
-    z_mm, machine = z_mm + profile.machine.clearance_mm, profile.machine
+    z_mm += machine.clearance_mm
     if z_mm > machine.z.limits_mm[1]:
         raise MoveError(
             f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside the part, "
@@ -112,83 +108,127 @@ def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, ove
     return z_mm
 
 
-def go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:
-    """A straight travel; straight up and down at the lift speed."""
-    if dist(tip.at_mm.tolist(), target) > STANDING_MM:
-        points = np.array([tip.at_mm, target], dtype=np.float64)
-        upright = bool(np.all(np.abs(points[1, :2] - points[0, :2]) <= STANDING_MM))
-        speed = lift_speed(profile) if upright else travel_speed(profile)
-        speed = limits.travel_speed(points, speed, profile.machine)
-        yield Travel(points, speed, travel_mm_s2(profile))
-        tip.at_mm = points[1]
+def go(tip: Tip, *goals_mm: Sequence[float] | Floats) -> None:
+    """Straight travels from place to place, straight up and down at the lift speed."""
+    for goal_mm in goals_mm:
+        tip.add(_straight(tip.at_mm, np.array(goal_mm, dtype=np.float64), tip.speeds))
 
 
-def travel_speed(profile: Profile) -> float:
-    """mm/s that a travel across may have."""
-    return min(profile.process.travel_speed_mm_s, profile.machine.x.speed_mm_s, profile.machine.y.speed_mm_s)
+@kernel
+def _straight(at_mm: Floats, goal_mm: Floats, speeds: Speeds) -> Moves:
+    out, done = Moves(table(3, 4), table(1, 6)), longs(2, 0)
+    add_point(out, done, at_mm[0], at_mm[1], at_mm[2], 0.0)
+    add_travel(out, done, table(0, 2), goal_mm, speeds)
+    return Moves(out.ways[1 : done[0]], out.rows[: done[1]])
 
 
-def lift_speed(profile: Profile) -> float:
-    """mm/s that a travel straight up or down may have."""
-    return min(profile.process.lift_speed_mm_s, profile.machine.z.speed_mm_s)
+@borrower
+def add_travel(out: Moves, done: Indices, between_mm: Floats, goal_mm: Floats, speeds: Speeds) -> None:
+    """Write a travel from the last point past (k, 2) places at the goal's height to the goal; it leaves out points where the tip
+    stands already, and is left out where it leads nowhere. done: as in add_point."""
+    first, upright = done[0], True
+    x, y, z = out.ways[first - 1, 0], out.ways[first - 1, 1], out.ways[first - 1, 2]
+    add_point(out, done, x, y, z, 0.0)
+    for k in range(len(between_mm) + 1):
+        to_x, to_y, to_z = goal_mm[0], goal_mm[1], goal_mm[2]
+        if k < len(between_mm):
+            to_x, to_y = between_mm[k, 0], between_mm[k, 1]
+        if np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2 + (to_z - z) ** 2) > STANDING_MM:
+            add_point(out, done, to_x, to_y, to_z, 0.0)
+            upright = upright and abs(to_x - x) <= STANDING_MM and abs(to_y - y) <= STANDING_MM
+        x, y, z = to_x, to_y, to_z
+    if done[0] == first + 1:
+        done[0] = first
+        return
+    speed = path_speed(out.ways, first, done[0], speeds.lift_mm_s if upright else speeds.travel_mm_s, speeds.axes_mm_s)
+    add_row(out, done, TRAVEL, done[0] - first, speed, speeds.acceleration_mm_s2)
 
 
-def retract(tip: Tip, profile: Profile) -> Iterator[Move]:
+def retract(tip: Tip) -> None:
     """Pull back what is not yet pulled back, moving over what was just printed where there is any."""
-    amount = profile.material.retract_mm - tip.retracted_mm
+    material, speeds = tip.profile.material, tip.speeds
+    amount = material.retract_mm - tip.retracted_mm
     if amount <= 0:
         return
     tip.retracted_mm += amount
-    tip.prime_extra_mm = max(tip.prime_extra_mm, profile.material.retract_prime_extra_mm)
-    way = first_length(tip.way_back(profile.material.wipe_mm), profile.material.wipe_mm)
-    tip.forget()
+    tip.prime_extra_mm = max(tip.prime_extra_mm, material.retract_prime_extra_mm)
+    way, tip.trail = tip.trail, NOWHERE
     length = np.linalg.norm(np.diff(way, axis=0), axis=1)
     if len(way) < 2 or float(np.linalg.norm(way[0] - tip.at_mm)) > STANDING_MM:
-        yield Retract(amount, filament_speed(profile))
+        tip.move(RETRACT, tip.at_mm[None], -amount, speeds.filament_mm_s)
         return
-    speed = min(travel_speed(profile), float(length.sum()) * filament_speed(profile) / amount)
-    yield Wipe(way, length * (amount / length.sum()), limits.travel_speed(way, speed, profile.machine))
-    tip.at_mm = way[-1]
+    speed = min(speeds.travel_mm_s, float(length.sum()) * speeds.filament_mm_s / amount)
+    (speed,) = path_speeds(way, np.array([0, len(way)]), np.array([speed]), speeds.axes_mm_s)
+    tip.move(WIPE, way, np.append(0.0, -length * (amount / length.sum())), speed)
 
 
-def prime(tip: Tip, profile: Profile) -> Iterator[Move]:
-    """Push forward what was pulled back, and what is to be pushed beyond it."""
-    amount = tip.retracted_mm + tip.prime_extra_mm
-    if amount > 0:
-        tip.retracted_mm = tip.prime_extra_mm = 0.0
-        yield Retract(-amount, filament_speed(profile))
+class Laid(NamedTuple):
+    """The strokes of a layer where they lie in the machine, mm: points (n, 3), where those of each begin (k + 1,), widths (k,),
+    whether a wipe may go over each; the way to each: points (m, 2) of all of them, where those begin (k + 1,)."""
+
+    points: Floats
+    starts: Indices
+    width: Floats
+    wiped: Mask
+    approach: Floats
+    approach_starts: Indices
 
 
-def filament_speed(profile: Profile) -> float:
-    """mm/s at which filament is pulled back and pushed forward."""
-    return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+@kernel
+def trail_after(laid: Laid, first: int, end: int, before: Floats, wipe_mm: float) -> Floats:
+    """The way (n, 3) of a wipe of wipe_mm after some of a layer's strokes; before: that before them, none after a retraction."""
+    from_here = end - 1
+    while from_here > first and not _suffices(laid, from_here, wipe_mm):
+        from_here -= 1
+    trail = before
+    for k in range(from_here, end):
+        trail = first_length(_trail_after(laid, k, trail, wipe_mm), wipe_mm)
+    return trail
 
 
-def _suffices(points: Floats, path: Path, wipe_mm: float) -> bool:
+@borrower
+def _suffices(laid: Laid, k: int, wipe_mm: float) -> bool:
     """Whether what was printed before a stroke does not matter for a wipe after it."""
-    return length_mm(points) >= wipe_mm if path.wiped else not runs_round(points, path.width_mm)
+    if laid.wiped[k]:
+        return bool(length_between(laid.points, laid.starts[k], laid.starts[k + 1]) >= wipe_mm)
+    return not runs_round(laid.points[laid.starts[k] : laid.starts[k + 1]], laid.width[k])
 
 
-def trail_after(points: Floats, path: Path, before: Floats, shift: Floats, wipe_mm: float) -> Floats:
-    """The way of a wipe of wipe_mm after a stroke (n, 3).
+@part
+def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
+    """The way of a wipe after one stroke.
 
     Where the stroke is shorter it goes on, back over the way to its beginning, to the strokes before it in the layer; where
-    there are none, to and fro. before: the way over those, from where the last of them ended; none after a retraction. Where
-    it must not go over the stroke itself, it goes on over those at once.
+    there are none, to and fro. Where it must not go over the stroke itself, it goes on over those at once.
     """
-    if not path.wiped and not (len(before) and runs_round(points, path.width_mm)):
-        return points[:0]
-    trail = wipe_trail(points, path.width_mm) if path.wiped else points[[-1, 0]]
-    if float(np.linalg.norm(points[-1] - points[0])) >= wipe_mm or length_mm(trail) >= wipe_mm:
-        return trail
-    if len(before) and abs(float(before[0, 2] - points[0, 2])) <= STANDING_MM:
-        z = np.full(len(path.approach), points[0, 2])
-        between = np.column_stack([path.approach.reshape(-1, 2) + shift[:2], z])[::-1]
-        trail = np.vstack([trail, between, first_length(before, wipe_mm)])
-    once = trail
+    points = laid.points[laid.starts[k] : laid.starts[k + 1]]
+    if not laid.wiped[k] and not (len(before) and runs_round(points, laid.width[k])):
+        return before[:0]
+    own = wipe_trail(points, laid.width[k])
+    if not laid.wiped[k]:
+        for axis in range(3):
+            own[0, axis], own[1, axis] = points[-1, axis], points[0, axis]
+        own = own[:2]
+    if distance(points, 0, len(points) - 1) >= wipe_mm or length_between(own, 0, len(own)) >= wipe_mm:
+        return own
+    passed = laid.approach[laid.approach_starts[k] : laid.approach_starts[k + 1]]
+    goes_on = len(before) > 0 and abs(before[0, 2] - points[0, 2]) <= STANDING_MM
+    once = len(own) + (len(passed) + len(before) if goes_on else 0)
+    trail: Floats = table(once + TO_AND_FRO * (once - 1), 3)
+    for i in range(once):
+        for axis in range(3):
+            if i < len(own):
+                trail[i, axis] = own[i, axis]
+            elif i < len(own) + len(passed):
+                trail[i, axis] = passed[len(own) + len(passed) - 1 - i, axis] if axis < 2 else points[0, 2]
+            else:
+                trail[i, axis] = before[i - len(own) - len(passed), axis]
+    count = once
     for _ in range(TO_AND_FRO):
-        if length_mm(trail) >= wipe_mm:
+        if length_between(trail, 0, count) >= wipe_mm:
             break
-        once = once[::-1]
-        trail = np.vstack([trail, once[1:]])
-    return trail
+        for i in range(count, count + once - 1):
+            for axis in range(3):
+                trail[i, axis] = trail[2 * (count - 1) - i, axis]
+        count += once - 1
+    return trail[:count]

@@ -32,7 +32,7 @@ def lengths_mm(points: Floats, starts: Indices) -> Floats:
 
 @borrower
 def length_between(points: Floats, first: int, end: int) -> float:
-    """Length of the polyline of some of the points."""
+    """Length of the polyline of some of the points, seen from above."""
     total = 0.0
     for i in range(first + 1, end):
         total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])

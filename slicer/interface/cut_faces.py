@@ -131,7 +131,7 @@ def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, fl
         if closed.area() > LEAST_MM2:
             distances = [np.array([-plane[0], -plane[1], plane[3] - plane[2] * z_mm]) for plane in planes.values()]
             counting = [near[index].band(layer, -np.inf, np.inf) if index in near else None for index in planes]
-            for index, area in zip(planes, _nearest_areas(closed, distances, counting), strict=True):
+            for index, area in zip(planes, nearest_areas(closed, distances, counting), strict=True):
                 more[index] += (1.0 - process.infill_density) * float(height_mm) * area
     if not sections.on_platform:
         filled = sections.own[0].area() - (1.0 - process.infill_density) * regions[0].sparse.area()
@@ -139,7 +139,7 @@ def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, fl
     return more
 
 
-def _nearest_areas(whole: Polygons, distances: Sequence[Floats], near: Sequence[Polygons | None]) -> list[float]:
+def nearest_areas(whole: Polygons, distances: Sequence[Floats], near: Sequence[Polygons | None]) -> list[float]:
     """mm2 of an area where each of several linear functions a x + b y + c is the least of those that count there.
 
     near: where each counts, None: everywhere.

@@ -30,7 +30,7 @@ FORBIDDEN = 1e3  # more than all that a part's seams can cost otherwise
 APART_MM = 3.0  # outlines that are farther from each other have seams of their own
 
 
-class _Places(NamedTuple):
+class Places(NamedTuple):
     """xy: (n, 2) outline after outline from the lowest layer up; cost: (n,); first: (k + 1,) where each outline's begin; layer:
     (k,)."""
 
@@ -59,7 +59,7 @@ def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]
         costs.append(seen - worth + TO_REAR * np.hypot(*(places[:, :2] - rear).T) + FORBIDDEN * ~clear)
         offered.append(places[:, :2])
     first, layers = np.cumsum([0, *map(len, offered)]), np.array([layer for layer, _ in loops])
-    chosen = _choose(_Places(np.concatenate(offered), np.concatenate(costs), first, layers))
+    chosen = choose(Places(np.concatenate(offered), np.concatenate(costs), first, layers))
     return [chosen[layers == layer] for layer in range(len(outlines))]
 
 
@@ -99,7 +99,7 @@ def _offered(loop: Floats) -> tuple[Floats, Floats]:
 
 
 @part
-def _cheapest(places: _Places, best: Floats, outline: int, below: int) -> tuple[int, float]:
+def _cheapest(places: Places, best: Floats, outline: int, below: int) -> tuple[int, float]:
     """The place of an outline that costs least with all on it and the way to it from a place below, and that cost; below -1:
     there is none."""
     least, taken = np.inf, places.first[outline]
@@ -114,7 +114,7 @@ def _cheapest(places: _Places, best: Floats, outline: int, below: int) -> tuple[
 
 
 @kernel
-def _choose(places: _Places) -> Floats:
+def choose(places: Places) -> Floats:
     """(k, 2) the place of each outline, of all choices the one that costs least together."""
     xy, first, count = places.xy, places.first, len(places.layer)
     below, best = longs(count, -1), places.cost.copy()

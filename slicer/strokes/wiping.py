@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from mdp.kernels.arrays import table
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats
 from mdp.overhang import Mask
 from slicer.geometry.cells import cells_of
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.polyline import length_mm
+from slicer.geometry.polyline import length_between
 from slicer.strokes.strokes import Strokes
 from slicer.strokes.travels import crosses, lie_within
 
@@ -22,34 +24,63 @@ def may_wipe_over(strokes: Strokes, skin: Polygons, wipe_mm: float) -> Mask:
     border = cells_of(skin)
     off = ~lie_within(border, strokes.last_points)
     for k in np.flatnonzero(off).tolist():
-        points = strokes.points[strokes.starts[k] : strokes.starts[k + 1], :2]
-        way = first_length(wipe_trail(points, float(strokes.width_mm[k])), wipe_mm)
+        points = np.ascontiguousarray(strokes.points[strokes.starts[k] : strokes.starts[k + 1], :2])
+        way = way_of_wipe(points, float(strokes.width_mm[k]), wipe_mm)
         may[k] = len(way) < 2 or not crosses(border, way[:-1], way[1:]).any()
     return may
 
 
+@kernel
+def way_of_wipe(points: Floats, width_mm: float, wipe_mm: float) -> Floats:
+    """The way (n, 2 or 3) of a wipe of wipe_mm after a stroke, over nothing but that."""
+    return first_length(wipe_trail(points, width_mm), wipe_mm)
+
+
+@borrower
 def runs_round(points: Floats, width_mm: float) -> bool:
     """Whether a path ends where it begins, or nearly."""
-    return float(np.linalg.norm(points[-1] - points[0])) <= width_mm and length_mm(points) > RING * width_mm
+    return bool(distance(points, 0, len(points) - 1) <= width_mm and length_between(points, 0, len(points)) > RING * width_mm)
 
 
+@borrower
+def distance(points: Floats, i: int, k: int) -> float:
+    """Between two of the points (n, 2 or 3)."""
+    squared = 0.0
+    for axis in range(points.shape[1]):
+        squared += (points[k, axis] - points[i, axis]) ** 2
+    return float(np.sqrt(squared))
+
+
+@part
 def wipe_trail(points: Floats, width_mm: float) -> Floats:
     """The way of a wipe after a stroke (n, 2 or 3): on along a ring, over its seam; back along a line."""
-    if not runs_round(points, width_mm):
-        return points[::-1]
-    stands = float(np.linalg.norm(points[-1] - points[0])) <= STANDING_MM
-    return points if stands else np.vstack([points[-1:], points])
+    count, onward = len(points), runs_round(points, width_mm)
+    across = 1 if onward and distance(points, 0, count - 1) > STANDING_MM else 0
+    trail: Floats = table(count + across, points.shape[1])
+    for i in range(len(trail)):
+        k = (i - across) % count if onward else count - 1 - i
+        for axis in range(points.shape[1]):
+            trail[i, axis] = points[k, axis]
+    return trail
 
 
+@part
 def first_length(way: Floats, length: float) -> Floats:
     """The first `length` mm of a polyline (n, 2 or 3), or all of it; without points that repeat."""
-    if len(way) < 2 or length <= 0.0:
-        return way[:0]
-    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
-    way, steps = way[np.concatenate([[True], steps > STANDING_MM])], steps[steps > STANDING_MM]
-    done = np.cumsum(steps)
-    last = int(np.searchsorted(done, length))
-    if last >= len(steps):
-        return way
-    share = 1.0 - (done[last] - length) / steps[last]
-    return np.vstack([way[: last + 1], way[last] + share * (way[last + 1] - way[last])])
+    first: Floats = table(len(way), way.shape[1])
+    count, run = 0, 0.0
+    for i in range(len(way) if len(way) > 1 and length > 0.0 else 0):
+        step = distance(way, i - 1, i) if i else 0.0
+        if i and step <= STANDING_MM:
+            continue
+        run += step
+        for axis in range(way.shape[1]):
+            first[count, axis] = way[i, axis]
+            if run >= length:
+                first[count, axis] = first[count - 1, axis] + (1.0 - (run - length) / step) * (
+                    way[i, axis] - first[count - 1, axis]
+                )
+        count += 1
+        if run >= length:
+            break
+    return first[:count]

@@ -1,13 +1,12 @@
 """A hand-made print of two parts: a post on the platform and an arm printed out of its side."""
 
-from collections.abc import Iterator
 from functools import cache
 
 import manifold3d as m3
 import numpy as np
 
 from machine.gcode.writer import write_gcode
-from machine.planning.moves import RETRACT, TRAVEL, WIPE, MachineProgram, Move, Retract, Stroke, Travel, Wipe
+from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from mdp.clearance import allowed_poses
 from mdp.decomposition import Decomposition, Part
@@ -16,7 +15,7 @@ from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, level, rotation
 from profiles.machine import Machine
 from profiles.profile import Profile, load
-from slicer.paths import KINDS, Kind, Layer, Path, SlicedPart
+from slicer.paths import Kind, Layer, Path, SlicedPart
 from tests.shapes import from_manifold
 
 SIDE = Plane(np.array([1.0, 0.0, 0.0]), 5.0)
@@ -79,27 +78,3 @@ def whole(machine: str = "generic_ac") -> tuple[Profile, tuple[str, ...]]:
     decomposition = post_and_arm(profile.machine)
     sliced = [squares(piece, profile, layers) for piece, layers in zip(decomposition.parts, (300, 5), strict=True)]
     return profile, tuple(write_gcode(plan(decomposition, sliced, profile), profile))
-
-
-def moves_of(program: MachineProgram) -> tuple[Move, ...]:
-    """The rows of a program one by one."""
-    return tuple(_each(program))
-
-
-def _each(program: MachineProgram) -> Iterator[Move]:
-    marks = iter(program.marks)
-    for k, what in enumerate(program.what.tolist()):
-        points, speed = program.points_mm[program.starts[k] : program.starts[k + 1]], float(program.speed[k])
-        filament_mm = program.filament_mm[program.starts[k] + 1 : program.starts[k + 1]]
-        acceleration = None if np.isinf(program.acceleration_mm_s2[k]) else float(program.acceleration_mm_s2[k])
-        if what < len(KINDS):
-            fan = None if np.isnan(program.fan[k]) else float(program.fan[k])
-            yield Stroke(KINDS[what], points, filament_mm, speed, float(program.width_mm[k]), fan, acceleration)
-        elif what == TRAVEL:
-            yield Travel(points, speed, acceleration)
-        elif what == WIPE:
-            yield Wipe(points, -filament_mm, speed)
-        elif what == RETRACT:
-            yield Retract(-float(program.filament_mm[program.starts[k]]), speed)
-        else:
-            yield next(marks)

@@ -21,7 +21,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile, load, shipped
 from slicer.paths import SlicedPart
 from slicer.slice import slice_part
-from tests.machine.hand import moves_of
+from tests.machine.moves import moves_of, program_of
 
 LEANING = np.array([0.0, np.sin(np.radians(25.0)), np.cos(np.radians(25.0))])
 LIGHT = ["process.walls=1", "process.infill_density=0.05"]  # a third of the lines
@@ -141,7 +141,7 @@ def test_a_flipped_sign_of_the_tilt_is_found(machine: str) -> None:
     profile, decomposition, sliced, _ = _planned(machine)
     tilt = profile.machine.tilt.model_copy(update={"sign": -profile.machine.tilt.sign, "limits_deg": (-360.0, 360.0)})
     changed = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": tilt})})
-    program = MachineProgram.of("flipped", moves_of(plan(decomposition, sliced, profile)))
+    program = program_of("flipped", moves_of(plan(decomposition, sliced, profile)))
     codes = _errors(list(write_gcode(program, changed)), machine)
     assert "sign" in codes
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from machine.gcode.writer import write_gcode
 from machine.kinematics.table import machine_points
-from machine.planning.moves import MachineProgram
 from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys
+from tests.machine.moves import program_of
 from tools.profile_tables import PAGE, page, table
 
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -39,7 +39,7 @@ def test_a_changed_row_is_made_good() -> None:
 def test_the_page_lists_the_placeholders_that_blocks_may_hold() -> None:
     listed = {word for row in re.findall(r"^\| (`\{.*?) \|", TEXT, re.MULTILINE) for word in re.findall(r"\{(\w+)\}", row)}
     with pytest.raises(ProfileError, match="placeholder") as caught:
-        write_gcode(MachineProgram.of("empty", ()), load(settings=['machine.gcode.start="{nothing}"']))
+        write_gcode(program_of("empty", ()), load(settings=['machine.gcode.start="{nothing}"']))
     assert listed == set(str(caught.value).partition("allowed are ")[2].split(", "))
 
 

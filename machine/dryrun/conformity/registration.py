@@ -67,7 +67,7 @@ def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
     return [
         Shift(int(part[own[0]]), int(run.segment_row[own[0]]), by)
         for own, mine in zip(chosen, np.split(np.arange(len(pieces)), np.cumsum([len(c) for c in chosen])[:-1]), strict=True)
-        if (by := _fit(normals[mine][use[mine]], beside[mine][use[mine]])) is not None
+        if (by := fit_shift(normals[mine][use[mine]], beside[mine][use[mine]])) is not None
     ]
 
 
@@ -85,7 +85,7 @@ def _evenly(own: NDArray[np.int64]) -> NDArray[np.int64]:
     return own if len(own) <= PER_PART else own[np.linspace(0, len(own) - 1, PER_PART).astype(np.int64)]
 
 
-def _fit(normals: Floats, beside: Floats) -> Floats | None:
+def fit_shift(normals: Floats, beside: Floats) -> Floats | None:
     """(3,) shift that explains best how far (n,) walls lie outward along (n, 3) normals, beside a constant; None: too few."""
     keep = np.ones(len(beside), dtype=np.bool_)
     shift = np.zeros(3)

@@ -14,8 +14,9 @@ from machine.gcode.turning import turn
 from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
 from machine.planning.lift import over_print_mm
+from machine.planning.limits import speeds_of
 from machine.planning.park_position import obstacle_top_mm
-from machine.planning.reorient import Speeds, Turn, route
+from machine.planning.reorient import Turn, route
 from mdp.pose import Pose
 from profiles.errors import JournalError
 from profiles.profile import Profile
@@ -31,7 +32,7 @@ def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
     near = min(float(goal[2]) + NEAR_MM, machine.z.limits_mm[1])
     down = [f"G0 Z{near:.3f} F{rise:.0f}", f"G1 Z{goal[2]:.3f} F{SLOWLY * rise:.0f}"]
     if hypot(way.end.tilt_deg - way.start.tilt_deg, way.end.turn_deg - way.start.turn_deg) > STILL_DEG:
-        speeds = Speeds(machine.z.speed_mm_s, process.travel_speed_mm_s)
+        speeds = speeds_of(profile)._replace(lift_mm_s=machine.z.speed_mm_s, travel_mm_s=process.travel_speed_mm_s)
         least_z_mm = over_print_mm(machine, printed, way.start), over_print_mm(machine, printed, way.end)
         path = route(replace(way, least_z_mm=least_z_mm), 0, printed, machine, speeds)
         return [

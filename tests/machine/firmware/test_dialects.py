@@ -14,17 +14,18 @@ from machine.firmware import dialects
 from machine.gcode.writer import write_gcode
 from machine.kinematics.coordinates import axis_positions, followed_places
 from machine.kinematics.table import workpiece_path
-from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Retract, Stroke, Travel, rows
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, straight_moves
 from machine.planning.plan import plan
 from machine.planning.stops import parse_stops
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
-from mdp.pose import Pose
+from mdp.pose import Pose, level
 from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile, load
 from slicer.paths import Kind, Layer, Path
-from tests.machine.hand import moves_of, post_and_arm, printed, squares
+from tests.machine.hand import post_and_arm, printed, squares
+from tests.machine.moves import Retract, Stroke, Travel, moves_of, program_of
 
 MODES = [(name, "table") for name in dialects()] + [
     (name, "workpiece") for name, dialect in dialects().items() if dialect.follow_on
@@ -89,10 +90,10 @@ def laid(machine: Machine, parsed: ParsedProgram) -> np.ndarray:
 
 def wanted(machine: Machine, program: MachineProgram) -> np.ndarray:
     """The same of the program itself."""
-    straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
-    moved = np.linalg.norm(straight.end[:, :3] - straight.start[:, :3], axis=1) > 1e-9
-    strokes = moved & (straight.end[:, 5] > straight.start[:, 5])
-    return np.column_stack([workpiece_path(machine, straight.end[strokes, :5]), straight.end[strokes, 5]])
+    start, end, _ = straight_moves(program, level(machine))
+    moved = np.linalg.norm(end[:, :3] - start[:, :3], axis=1) > 1e-9
+    strokes = moved & (end[:, 5] > start[:, 5])
+    return np.column_stack([workpiece_path(machine, end[strokes, :5]), end[strokes, 5]])
 
 
 @EACH
@@ -206,12 +207,12 @@ PLACE = st.tuples(*[st.floats(-60, 60).map(lambda v: round(v, 3))] * 2, st.float
 @given(st.lists(st.tuples(ANGLE, ANGLE, st.lists(PLACE, min_size=2, max_size=5, unique=True)), min_size=1, max_size=3))
 def test_any_program_comes_back_in_any_dialect(dialect: str, coordinates: str, parts: list) -> None:
     chosen = profile(dialect, coordinates)
-    program = program_of(parts)
+    program = turned_program(parts)
     parsed = parse_gcode(write_gcode(program, chosen), chosen.machine)
     assert laid(chosen.machine, parsed) == pytest.approx(wanted(chosen.machine, program), abs=1e-3)
 
 
-def program_of(parts: list) -> MachineProgram:
+def turned_program(parts: list) -> MachineProgram:
     """Parts of (tilt, turn, points): each one stroke at its pose, with a retraction between."""
     moves: list = []
     at = np.array([0.0, 0.0, 90.0])
@@ -222,7 +223,7 @@ def program_of(parts: list) -> MachineProgram:
         moves += [Travel(np.array([at, path[0]]), 50.0), Stroke(Kind.SKIN, path, np.full(len(path) - 1, 0.731), 33.0, 0.45)]
         moves += [Retract(0.8, 35.0), Retract(-0.8, 35.0)]
         at = path[-1]
-    return MachineProgram.of("random", tuple(moves))
+    return program_of("random", tuple(moves))
 
 
 @given(ANGLE, ANGLE, PLACE)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from machine.dryrun import dry_run
 from machine.gcode.arcs import arc_box, centre_of, chord_count, chords, sweep_rad
 from machine.gcode.writer import write_gcode
-from machine.planning.moves import MachineProgram, Stroke, Travel
 from machine.reader.motion import CHORD_MM
 from machine.reader.parse import parse_gcode
 from machine.simulator.board import BuildOptions
@@ -19,6 +18,7 @@ from machine.simulator.firmware import SimulatedFirmware
 from mdp.mesh import Floats
 from profiles.profile import Profile, load
 from slicer.paths import Kind
+from tests.machine.moves import Stroke, Travel, program_of
 
 ARCS = ("machine.arcs=true",)
 HEAD = "G21\nG90\nM83\nG92 X0 Y0 Z0 E0\n"
@@ -42,7 +42,7 @@ def _program(flat: Floats, profile: Profile) -> tuple[list[str], Stroke]:
     points = np.column_stack([flat, np.full(len(flat), 0.2)])
     stroke = Stroke(Kind.OUTER_WALL, points, 0.03 * np.hypot(*np.diff(flat, axis=0).T), 30.0, 0.45)
     arrive = Travel(np.array([points[0] + [0, 0, 1], points[0]]), 50.0)
-    return list(write_gcode(MachineProgram.of("arcs", (arrive, arrive, stroke)), profile)), stroke
+    return list(write_gcode(program_of("arcs", (arrive, arrive, stroke)), profile)), stroke
 
 
 @settings(deadline=None, max_examples=40)

@@ -10,15 +10,17 @@ from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
 from machine.gcode.writer import write_gcode
-from machine.planning.moves import BeginLayer, MachineProgram, Stroke, rows
+from machine.planning.moves import BeginLayer, straight_moves
 from machine.planning.timing import lengths
 from machine.quantities import duration
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
+from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.profile import Profile, load
 from slicer.paths import Kind
-from tests.machine.hand import moves_of, printed, text
+from tests.machine.hand import printed, text
+from tests.machine.moves import Stroke, moves_of, program_of
 
 GOLDEN = Path(__file__).parents[1] / "programs"
 BOTH = pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
@@ -45,11 +47,11 @@ def test_writing_twice_gives_the_same_lines(machine: str) -> None:
 def test_read_back_every_move_is_where_the_program_had_it(machine: str) -> None:
     profile, _, _, program = printed(machine)
     parsed = parse_gcode(text(machine), profile.machine)
-    wanted = rows(program, 0.0, 0.0)
-    moving = lengths(wanted.end - wanted.start)[0] > 0
+    start, end, _ = straight_moves(program, Pose(0.0, 0.0))
+    moving = lengths(end - start)[0] > 0
     first = len(parsed.line) - moving.sum()
-    assert parsed.end[first:] == pytest.approx(wanted.end[moving, :5], abs=5.1e-4)
-    assert parsed.filament_mm[first:] == pytest.approx(wanted.end[moving, 5], abs=5.1e-6)
+    assert parsed.end[first:] == pytest.approx(end[moving, :5], abs=5.1e-4)
+    assert parsed.filament_mm[first:] == pytest.approx(end[moving, 5], abs=5.1e-6)
 
 
 @settings(deadline=None)  # the first call compiles
@@ -58,7 +60,7 @@ def test_rounding_of_filament_never_drifts(filament: list[float]) -> None:
     profile = load()
     points = np.column_stack([np.arange(len(filament) + 1) * 0.01, np.zeros(len(filament) + 1), np.full(len(filament) + 1, 0.2)])
     stroke = Stroke(Kind.SKIN, points, np.array(filament), 20.0, 0.4)
-    parsed = parse_gcode(write_gcode(MachineProgram.of("p", (stroke,)), profile), profile.machine)
+    parsed = parse_gcode(write_gcode(program_of("p", (stroke,)), profile), profile.machine)
     assert parsed.filament_mm == pytest.approx(np.cumsum(filament), abs=5.1e-6)
 
 
@@ -68,7 +70,7 @@ def test_no_step_is_written_denser_than_its_stroke(steps: list[float], heading_d
     along = np.concatenate([[0.0], np.cumsum(steps)])
     x, y = 7.0 + along * np.cos(np.radians(heading_deg)), 3.0 + along * np.sin(np.radians(heading_deg))
     stroke = Stroke(Kind.SKIN, np.column_stack([x, y, np.full(len(x), 0.2)]), 0.4 * np.array(steps), 100.0, 0.4)
-    parsed = parse_gcode(write_gcode(MachineProgram.of("p", (stroke,)), load()), load().machine)
+    parsed = parse_gcode(write_gcode(program_of("p", (stroke,)), load()), load().machine)
     length = np.linalg.norm(parsed.end - parsed.start, axis=1)
     filament_mm_s = (parsed.e_mm - 1e-5)[1:] / length[1:] * parsed.feed[1:] / 60.0  # the first comes from where the text begins
     assert filament_mm_s.max(initial=0.0) <= 40.0 * 1.001 + 0.01
@@ -83,7 +85,7 @@ def test_no_command_outgrows_the_firmware_s_line(machine: str) -> None:
 def test_zero_has_no_sign() -> None:
     points = np.array([[1, 0, 0.2], [-0.0001, -0.0004, 0.2]])
     stroke = Stroke(Kind.SKIN, points, np.array([0.1]), 20.0, 0.4)
-    lines = list(write_gcode(MachineProgram.of("p", (stroke,)), load()))
+    lines = list(write_gcode(program_of("p", (stroke,)), load()))
     assert "G1 X0.000 Y0.000 Z0.200 E0.10000 F1200" in lines
 
 
@@ -116,14 +118,14 @@ def test_the_first_layer_s_temperature_is_waited_for_and_lowered_in_the_second()
 def test_layers_that_ask_for_more_heat_get_it_up_to_the_machines_limit():
     profile, _, _, program = printed()
     moves = tuple(replace(m, nozzle_add_c=95.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in moves_of(program))
-    heats = [line for line in write_gcode(MachineProgram.of(program.name, moves), profile) if line.startswith("M104 S")]
+    heats = [line for line in write_gcode(program_of(program.name, moves), profile) if line.startswith("M104 S")]
     assert heats[-3:] == ["M104 S210", "M104 S300", "M104 S0"]
 
 
 def test_the_heat_of_a_hotter_layer_after_a_turn_is_asked_for_before_the_turn() -> None:
     profile, _, _, program = printed()
     moves = tuple(replace(m, nozzle_add_c=5.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in moves_of(program))
-    lines = list(write_gcode(MachineProgram.of(program.name, moves), profile))
+    lines = list(write_gcode(program_of(program.name, moves), profile))
     turned = next(k for k, line in enumerate(lines) if line.startswith("G0 A90"))
     last_stroke = max(k for k, line in enumerate(lines[:turned]) if re.match(r"G1 X.* E[0-9]", line))
     assert [k for k, line in enumerate(lines) if line == "M104 S215" and last_stroke < k < turned]
@@ -214,6 +216,6 @@ def test_speeds_of_short_strokes_differ_by_twentieths_or_not_at_all() -> None:
     speeds = set()
     for length in np.linspace(0.01, 0.03, 41):
         stroke = Stroke(Kind.GAP, np.array([[7.0, 3.0, 0.2], [7.0 + length, 3.0, 0.2]]), np.array([0.4 * length]), 10.0, 0.4)
-        line = next(line for line in write_gcode(MachineProgram.of("p", (stroke,)), load()) if line.startswith("G1 X7"))
+        line = next(line for line in write_gcode(program_of("p", (stroke,)), load()) if line.startswith("G1 X7"))
         speeds.add(float(line.partition(" F")[2]))
     assert speeds == {600.0, 571.0, 545.0}

@@ -9,15 +9,16 @@ from machine.kinematics.collision import hull
 from machine.link.pause.return_path import return_moves
 from machine.planning import travel
 from machine.planning.arrange import standing_at
-from machine.planning.moves import Pause, Travel
+from machine.planning.limits import speeds_of
+from machine.planning.moves import Pause
 from machine.planning.plan import plan
-from machine.planning.reorient import Speeds, Turn, route
+from machine.planning.reorient import Turn, route
 from machine.planning.stops import Stop
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load
 from tests.limbs import MODELS, moved_part, printed, sliced
-from tests.machine.hand import moves_of
+from tests.machine.moves import Travel, moves_of
 
 TOP_MM = 24.0  # of the posts
 
@@ -82,7 +83,7 @@ def test_ways_across_are_no_lower_than_what_may_stand_there() -> None:
     machine, start, end = load().machine, level(load().machine), Pose(30.0, 0.0)
     at, target = np.array([0.0, 0.0, 20.0]), np.array([10.0, 0.0, 20.0])
     post = hull(np.array([[-5.0, -5.0, 0.0], [5.0, 5.0, 0.0], [5.0, -5.0, 10.0], [-5.0, 5.0, 10.0]]), 0.2)
-    speeds = Speeds(10.0, 100.0)
+    speeds = speeds_of(load())._replace(lift_mm_s=10.0, travel_mm_s=100.0)
     low = route(Turn(start, end, at, target), 2, post, machine, speeds)
     high = route(Turn(start, end, at, target, (90.0, 120.0)), 2, post, machine, speeds)
     assert low.across_z_mm < 90.0

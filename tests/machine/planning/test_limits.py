@@ -1,20 +1,21 @@
 import numpy as np
 import pytest
 
-from machine.planning.limits import axis_limits, check, travel_speed, turn_speed
-from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Travel, rows
+from machine.planning.limits import axis_limits, check, path_speeds, speeds_of, turn_speed
+from machine.planning.moves import BeginLayer, BeginPart, Reorient
 from machine.planning.plan import plan
 from mdp.pose import Pose
 from profiles.errors import MoveError
 from profiles.profile import load
 from tests.machine.hand import post_and_arm, squares
+from tests.machine.moves import Travel, program_of
 
 MACHINE = load().machine
 
 
 def _checked(*moves) -> None:
-    program = MachineProgram.of("p", (BeginPart(3, Pose(0, 0), 1), BeginLayer(3, 7, 0.2, 0.2, 0.0), *moves))
-    check(program, rows(program, 0.0, 0.0), MACHINE)
+    program = program_of("p", (BeginPart(3, Pose(0, 0), 1), BeginLayer(3, 7, 0.2, 0.2, 0.0), *moves))
+    check(program, MACHINE)
 
 
 @pytest.mark.parametrize(
@@ -55,9 +56,9 @@ def test_limits_carry_the_machine_s_own_letters() -> None:
 
 
 def test_a_slanted_travel_is_slowed_so_that_z_keeps_its_speed() -> None:
-    slanted = np.array([[0, 0, 0], [3, 0, 4]], dtype=float)
-    assert travel_speed(slanted, 150.0, MACHINE) == pytest.approx(15.0 / 0.8)
-    assert travel_speed(np.array([[0, 0, 0], [3, 4, 0]], dtype=float), 150.0, MACHINE) == 150.0
+    slanted_then_level = np.array([[0, 0, 0], [3, 0, 4], [3, 0, 4], [6, 4, 4]], dtype=float)
+    speeds = path_speeds(slanted_then_level, np.array([0, 2, 4]), np.array([150.0, 150.0]), speeds_of(load()).axes_mm_s)
+    assert speeds == pytest.approx([15.0 / 0.8, 150.0])
 
 
 def test_a_turn_of_both_axes_lasts_as_long_as_the_slower_one() -> None:

@@ -60,3 +60,11 @@ def test_the_end_block_runs_with_the_tip_beside_the_print_and_above_everything(m
     highest = max(float(reach_of(UP[None])[0]) for _, reach_of in solids(profile.machine, pose, hull(laid, 0.3)))
     assert end[2] >= min(highest + profile.machine.lift_mm, profile.machine.z.limits_mm[1]) - 0.5
     assert not [finding for finding in dry_run(lines, profile).findings if finding.code in ("collision", "limits")]
+
+
+def test_the_distance_beside_a_finished_print_is_kept_to_its_beads_and_not_to_their_middles() -> None:
+    profile, program = program_of("generic_ac", True)
+    middles = program.points_mm[np.repeat(program.is_stroke, np.diff(program.starts)), :2]
+    end = program.points_mm[-1, :2]
+    away_mm = np.maximum(middles.min(axis=0) - end, end - middles.max(axis=0)).max()
+    assert away_mm == pytest.approx(BESIDE_MM + 0.5 * profile.process.line_width_mm)

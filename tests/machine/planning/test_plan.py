@@ -8,14 +8,16 @@ from machine.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.kinematics.collision import hull
 from machine.kinematics.table import workpiece_points
-from machine.planning.moves import BeginLayer, BeginPart, Reorient, Retract, Stroke, Travel, Wipe
+from machine.planning.limits import speeds_of
+from machine.planning.moves import BeginLayer, BeginPart, Reorient
 from machine.planning.plan import plan
-from machine.planning.reorient import Speeds, Turn, poses_between, route
+from machine.planning.reorient import Turn, poses_between, route
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load
 from slicer.paths import SlicedPart
-from tests.machine.hand import moves_of, post_and_arm, printed, squares
+from tests.machine.hand import post_and_arm, printed, squares
+from tests.machine.moves import Retract, Stroke, Travel, Wipe, moves_of
 
 BOTH = pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
 
@@ -105,7 +107,13 @@ def test_no_safe_place_is_refused_with_part_and_heights() -> None:
     machine = _cramped(60.5, 5.0, 100.0).machine
     post = hull(post_and_arm(load().machine).parts[0].mesh.vertices, 0.2)
     with pytest.raises(MoveError, match=r"part 2: .* A60.* needs the tip at Z 7.* mm, generic A/C table allows at most 60.5 mm"):
-        route(Turn(level(machine), Pose(60.0, 0.0), np.array([0.0, 0.0, 60.0]), None), 2, post, machine, Speeds(10.0, 100.0))
+        route(
+            Turn(level(machine), Pose(60.0, 0.0), np.array([0.0, 0.0, 60.0]), None),
+            2,
+            post,
+            machine,
+            speeds_of(load())._replace(lift_mm_s=10.0, travel_mm_s=100.0),
+        )
 
 
 def test_a_part_without_a_path_is_left_out() -> None:
@@ -120,6 +128,14 @@ def test_strokes_are_slowed_to_what_the_hot_end_melts() -> None:
     program = plan(decomposition, [squares(decomposition.parts[0], profile)], profile)
     speeds = {move.speed_mm_s for move in moves_of(program) if isinstance(move, Stroke)}
     assert max(speeds) * ((0.45 - 0.2) * 0.2 + pi * 0.01) == pytest.approx(1.0)
+
+
+def test_strokes_are_slowed_to_what_the_extruder_pushes() -> None:
+    profile = load(settings=["machine.extruder_speed_mm_s=0.5", "machine.purge_mm=0"])
+    decomposition = post_and_arm(profile.machine)
+    program = plan(decomposition, [squares(decomposition.parts[0], profile)], profile)
+    speeds = {move.speed_mm_s for move in moves_of(program) if isinstance(move, Stroke)}
+    assert max(speeds) * ((0.45 - 0.2) * 0.2 + pi * 0.01) == pytest.approx(0.5 * pi * 1.75**2 / 4)
 
 
 def test_layers_are_numbered_from_one_in_every_part() -> None:

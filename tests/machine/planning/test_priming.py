@@ -1,15 +1,12 @@
 """What oozed while the table turned is made up for inside, along a stroke, within what the hot end melts."""
 
-from dataclasses import replace
 from math import pi
 
 import numpy as np
 import pytest
 
-from machine.planning.moves import Stroke
+from machine.planning.moves import SPEED, Moves
 from machine.planning.priming import RUN_MM, run_in
-from machine.planning.travel import Tip
-from mdp.pose import Pose
 from profiles.profile import Profile, load
 from slicer.bead import Bead
 from slicer.interface.interlock import begin_inside
@@ -21,14 +18,11 @@ from tests.slicer.hand import BARE, cut
 PER_MM = 0.033  # filament of a usual bead
 
 
-def _tip(run_in_mm: float = 0.4) -> Tip:
-    return Tip(np.zeros(3), Pose(0.0, 0.0), run_in_mm=run_in_mm)
-
-
-def _stroke(kind: Kind, *steps_mm: float, speed: float = 25.0) -> Stroke:
-    x = np.concatenate([[0.0], np.cumsum(steps_mm)])
-    points = np.column_stack([x, np.zeros((len(x), 2))])
-    return Stroke(kind, points, PER_MM * np.array(steps_mm), speed, 0.45)
+def _strokes(*steps_mm: tuple[float, ...], speed: float = 25.0, flow: float = 1.0) -> Moves:
+    """Strokes along X with steps of some lengths."""
+    steps = [np.array([0.0, *lengths]) for lengths in steps_mm]
+    ways = [np.column_stack([np.cumsum(row), np.zeros((len(row), 2)), flow * PER_MM * row]) for row in steps]
+    return Moves(np.concatenate(ways), np.array([[0.0, len(row), speed, 0.45, np.nan, np.inf] for row in steps]))
 
 
 def _layer(*kinds: Kind) -> Layer:
@@ -37,34 +31,36 @@ def _layer(*kinds: Kind) -> Layer:
 
 
 def test_the_filament_is_spread_over_the_first_stretch_and_then_all_is_as_usual() -> None:
-    tip = _tip(0.3)
-    stroke = run_in(_stroke(Kind.INFILL, 5.0, 15.0, 30.0), _layer(Kind.INFILL), tip, load())
-    assert stroke.filament_mm == pytest.approx([5 * (PER_MM + 0.3 / RUN_MM), 15 * (PER_MM + 0.3 / RUN_MM), 30 * PER_MM])
-    assert tip.run_in_mm == 0.0
+    strokes = _strokes((5.0, 15.0, 30.0), (40.0,))
+    assert run_in(strokes, _layer(Kind.INFILL, Kind.INFILL), 0.3, load()) == pytest.approx(0.3)
+    thicker = PER_MM + 0.3 / RUN_MM
+    assert strokes.ways[:, 3] == pytest.approx([0.0, 5 * thicker, 15 * thicker, 30 * PER_MM, 0.0, 40 * PER_MM])
 
 
 @pytest.mark.parametrize("flow", [1.0, 1.24])  # outer beads that nothing covers bulge, the more so the narrower they are
 def test_no_stroke_takes_more_than_half_too_much_and_the_next_one_takes_the_rest(flow: float) -> None:
-    tip, stroke = _tip(), _stroke(Kind.INFILL, 5.0)
-    stroke = replace(stroke, filament_mm=flow * stroke.filament_mm)
-    short = run_in(stroke, _layer(Kind.INFILL), tip, load())
+    strokes = _strokes((5.0,), (40.0,), flow=flow)
+    assert run_in(strokes, _layer(Kind.INFILL, Kind.INFILL), 0.4, load()) == pytest.approx(0.4)
     needed_mm = 5 * (0.2 * (0.45 - 0.2) + pi * 0.1**2) / (pi * 1.75**2 / 4)
-    assert short.filament_mm == pytest.approx([1.5 * needed_mm])
-    assert tip.run_in_mm == pytest.approx(0.4 - 1.5 * needed_mm + flow * 5 * PER_MM)
+    assert strokes.ways[1, 3] == pytest.approx(1.5 * needed_mm)
+    assert strokes.ways[3, 3] == pytest.approx(flow * 45 * PER_MM + 0.4 - 1.5 * needed_mm)
+    assert run_in(_strokes((5.0,), flow=flow), _layer(Kind.INFILL), 0.4, load()) == pytest.approx(
+        1.5 * needed_mm - flow * 5 * PER_MM
+    )
 
 
 def test_an_outer_wall_takes_nothing_where_the_layer_has_anything_inside() -> None:
-    for kinds, more in (((Kind.OUTER_WALL, Kind.INFILL), 0.0), ((Kind.OUTER_WALL,), 0.4)):
-        tip, wall = _tip(), _stroke(Kind.OUTER_WALL, 40.0)
-        run = run_in(wall, _layer(*kinds), tip, load())
-        assert run.filament_mm.sum() - wall.filament_mm.sum() == pytest.approx(more)
+    for kinds, more in (((Kind.OUTER_WALL, Kind.INFILL), [0.0, 0.4]), ((Kind.OUTER_WALL,), [0.4])):
+        strokes = _strokes(*((40.0,) for _ in kinds))
+        assert run_in(strokes, _layer(*kinds), 0.4, load()) == pytest.approx(0.4)
+        assert strokes.ways[1::2, 3] - 40.0 * PER_MM == pytest.approx(more)
 
 
 def test_it_goes_no_faster_than_the_hot_end_melts() -> None:
     profile: Profile = load(settings=["material.volumetric_limit_mm3_s=2"])
-    stroke = run_in(_stroke(Kind.INFILL, 20.0, speed=25.0), _layer(Kind.INFILL), _tip(), profile)
-    rate = stroke.filament_mm[0] / 20.0 * stroke.speed_mm_s * pi * 1.75**2 / 4
-    assert rate == pytest.approx(2.0)
+    strokes = _strokes((20.0,), speed=25.0)
+    run_in(strokes, _layer(Kind.INFILL), 0.4, profile)
+    assert strokes.ways[1, 3] / 20.0 * strokes.rows[0, SPEED] * pi * 1.75**2 / 4 == pytest.approx(2.0)
 
 
 def test_a_part_on_plastic_begins_inside_with_its_skin() -> None:

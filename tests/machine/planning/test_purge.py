@@ -5,7 +5,7 @@ import pytest
 
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
-from machine.planning.moves import BeginPart, MachineProgram, Stroke
+from machine.planning.moves import BeginPart, MachineProgram
 from machine.planning.plan import plan
 from machine.planning.purge import has_purge, purge_lanes
 from mdp.decomposition import Decomposition, Part
@@ -15,7 +15,7 @@ from mdp.pose import level, rotation
 from profiles.profile import Profile, load, load_one, shipped
 from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.slice import slice_part
-from tests.machine.hand import moves_of
+from tests.machine.moves import Stroke, moves_of
 from tests.shapes import box
 
 

@@ -1,22 +1,24 @@
 """Routes around a turn of the table against brute force: points all over head, table, cradle and print, pose by pose."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from machine.kinematics.collision import hull
+from machine.kinematics.collision import hull, solids
 from machine.kinematics.table import machine_points
-from machine.planning.reorient import Speeds, Sweep, Turn, poses_between, route, stands, way_s
+from machine.planning.limits import speeds_of
+from machine.planning.reorient import Sweep, Turn, poses_between, route, stands, sweep, way_s
 from mdp.head import bodies, corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.machine import CradleBox, Machine
 from profiles.profile import load
 
-SPEEDS = Speeds(10.0, 150.0)
+SPEEDS = speeds_of(load())._replace(lift_mm_s=10.0, travel_mm_s=150.0)
 PRINT = corners((-20.0, -15.0, 0.0), (20.0, 15.0, 50.0))
 AT, TARGET = np.array([10.0, 5.0, 50.2]), np.array([0.0, -40.0, 30.0])
 TURN = Pose(60.0, 50.0)
@@ -109,6 +111,18 @@ def test_no_stand_of_the_family_is_quicker_and_safe_too(name: str) -> None:
             if seconds < way.seconds - 0.25:
                 quicker.append((x, y, z))
     assert not quicker or (_least_distance(name, np.array(quicker)) < machine.lift_mm).all()
+
+
+def test_between_two_poses_that_are_tried_nothing_reaches_farther_than_is_reckoned_with() -> None:
+    machine, printed = _machine("cradle"), hull(PRINT, 0.0)
+    swept, tried = sweep(machine, printed, level(machine), TURN), poses_between(level(machine), TURN)
+    assert len(swept.reach) == len(tried) - 1
+    nearest = np.inf
+    for known, (a, b) in zip(swept.reach, pairwise(tried), strict=True):
+        between = Pose(0.5 * (a.tilt_deg + b.tilt_deg), 0.5 * (a.turn_deg + b.turn_deg))
+        reach = np.array([reach_of(swept.tried) for _, reach_of in solids(machine, between, printed)])
+        nearest = min(nearest, float((known - reach).min()))
+    assert 0.0 <= nearest < 0.01  # mm
 
 
 def test_a_cradle_in_the_way_costs_time() -> None:

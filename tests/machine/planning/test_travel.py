@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from machine.gcode.writer import write_gcode
-from machine.planning.moves import BeginLayer, MachineProgram, Retract, Stroke, Travel, Wipe
+from machine.planning.moves import BeginLayer, MachineProgram
 from machine.planning.plan import plan
-from machine.planning.travel import trail_after
+from machine.planning.travel import Laid, trail_after
 from machine.reader.parse import parse_gcode
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from profiles.profile import Profile, load
 from slicer.geometry.polyline import length_mm
-from slicer.paths import Kind, Path
+from slicer.paths import Kind, Layer, Path
 from slicer.slice import slice_part
-from slicer.strokes.wiping import first_length, wipe_trail
-from tests.machine.hand import moves_of
+from slicer.strokes.wiping import way_of_wipe
+from tests.machine.moves import Retract, Stroke, Travel, Wipe, moves_of
 from tests.shapes import box
 from tests.slicer.hand import whole
 
@@ -79,6 +79,16 @@ def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
     assert checked >= 14
 
 
+def test_ways_across_have_the_travel_speed_and_those_straight_up_and_down_the_lift_speed() -> None:
+    words = ("process.lift_mm=0.4", "process.lift_speed_mm_s=5", "process.travel_speed_mm_s=120")
+    travels = [move for move in moves_of(_towers(*words)[0]) if isinstance(move, Travel)][
+        2:
+    ]  # two stand for the way to the start
+    upright = {move.speed_mm_s for move in travels if not np.ptp(move.points_mm[:, :2], axis=0).any()}
+    level = {move.speed_mm_s for move in travels if not np.ptp(move.points_mm[:, 2])}
+    assert (upright, level) == ({5.0}, {120.0})
+
+
 def test_coasting_pushes_nothing_over_the_last_stretch_before_a_retraction() -> None:
     moves = moves_of(_towers("material.coast_mm=0.5", "process.infill_density=1")[0])
     coasted = [a for a, b in pairwise(moves) if isinstance(a, Stroke) and isinstance(b, Wipe) and a.filament_mm[-1] == 0]
@@ -113,8 +123,8 @@ def test_wipes_are_written_with_the_marks_that_viewers_know() -> None:
 
 def test_a_ring_is_wiped_onward_and_a_line_backward() -> None:
     ring = np.array([[0, 0, 1], [9, 0, 1], [9, 9, 1], [0, 9, 1], [0, 0, 1]], dtype=float)
-    assert first_length(wipe_trail(ring, 0.4), 2.0)[-1] == pytest.approx([2, 0, 1])
-    assert first_length(wipe_trail(ring[:4], 0.4), 2.0)[-1] == pytest.approx([2, 9, 1])
+    assert way_of_wipe(ring, 0.4, 2.0)[-1] == pytest.approx([2, 0, 1])
+    assert way_of_wipe(ring[:4], 0.4, 2.0)[-1] == pytest.approx([2, 9, 1])
 
 
 def _short(length: float, approach: tuple[tuple[float, float], ...] = ()) -> Path:
@@ -123,14 +133,21 @@ def _short(length: float, approach: tuple[tuple[float, float], ...] = ()) -> Pat
 
 
 def _wiped(path: Path, before: np.ndarray) -> np.ndarray:
-    points = np.column_stack([path.points, np.full(2, 0.2)])
-    return first_length(trail_after(points, path, before, np.zeros(3), 2.0), 2.0)
+    layer = Layer.of(0.2, 0.2, [path], 0.0)
+    laid = Laid(layer.points_mm, layer.starts, layer.width_mm, layer.wiped, layer.approach, layer.approach_starts)
+    return trail_after(laid, 0, 1, before, 2.0)
 
 
 def test_a_wipe_longer_than_its_stroke_goes_on_over_the_way_and_the_strokes_before_it() -> None:
     before = np.array([[9.0, 0.5, 0.2], [0.0, 0.5, 0.2]])
     way = _wiped(_short(0.15, ((10.0, 0.5),)), before)
     assert way == pytest.approx(np.array([[10.15, 0, 0.2], [10, 0, 0.2], [10, 0.5, 0.2], [9, 0.5, 0.2], [8.65, 0.5, 0.2]]))
+
+
+def test_a_wipe_goes_back_over_all_places_that_the_way_to_its_stroke_passed() -> None:
+    way = _wiped(_short(0.15, ((9.4, 0.5), (10.0, 0.5))), np.array([[9.4, 0.9, 0.2], [0.0, 0.9, 0.2]]))
+    places = [[10.15, 0], [10, 0], [10, 0.5], [9.4, 0.5], [9.4, 0.9], [9.05, 0.9]]
+    assert way == pytest.approx(np.insert(places, 2, 0.2, axis=1))
 
 
 def test_a_wipe_never_goes_back_to_the_layer_below() -> None:
@@ -146,8 +163,6 @@ def test_a_stroke_as_long_as_the_wipe_is_wiped_over_itself() -> None:
 def test_a_wipe_that_must_not_go_over_its_ring_goes_over_the_inner_wall_or_nowhere() -> None:
     ring = np.array([[5, 0.9], [5, 0.3], [9, 0.3], [9, 9], [1, 9], [1, 0.3], [5, 0.3], [5, 0.6]], dtype=float)
     path = Path(Kind.OUTER_WALL, ring, 0.6, 20.0, 1.0, np.zeros((0, 2)), False, wiped=False)
-    points = np.column_stack([ring, np.full(len(ring), 0.2)])
     inner = np.array([[5, 0.9, 0.2], [8, 0.9, 0.2]])
-    way = first_length(trail_after(points, path, inner, np.zeros(3), 2.0), 2.0)
-    assert way == pytest.approx(np.array([[5, 0.6, 0.2], [5, 0.9, 0.2], [6.7, 0.9, 0.2]]))
-    assert not len(trail_after(points, path, inner[:0], np.zeros(3), 2.0))
+    assert _wiped(path, inner) == pytest.approx(np.array([[5, 0.6, 0.2], [5, 0.9, 0.2], [6.7, 0.9, 0.2]]))
+    assert not len(_wiped(path, inner[:0]))

@@ -16,7 +16,7 @@ from mdp.ranking.ranker import ByReduction, ranker_named, shipped
 from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, shortlist
 from mdp.search.beam import Beam
 from mdp.search.problem import Problem
-from mdp.search.published import _fill
+from mdp.search.published import search_as_published
 from mdp.search.search import decompose
 from profiles.errors import RankerError
 from profiles.profile import load
@@ -122,9 +122,11 @@ def test_the_published_search_follows_the_plain_best_beside_what_a_learned_ranke
     problem = Problem(shapes.branch(), profile)
     table = problem.table(problem.root, described=True)
     plain, *_ = rank_classic([table], problem.model.risky_mm2, np.inf)
-    chosen, children = _fill(problem, LastFirst(), [problem.root], [table])
-    assert len(children) == width + 1
-    assert chosen[-1].row == plain.row
+    told: list[tuple[int, int]] = []
+    best, _ = search_as_published(problem, LastFirst(), lambda stage: stage < 1, None, lambda *given: told.append(given[:2]))
+    assert told == [(1, width + 1)]
+    assert (best.cuts[-1].base.normal @ table.plane(plain.row).normal) == pytest.approx(1.0)
+    assert best.cuts[-1].base.offset_mm == pytest.approx(table.plane(plain.row).offset_mm)
 
 
 class LastFirst(ByReduction):

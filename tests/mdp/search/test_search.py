@@ -23,8 +23,7 @@ from mdp.ranking.candidates import directions
 from mdp.ranking.features import COLUMNS
 from mdp.search.front import Front, Price
 from mdp.search.parts import folded_mm3
-from mdp.search.problem import Problem
-from mdp.search.search import Progress, _take, decompose
+from mdp.search.search import Progress, decompose
 from profiles.errors import DecompositionError
 from profiles.profile import load
 from tests import shapes
@@ -273,16 +272,14 @@ def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
         assert record["node_expanded"].tolist() == [True, True, True, True]
 
 
-def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best() -> None:
-    profile = load(settings=("search.objective=risky", "search.clearance=false"))
-    problem = Problem(shapes.tee(), profile)
-    first = problem.cut(problem.root, Plane(np.array([0.0, 0.0, 1.0]), 15.0))
-    assert first is not None
-    twin, front = replace(first), Front(problem.start)
-    front.offer(first)
-    front.offer(twin)
-    (chosen,) = (row for row in _take(problem, front, twin, None, None, profile).front if row.chosen)
-    assert chosen.cost_mm2 == first.cost_mm2
+@pytest.mark.parametrize("method", ["published", "best"])
+def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = (f"search.method={method}", "search.objective=risky", "search.directions=200", "search.polish=false")
+    usual, offer = decompose(shapes.tee(), "tee", load(settings=words)), Front.offer
+    monkeypatch.setattr(Front, "offer", lambda front, node: offer(front, replace(node)))
+    twin = decompose(shapes.tee(), "tee", load(settings=words))
+    assert [row.chosen for row in twin.front] == [row.chosen for row in usual.front]
+    assert len(twin.parts) == len(usual.parts) > 1
 
 
 def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_needs_support_tells_nothing() -> None:

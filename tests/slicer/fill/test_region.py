@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from profiles.process import Process
-from slicer.fill.region import Cover, Region, _common, regions, shell_layers
+from slicer.fill.region import Cover, Region, regions, shell_layers
 from slicer.geometry.polygons import Polygons, offset, opening
 from tests.slicer.hand import as_shapely, profile
 
@@ -166,14 +166,15 @@ def test_every_vertical_line_meets_enough_wall_or_skin_below_a_slope(step: float
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 1000])
-def test_running_intersections_agree_with_intersecting_one_by_one(count: int) -> None:
+def test_sparse_is_what_each_of_so_many_layers_below_covers(count: int) -> None:
     layers = [square(10).translate((k * 7 % 5, k * 3 % 4)) for k in range(11)]
-    for i, common in enumerate(_common(layers, count)):
-        window = layers[i : i + count]
-        expected = square(100)
-        for layer in window:
+    for i, region in enumerate(alone(layers, layers, None, process(0, count, solid_below_mm2=0))):
+        expected = layers[i]
+        for layer in layers[max(i - count, 0) : i]:
             expected = expected ^ layer
-        assert common.area() == pytest.approx(expected.area() if len(window) == count else 0.0)
+        expected = expected if i >= count else Polygons()
+        assert (region.sparse - expected).area() < 1e-6
+        assert (offset(expected, -2.0 * WIDTH) - region.sparse).area() < 1e-6  # beside walls that begin it is solid
 
 
 def test_opening_drops_what_is_too_narrow_only() -> None:

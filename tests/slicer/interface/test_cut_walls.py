@@ -139,6 +139,16 @@ def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
     assert over == {2: pytest.approx(0.1 * (0.8 * within_wide_walls + 0.1 * SIDE**2), rel=0.03)}
 
 
+def test_the_plastic_between_two_cuts_belongs_to_the_nearer_one() -> None:
+    alone = [interface_mm3(both.sections, both.regions)[2] for both in shells("cube", STRAIGHT)]
+    low, middle, high = cut(from_manifold(model("cube")), (STRAIGHT, 24.0), (STRAIGHT, 11.9))
+    between = shells_of(section_part(middle, profile(*PLAIN), [low], [high]))
+    assert interface_mm3(between.sections, between.regions) == {
+        2: pytest.approx(alone[1], rel=0.01),
+        3: pytest.approx(alone[0], rel=0.01),
+    }
+
+
 def test_a_model_in_one_part_has_no_interface() -> None:
     (lower, _) = parts("cube", STRAIGHT)
     alone = shells_of(section_part(lower, profile(*PLAIN)))

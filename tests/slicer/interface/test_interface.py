@@ -14,7 +14,7 @@ from slicer.bead import OUTSIDE, Bead
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean
 from slicer.interface.base_plane import plane_in_frame_of
-from slicer.interface.cut_faces import _nearest_areas, joined
+from slicer.interface.cut_faces import joined, nearest_areas
 from slicer.interface.interface import (
     frame_change,
     near_parts,
@@ -119,7 +119,7 @@ def test_a_place_is_shared_out_to_the_least_of_linear_functions(seed: int, count
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points = points[shapely.contains_xy(as_shapely(ring), points)]
     least = np.argmin([points @ f[:2] + f[2] for f in functions], axis=0)
-    areas = _nearest_areas(ring, functions, [None] * count)
+    areas = nearest_areas(ring, functions, [None] * count)
     assert areas == pytest.approx(0.01 * np.bincount(least, minlength=count), abs=1.5)
     assert sum(areas) == pytest.approx(ring.area())
 
@@ -127,8 +127,8 @@ def test_a_place_is_shared_out_to_the_least_of_linear_functions(seed: int, count
 def test_a_limb_s_plane_shares_in_places_beside_the_limb_alone() -> None:
     square, left = Polygons.square((10.0, 10.0), True), Polygons.square((4.0, 10.0)).translate((-5.0, -5.0))
     functions = [np.array([0.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])]
-    assert _nearest_areas(square, functions, [None, left]) == pytest.approx([60.0, 40.0])
-    assert _nearest_areas(square, functions[1:], [left]) == pytest.approx([40.0])
+    assert nearest_areas(square, functions, [None, left]) == pytest.approx([60.0, 40.0])
+    assert nearest_areas(square, functions[1:], [left]) == pytest.approx([40.0])
 
 
 @pytest.mark.parametrize(

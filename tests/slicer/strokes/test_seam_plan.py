@@ -13,7 +13,7 @@ from slicer.sectioning import section_part
 from slicer.sections import Sections
 from slicer.slice import slice_part
 from slicer.strokes.seam import seam_limits
-from slicer.strokes.seam_plan import JUMP, SHIFT, _choose, _Places, plan_seams
+from slicer.strokes.seam_plan import JUMP, SHIFT, Places, choose, plan_seams
 from slicer.strokes.visibility import Outside, Visibility
 from tests.shapes import standing
 from tests.slicer.hand import BARE, cut, profile, whole
@@ -45,6 +45,14 @@ def test_a_box_without_a_groove_begins_at_a_corner_of_the_rear() -> None:
     assert np.abs(places[:, 0]) == pytest.approx(10.0, abs=0.01)
     assert places[:, 1] == pytest.approx(10.0, abs=0.01)
     assert np.abs(np.diff(places, axis=0)).max() < 0.01
+
+
+def test_the_seam_of_a_disc_lies_below_the_groove_at_the_front_of_what_stands_on_it() -> None:
+    disc = m3.Manifold.cylinder(2, 11, 11, 90).translate((0, 0, -2))
+    block = m3.Manifold.cube((16, 16, 8), True).translate((0, 0, 4))
+    places = np.concatenate(planned(whole(standing(disc + block - m3.Manifold.cube((4, 6, 9), True).translate((0, -8, 4.5))))))
+    assert len(places) == 50
+    assert (places[:, 1] < -4.0).all()
 
 
 def test_the_seam_of_a_cylinder_lies_where_it_faces_a_wall() -> None:
@@ -101,6 +109,6 @@ def test_no_other_choice_of_places_costs_less(seed: int) -> None:
         ways = [np.hypot(*(xy[at[k]] - xy[at[j]])) for k, j in enumerate(below) if j is not None]
         return float(cost[at].sum() + np.minimum(SHIFT * np.array(ways), JUMP).sum())
 
-    chosen = _choose(_Places(xy, cost, np.arange(0, 5 * count + 1, count), layer))
+    chosen = choose(Places(xy, cost, np.arange(0, 5 * count + 1, count), layer))
     taken = tuple(int(np.hypot(*(xy[count * k : count * (k + 1)] - place).T).argmin()) for k, place in enumerate(chosen))
     assert costs(taken) == pytest.approx(min(costs(choice) for choice in product(range(count), repeat=5)))

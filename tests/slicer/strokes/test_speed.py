@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from profiles.profile import load
+from slicer.bead import Bead
 from slicer.paths import Kind
 from slicer.slice import slice_part
-from slicer.strokes.speed import fan_share
+from slicer.strokes.speed import fan_share, stroke_accelerations, travel_time_s
+from slicer.strokes.strokes import strokes_of
 from tests.shapes import box, from_manifold
 from tests.slicer.hand import cut, of_kind, profile, whole
 
@@ -72,3 +74,22 @@ def test_a_layer_takes_its_least_time_unless_all_is_at_the_least_speed(size: flo
         time_s = sum(path.length_mm / path.speed_mm_s for path in layer.paths)
         slowest = np.allclose([path.speed_mm_s for path in layer.paths], chosen.process.least_speed_mm_s)
         assert time_s >= 0.97 * 8 or slowest
+
+
+def test_travels_last_as_long_as_their_ways_with_a_pull_back_and_a_push_for_each_retraction() -> None:
+    keys = profile("material.retract_mm=2", "material.retract_speed_mm_s=40", "process.travel_speed_mm_s=100")
+    lines = [np.array([[x, 0.0], [x + 10.0, 0.0]]) for x in (0.0, 20.0, 36.0)]
+    beads = [(Bead(Kind.INFILL, line, 0.45, 3), line) for line in lines]
+    round_about = {1: np.array([[10.0, 5.0], [20.0, 5.0]])}  # 5, 10 and 5 mm to the second line, 6 mm to the third
+    strokes = strokes_of(beads, np.array([False, True, False]), round_about, 0.0)
+    assert travel_time_s(strokes, keys) == pytest.approx(26.0 / 100.0 + 2.0 * 2.0 / 40.0)
+
+
+def test_support_is_accelerated_as_infill_and_overhanging_walls_as_bridges() -> None:
+    keys = profile(
+        "process.acceleration_mm_s2=1000", "process.infill_acceleration_mm_s2=2000", "process.bridge_acceleration_mm_s2=500"
+    )
+    found = stroke_accelerations(keys, False)
+    assert found is not None
+    kinds = (Kind.INFILL, Kind.SUPPORT, Kind.SUPPORT_INTERFACE, Kind.BRIDGE, Kind.OVERHANG, Kind.SKIN, Kind.OUTER_WALL)
+    assert [found[kind] for kind in kinds] == [2000.0, 2000.0, 2000.0, 500.0, 500.0, 1000.0, 1000.0]

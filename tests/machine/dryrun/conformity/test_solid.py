@@ -8,7 +8,7 @@ from trimesh.triangles import closest_point
 
 from machine.dryrun.conformity.deposit import inside, nearest_faces, outside_mm, signed
 from machine.dryrun.conformity.filling import ROUND_MM, in_beads, lattice
-from machine.dryrun.conformity.registration import _fit
+from machine.dryrun.conformity.registration import fit_shift
 from mdp.mesh import Floats, Mesh
 from tests.mdp.solids import random_solid
 from tests.shapes import box, hollow
@@ -119,12 +119,12 @@ def test_a_shift_is_found_beside_a_constant_and_among_walls_that_lie_elsewhere(s
     shift, constant = rng.uniform(-0.5, 0.5, 3), rng.uniform(-0.2, 0.2)
     beside = normals @ shift + constant + rng.normal(0.0, 0.005, count)
     beside[: count // 10] += rng.uniform(0.5, 1.4, count // 10)
-    found = _fit(normals, beside)
+    found = fit_shift(normals, beside)
     assert found == pytest.approx(shift, abs=0.03)
 
 
 def test_a_direction_in_which_no_wall_faces_is_not_told_and_few_walls_tell_nothing() -> None:
     turns = 2.0 * np.pi * np.arange(100) / 100
     level = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(100)])
-    assert _fit(level, level @ (0.3, -0.1, 9.0) + 0.1) == pytest.approx([0.3, -0.1, 0.0], abs=1e-6)
-    assert _fit(level[:39], level[:39, 0]) is None
+    assert fit_shift(level, level @ (0.3, -0.1, 9.0) + 0.1) == pytest.approx([0.3, -0.1, 0.0], abs=1e-6)
+    assert fit_shift(level[:39], level[:39, 0]) is None
