@@ -95,7 +95,7 @@ class ParsedProgram:
         """(n,) from ;PART: comments, 0 before the first."""
         return self.remarks.part[self.remark]
 
-    @property
+    @cached_property
     def layer(self) -> Indices32:
         """(n,) from ;LAYER_CHANGE comments, counted in each part, 0 before the first."""
         return self.remarks.layer[self.remark]
@@ -125,6 +125,14 @@ class ParsedProgram:
         """(n,) running sum of e_mm."""
         pushed: Floats = np.cumsum(self.e_mm)
         return pushed
+
+    @cached_property
+    def bounds(self) -> Floats:
+        """(2, 5) least and greatest place of each axis at the ends of moves; infinite where there is none."""
+        least, most = np.full(5, np.inf), np.full(5, -np.inf)
+        for some in pieces(len(self.line)):
+            least, most = np.minimum(least, self.end[some].min(axis=0)), np.maximum(most, self.end[some].max(axis=0))
+        return np.stack([least, most])
 
     @property
     def way_mm(self) -> Floats:

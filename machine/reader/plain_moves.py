@@ -92,7 +92,7 @@ def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
         table.begin(state.tolist(), len(lines) - at)
         counts = np.array([at, table.rows, table.remarks, -1])
         _read_run(Text(lines.content, lines.start), meaning, table.columns, state, counts)
-        begun, (at, table.rows, table.remarks, move) = at, counts.tolist()
+        begun, at, table.rows, table.remarks, move = at, *(int(count) for count in counts)
         if move >= 0:
             reader.motion = lines[move][:2]
         if at == begun or table.remarks < len(table.columns.told):

@@ -38,8 +38,8 @@ def program_of(reader: Reader) -> ParsedProgram:
     """All that a reader has read."""
     columns, count = reader.table.columns, reader.table.rows
     begins = columns.starts if len(columns.starts) else columns.places
-    flat = (column[:count] for column in (columns.line, columns.remark, columns.e_mm, columns.feed))
-    rows, events = _Rows(*flat, begins[:count], columns.places[1 : count + 1]), reader.events
+    end, events = columns.places[1 : count + 1], reader.events
+    rows = _Rows(columns.line[:count], columns.remark[:count], columns.e_mm[:count], columns.feed[:count], begins[:count], end)
     followed = np.searchsorted(reader.switches, np.arange(count), side="right") % 2 == 1 if reader.switches else None
     asked = (rows.feed < 0.0) | np.isinf(rows.feed)
     if followed is not None:
@@ -131,7 +131,7 @@ def _merge_turns(keep: NDArray[np.bool_], rows: _Rows, events: Sequence[Event]) 
     last = np.append(first[1:], len(keep)) - 1
     minutes = np.add.reduceat(_feed_length(rows.change()) / rows.feed, first)
     merged_row = np.append(np.cumsum(keep) - 1, len(first))
-    merged = _Rows(*(column[first] for column in rows[:-1]), rows.end[last])
+    merged = _Rows(rows.line[first], rows.remark[first], rows.e_mm[first], rows.feed[first], rows.start[first], rows.end[last])
     joined = first < last
     merged.feed[joined] = _feed_length(merged.change())[joined] / minutes[joined]
     return merged, [replace(event, row=int(merged_row[event.row])) for event in events]

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from machine.gcode.modes import E_AXIS
 from mdp.mesh import Floats
 
-COLUMNS: dict[str, type[np.generic]] = {"line": np.int32, "e_mm": np.float64, "feed": np.float64, "remark": np.int32}
 TOLD = 6  # columns of told: part, layer, type, width, height, acceleration
 ROOM = 1024  # remarks
 
@@ -32,15 +31,20 @@ class Table:
 
     def __init__(self, room: int) -> None:
         self.rows = self.remarks = 0
-        columns = [np.empty(room, kind) for kind in COLUMNS.values()]
-        self.columns = Columns(*columns, np.empty((room + 1, E_AXIS)), np.empty((0, E_AXIS)), np.empty((ROOM, TOLD)))
+        self.columns = Columns(
+            np.empty(room, np.int32), np.empty(room), np.empty(room), np.empty(room, np.int32),
+            np.empty((room + 1, E_AXIS)), np.empty((0, E_AXIS)), np.empty((ROOM, TOLD)),
+        )  # fmt: skip
 
     def begin(self, place: list[float], rows: int) -> None:
         """Have room for so many more rows, the first of which begins at a place (X Y Z tilt turn, then anything)."""
         count, columns, room = self.rows, self.columns, len(self.columns.places) - 1
         if count + rows > room:
-            columns = Columns(*(_longer(column, 2 * (count + rows) + 1) for column in columns[:-1]), columns.told)
-            columns = columns._replace(starts=columns.starts if len(self.columns.starts) else np.empty((0, E_AXIS)))
+            kept = ("told",) if len(columns.starts) else ("told", "starts")
+            longer = {
+                name: _longer(column, 2 * (count + rows) + 1) for name, column in columns._asdict().items() if name not in kept
+            }
+            columns = columns._replace(**longer)
         if self.remarks == len(columns.told):
             columns = columns._replace(told=_longer(columns.told, 2 * self.remarks))
         if count == 0:
