@@ -50,18 +50,13 @@ def _outside(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
         yield from per_part(program, below, -values[below], f"{letter} goes to -{{value}} {unit}, {allowed}", code="axis-limit")
 
 
-def deltas(program: ParsedProgram, rows: slice = slice(None)) -> Floats:
-    """(n, 6) changes of X Y Z tilt turn E."""
-    return np.column_stack([program.end[rows] - program.start[rows], program.e_mm[rows]])
-
-
 def times_s(program: ParsedProgram, machine: Machine) -> Floats:
     """(n,) seconds of each row, some at a time: where the machine stands still in between neither knows of the other."""
     stop, seconds, begin = standstills(program), np.empty(len(program.line)), 0
     while begin < len(seconds):
         some = _until_standstill(program, begin)
         told = (program.feed[some] / 60.0, stop[some], machine, program.remarks.acceleration[program.remark[some]])
-        seconds[some], begin = move_times(deltas(program, some), *told), some.stop
+        seconds[some], begin = move_times(program.changes(some), *told), some.stop
     return seconds
 
 
@@ -69,7 +64,7 @@ def _until_standstill(program: ParsedProgram, begin: int) -> slice:
     """Many rows, with the last of which a run of moves ends that F measures alike; such runs begin and end at a standstill."""
     count, last = AT_ONCE, len(program.line)
     while begin + count < last:
-        _, measure = lengths(deltas(program, slice(begin, begin + count)))
+        _, measure = lengths(program.changes(slice(begin, begin + count)))
         moving = np.flatnonzero(measure < STILL)
         ends = moving[1:][np.diff(measure[moving]) != 0]
         if len(ends):
@@ -90,7 +85,7 @@ def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     most = axis_speeds(machine)
     told = most * SLACK + ROUNDING_MM_S
     fast = np.flatnonzero(_are_fast(program.start, program.end, program.e_mm, program.feed, told, WRITTEN))
-    change = np.column_stack([program.end[fast] - program.start[fast], program.e_mm[fast]])
+    change = program.changes(fast)
     way = np.maximum(lengths(change)[0], 1e-9)
     speeds = np.maximum(np.abs(change) - WRITTEN, 0.0) / way[:, None] * (program.feed[fast] / 60.0)[:, None]
     for axis, letter in enumerate(names):

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 AT_ONCE = 4096  # lines
-TEXT_AT_ONCE = 2**16  # characters
 BYTES_AT_ONCE = 2**20
 NEWLINE = 10
 
@@ -37,7 +36,7 @@ class Lines(Sequence[str]):
     def of_text(cls, pieces: Iterable[str]) -> "Lines":
         """A text that comes in pieces, whose lines end with a line feed."""
         content = bytearray()
-        for text in _joined(pieces):
+        for text in pieces:
             content += _bytes(text)
         return cls.of_bytes(content)
 
@@ -93,18 +92,6 @@ class Lines(Sequence[str]):
         return isinstance(other, Sequence) and len(self) == len(other) and all(a == b for a, b in zip(self, other, strict=True))
 
     __hash__ = None  # type: ignore[assignment]
-
-
-def _joined(pieces: Iterable[str]) -> Iterator[str]:
-    """The text in pieces of at least TEXT_AT_ONCE characters, but for the last."""
-    some, size = list[str](), 0
-    for piece in pieces:
-        some.append(piece)
-        size += len(piece)
-        if size >= TEXT_AT_ONCE:
-            yield "".join(some)
-            some, size = [], 0
-    yield "".join(some)
 
 
 def _bytes(text: str) -> bytes:

@@ -12,7 +12,7 @@ from machine.reader.codes import BARE_WORDS, VALUED, dispatch
 from machine.reader.macros import macro
 from machine.reader.motion import flush
 from machine.reader.parsed import ParsedProgram
-from machine.reader.plain_moves import may_be_plain, read_plain_moves
+from machine.reader.plain_moves import read_plain_moves
 from machine.reader.program import program_of
 from machine.reader.remarks import remark
 from machine.reader.state import Reader, Words, reader_of
@@ -35,7 +35,7 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     lines = Lines.of(lines)
     reader, at = reader_of(machine, len(lines)), 0
     while at < len(lines):
-        after = read_plain_moves(reader, lines, at) if may_be_plain(lines, at) else at
+        after = read_plain_moves(reader, lines, at)
         if after == at:
             reader.number = after = at + 1
             _line(reader, lines[at])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.gcode.part_totals import PartTotals
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
 
 AT_ONCE = 16_384  # rows
@@ -141,6 +141,10 @@ class ParsedProgram:
         for some in pieces(len(way_mm)):
             way_mm[some] = np.linalg.norm(self.end[some, :3] - self.start[some, :3], axis=1)
         return way_mm
+
+    def changes(self, rows: Indices | slice = slice(None)) -> Floats:
+        """(m, 6) of X Y Z tilt turn E, in some rows."""
+        return np.column_stack([self.end[rows] - self.start[rows], self.e_mm[rows]])
 
     def turned_between(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(m - 1,) whether the table stands otherwise after the one than after the other of each two of (m,) rows."""

@@ -64,18 +64,15 @@ class Meaning(NamedTuple):
     accelerations: Floats
 
 
-def may_be_plain(lines: Lines, at: int) -> bool:
-    """Whether a line begins as those do that a run is made of."""
-    first = lines.content[lines.start[at] : lines.start[at] + 2].tobytes()
-    return first in FIRST or first[:1] in FIRST
-
-
 def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
     """Rows of the plain lines from line `first`, counted from 0; returns the first line that is not plain.
 
     Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row.
     """
     modes, table = reader.modes, reader.table
+    begin = lines.content[lines.start[first] : lines.start[first] + 2].tobytes()
+    if begin not in FIRST and begin[:1] not in FIRST:  # nothing need be got ready
+        return first
     if reader.flow != 1.0 or reader.filament_mm2 or modes.inverse_time or reader.turning or reader.ended:
         return first
     kinds = [kind.encode("utf-8", "surrogatepass") for kind in islice(reader.types, MOST_TYPES)]

@@ -1,15 +1,13 @@
 """Program: what was read, in axis positions and with feeds in the terms of the timeline."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.kinematics.coordinates import axis_positions
 from machine.planning.timing import axis_speeds, lengths
-from machine.reader.parsed import Event, MoveKind, ParsedProgram, Remarks
+from machine.reader.parsed import MoveKind, ParsedProgram, Remarks
 from machine.reader.state import Reader
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
@@ -19,53 +17,38 @@ SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded plac
 TRAVEL, EXTRUDE, RETRACT, ROTATE = (int(kind) for kind in MoveKind)
 
 
-class _Rows(NamedTuple):
-    """n rows. line, remark, e_mm, feed: (n,); start, end: (n, 5)."""
-
-    line: NDArray[np.int32]
-    remark: NDArray[np.int32]
-    e_mm: Floats
-    feed: Floats
-    start: Floats
-    end: Floats
-
-    def change(self, some: Indices | slice = slice(None)) -> Floats:
-        """(k, 6) of X Y Z tilt turn E, of some rows."""
-        return np.column_stack([self.end[some] - self.start[some], self.e_mm[some]])
-
-
 def program_of(reader: Reader) -> ParsedProgram:
     """All that a reader has read."""
     columns, count = reader.table.columns, reader.table.rows
-    begins = columns.starts if len(columns.starts) else columns.places
-    end, events = columns.places[1 : count + 1], reader.events
-    rows = _Rows(columns.line[:count], columns.remark[:count], columns.e_mm[:count], columns.feed[:count], begins[:count], end)
-    followed = np.searchsorted(reader.switches, np.arange(count), side="right") % 2 == 1 if reader.switches else None
-    asked = (rows.feed < 0.0) | np.isinf(rows.feed)
-    if followed is not None:
-        asked |= followed
-    if reader.dialect.largest_delta:
-        asked |= (rows.start[:, 3:] != rows.end[:, 3:]).any(axis=1)
-    odd = np.flatnonzero(asked)
-    length = _feed_length(rows.change(odd), reader.dialect.largest_delta)
-    if followed is not None and followed.any():
-        rows = rows._replace(start=rows.start.copy(), end=rows.end.copy())
-        for side in (rows.start, rows.end):
-            side[followed, :3] = axis_positions(reader.machine, side[followed])
-        keep = _turn_starts(rows, np.flatnonzero(followed), events)
-        rows.feed[odd] = _feeds(rows.feed[odd], length, rows.change(odd), axis_speeds(reader.machine))
-        rows, events = _merge_turns(keep, rows, events)
-    else:
-        rows.feed[odd] = _feeds(rows.feed[odd], length, rows.change(odd), axis_speeds(reader.machine))
-    kind = np.empty(len(rows.line), dtype=np.int8)
-    _tell_kinds(rows.start, rows.end, rows.e_mm, kind)
-    told = columns.told[: reader.table.remarks].T
-    return ParsedProgram(
-        **rows._asdict(), kind=kind, remarks=Remarks(*told[:3].astype(np.int32), *told[3:]), types=tuple(reader.types),
-        events=tuple(events), ignored=reader.ignored, replaced=tuple(reader.replaced), layers=reader.layers,
-        parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported), announced=reader.announced,
-        part_totals=tuple(reader.part_totals),
+    begins, told = columns.starts if len(columns.starts) else columns.places, columns.told[: reader.table.remarks].T
+    program = ParsedProgram(
+        line=columns.line[:count], start=begins[:count], end=columns.places[1 : count + 1], e_mm=columns.e_mm[:count],
+        feed=columns.feed[:count], kind=np.empty(count, np.int8), remark=columns.remark[:count],
+        remarks=Remarks(*told[:3].astype(np.int32), *told[3:]), types=tuple(reader.types), events=tuple(reader.events),
+        ignored=reader.ignored, replaced=tuple(reader.replaced), layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)),
+        unsupported=tuple(reader.unsupported), announced=reader.announced, part_totals=tuple(reader.part_totals),
     )  # fmt: skip
+    followed = np.searchsorted(reader.switches, np.arange(count), side="right") % 2 == 1 if reader.switches else np.zeros(0, bool)
+    program = _in_axis_positions(program, np.flatnonzero(followed), reader)
+    _tell_kinds(program.start, program.end, program.e_mm, program.kind)
+    return program
+
+
+def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader) -> ParsedProgram:
+    """The program whose (m,) followed rows are axis positions too, with feeds by the measure of NIST."""
+    asked = (program.feed < 0.0) | np.isinf(program.feed)
+    asked[followed] = True
+    if reader.dialect.largest_delta:
+        asked |= (program.start[:, 3:] != program.end[:, 3:]).any(axis=1)
+    odd = np.flatnonzero(asked)
+    length, keep = _feed_length(program.changes(odd), reader.dialect.largest_delta), None
+    if len(followed):
+        program = replace(program, start=program.start.copy(), end=program.end.copy())
+        for side in (program.start, program.end):
+            side[followed, :3] = axis_positions(reader.machine, side[followed])
+        keep = _turn_starts(program, followed)
+    program.feed[odd] = _feeds(program.feed[odd], length, program.changes(odd), axis_speeds(reader.machine))
+    return program if keep is None else _merge_turns(keep, program)
 
 
 @kernel
@@ -106,32 +89,38 @@ def _feeds(given: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floa
     return np.where(differs, along, given)
 
 
-def _turn_starts(rows: _Rows, followed: Indices, events: Sequence[Event]) -> NDArray[np.bool_]:
+def _turn_starts(program: ParsedProgram, followed: Indices) -> NDArray[np.bool_]:
     """(n,) False for a row that only goes on with the turn of the row before: the head stays, the direction too."""
-    start, end = rows.start, rows.end
+    start, end = program.start, program.end
     turn = end[:, 3:] - start[:, 3:]
     size = np.hypot(turn[:, 0], turn[:, 1])
     sway = np.abs(end[followed, :3] - start[followed, :3]).max(axis=1, initial=0.0)
     pure = np.zeros(len(size), dtype=np.bool_)
-    pure[followed] = (size[followed] > STILL) & (rows.e_mm[followed] == 0.0) & (sway < SWAY_MM)
+    pure[followed] = (size[followed] > STILL) & (program.e_mm[followed] == 0.0) & (sway < SWAY_MM)
     heading = turn / np.maximum(size, STILL)[:, None]
     goes_on = np.zeros(len(size), dtype=np.bool_)
     goes_on[1:] = pure[1:] & pure[:-1] & (np.abs(heading[1:] - heading[:-1]).max(axis=1, initial=0.0) < 0.01)
     goes_on[1:] &= np.abs(start[1:] - end[:-1]).max(axis=1, initial=0.0) < SWAY_MM
-    goes_on[[event.row for event in events if event.row < len(size)]] = False
+    goes_on[[event.row for event in program.events if event.row < len(size)]] = False
     end[pure, :3] = start[pure, :3]
     for row in np.flatnonzero(goes_on):
         start[row, :3] = end[row, :3] = start[row - 1, :3]
     return ~goes_on
 
 
-def _merge_turns(keep: NDArray[np.bool_], rows: _Rows, events: Sequence[Event]) -> tuple[_Rows, list[Event]]:
-    """The rows with each turn in one piece, at the pace of the whole."""
+def _merge_turns(keep: NDArray[np.bool_], program: ParsedProgram) -> ParsedProgram:
+    """The program with each turn in one row, at the pace of the whole."""
     first = np.flatnonzero(keep)
     last = np.append(first[1:], len(keep)) - 1
-    minutes = np.add.reduceat(_feed_length(rows.change()) / rows.feed, first)
+    minutes = np.add.reduceat(_feed_length(program.changes()) / program.feed, first)
     merged_row = np.append(np.cumsum(keep) - 1, len(first))
-    merged = _Rows(rows.line[first], rows.remark[first], rows.e_mm[first], rows.feed[first], rows.start[first], rows.end[last])
+    names = ("line", "start", "e_mm", "feed", "kind", "remark")
+    merged = replace(
+        program,
+        **{name: getattr(program, name)[first] for name in names},
+        end=program.end[last],
+        events=tuple(replace(event, row=int(merged_row[event.row])) for event in program.events),
+    )
     joined = first < last
-    merged.feed[joined] = _feed_length(merged.change())[joined] / minutes[joined]
-    return merged, [replace(event, row=int(merged_row[event.row])) for event in events]
+    merged.feed[joined] = _feed_length(merged.changes())[joined] / minutes[joined]
+    return merged
