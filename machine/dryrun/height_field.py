@@ -51,6 +51,12 @@ def empty_field(low: Floats, high: Floats) -> Field:
     return Field(np.asarray(low, np.float64), cell, shape, *heights, coarse, order, np.full(2, NOTHING))
 
 
+def in_order(field: Field) -> Field:
+    """The same field, of which a move meets the highest blocks first: most moves are above all of them."""
+    field.highest[1] = NOTHING
+    return field._replace(order=np.argsort(-field.coarse, kind="stable"))
+
+
 @borrower
 def _blocks(cells: int) -> int:
     """How many blocks so many cells are in."""
