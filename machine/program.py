@@ -2,12 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from machine.dryrun.dryrun import DryRun
-from mdp.decomposition import Decomposition
-from mdp.joint import Joint, joints_of
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
+
+if TYPE_CHECKING:
+    from mdp.decomposition import Decomposition
+    from mdp.joint import Joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,7 +19,7 @@ class Program:
 
     lines: Sequence[str]
     run: DryRun
-    decomposition: Decomposition | None
+    decomposition: "Decomposition | None"
     sliced: tuple[SlicedPart, ...] = ()
 
     @property
@@ -29,10 +32,12 @@ class Program:
         return dict(sorted(more.items()))
 
 
-def joints_of_print(program: Program, profile: Profile) -> tuple[Joint, ...]:
+def joints_of_print(program: Program, profile: Profile) -> "tuple[Joint, ...]":
     """The joints of a print, with what its dry run tells of the first layers on them; none where its model is not known."""
     if program.decomposition is None:
         return ()
+    from mdp.joint import joints_of  # a G-code file has none
+
     laid = {face.part: face for face in program.run.interfaces}
     return tuple(
         replace(joint, contact_share=laid[joint.part].contact, plastic_over_room=laid[joint.part].over_room)
@@ -62,5 +67,5 @@ class Alternative:
     seam_mm: float = 0.0
     stairs_mm2: float = 0.0
     interface_mm3: Mapping[int, float] = field(default_factory=dict)
-    joints: tuple[Joint, ...] = ()
+    joints: "tuple[Joint, ...]" = ()
     findings: int = 0

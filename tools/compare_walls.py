@@ -24,7 +24,6 @@ from bench_slice import METER
 from bench_travel import PRUSA, SAME, own_gcode
 from check_layers import section_of
 
-from machine.dryrun import motion
 from machine.kinematics.table import part_shift
 from machine.planning.timing import move_times
 from machine.reader.parse import parse_gcode
@@ -125,7 +124,7 @@ def figures(laid: Print, mesh: Mesh, profile: Profile, layers: int) -> Sequence[
         unfilled += band.difference(plastic).area
         band_mm2 += band.area
     stop = np.zeros(len(program.line), dtype=np.bool_)
-    times = move_times(motion.deltas(program), program.feed / 60.0, stop, profile.machine, program.acceleration)
+    times = move_times(program.changes(), program.feed / 60.0, stop, profile.machine, program.acceleration)
     return (
         f"{100 * outside / band_mm2:.2f}",
         f"{100 * unfilled / band_mm2:.2f}",

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from machine.gcode.lines import Lines
 from machine.gcode.settings import CONFIG_BEGIN, CONFIG_END
 from profiles.errors import ProfileError
 from profiles.part_settings import PartSettings
@@ -39,11 +40,15 @@ def _with_parts(profile: Profile, tables: Any) -> Profile:
 
 def _tables(lines: Sequence[str]) -> dict[str, Any]:
     """Section -> nested table of the values as they were written; {} where that is no TOML."""
-    at = {mark: next((k for k, line in enumerate(lines) if line.rstrip() == mark), None) for mark in (CONFIG_BEGIN, CONFIG_END)}
+    text = Lines.of(lines)
+    at = {
+        mark: next((k for k in text.beginning_with(mark) if text[k].rstrip() == mark), None)
+        for mark in (CONFIG_BEGIN, CONFIG_END)
+    }
     begin, end = at[CONFIG_BEGIN], at[CONFIG_END]
     if begin is None or end is None:
         return {}
-    settings = [line.rstrip() for line in lines[begin + 1 : end]]
+    settings = [line.rstrip() for line in text[begin + 1 : end]]
     try:
         whole: dict[str, Any] = _with_lists(read_toml("\n".join(map(_as_toml, settings))))
     except ValueError:

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from machine.app.requests import STDOUT, ModelRequest, Outputs, PrintRequest
 from mdp.model_file import DEMO
-from mdp.ranking.ranker import SUFFIX
-from mdp.save import FOLDER_FILES, PART_FILES
+from mdp.ranking import SUFFIX
 from profiles.errors import OutputError
 from profiles.places import is_file_name
 
@@ -76,6 +75,8 @@ def _written(outputs: Outputs) -> list[Role]:
 
 def _check_folder(folder: Path, read: Iterable[Role]) -> None:
     """A folder's own files have fixed names: none of them may be one that is read."""
+    from mdp.save import FOLDER_FILES, PART_FILES
+
     own = {_identity(folder / name): name for name in FOLDER_FILES}
     own |= {_identity(file): file.name for file in folder.glob(PART_FILES)} if folder.is_dir() else {}
     for role, path in read:

@@ -106,13 +106,13 @@ def cold_start(pen: Pen) -> Iterator[str]:
     """Homing as the start block does it but without heat, and the modes of a program; a comment for what is left out because it
     may heat. Raises MoveError where the machine is not homed without that."""
     dialect = pen.dialect
-    start = cold_block(_fill(pen.machine.gcode.start, pen), dialect)
-    yield from (f"; left out, for it may heat: {line}" for line in start.left_out)
-    if any(command_in(line) is COMMANDS[TOOL] for line in start.lines):  # it goes to its active temperature when it is selected
+    lines, left_out = cold_block(_fill(pen.machine.gcode.start, pen), dialect)
+    yield from (f"; left out, for it may heat: {line}" for line in left_out)
+    if any(command_in(line) is COMMANDS[TOOL] for line in lines):  # it goes to its active temperature when it is selected
         yield dialect.nozzle.format(number(0.0))
     for word in dialect.before_start:
         yield from _fill(word, pen)
-    yield from start.lines
+    yield from lines
     yield from (mode for mode in dialect.modes if mode not in ("M83", "M82"))
     for word in dialect.after_start:
         yield from _fill(word, pen)

@@ -48,11 +48,12 @@ def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
 def _rises_from_home(program: ParsedProgram) -> NDArray[np.bool_]:
     """(n,) moves straight up from where the firmware has homed: there the tip stands on the plate or above it, although a
     calibrated plate may lie higher than the 0 that it is read as standing at."""
-    from_home = np.ones(len(program.line), dtype=np.bool_)
-    from_home[1:] = (program.start[1:, :3] != program.end[:-1, :3]).any(axis=1)
+    up = np.flatnonzero(program.end[:, 2] > program.start[:, 2])
+    start, end, before = program.start[up], program.end[up], program.end[np.maximum(up - 1, 0)]
+    from_home = (up == 0) | (start[:, :3] != before[:, :3]).any(axis=1)
     aside = [0, 1, 3, 4]
-    straight = (program.start[:, aside] == program.end[:, aside]).all(axis=1) & (program.end[:, 2] > program.start[:, 2])
-    rises: NDArray[np.bool_] = from_home & straight
+    rises = np.zeros(len(program.line), dtype=np.bool_)
+    rises[up] = from_home & (start[:, aside] == end[:, aside]).all(axis=1)
     return rises
 
 
@@ -64,8 +65,10 @@ def _close(program: ParsedProgram, run: PoseRun, machine: Machine) -> Iterator[t
     for some in pieces(len(run.rows)):
         rows = run.rows[some]
         least = swept(program.start[rows, :3], program.end[rows, :3], tried)
+        nearest = least.min(axis=1, initial=np.inf)[:, None]
         for (body, _, reach), own in zip(meetings, close, strict=True):
-            own.append(rows[gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM])
+            if gaps_of(body, nearest, tried, reach)[0] < body.need_mm:  # else one direction alone parts all of them
+                own.append(rows[gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM])
     for (body, solid, _), own in zip(meetings, close, strict=True):
         if any(map(len, own)):
             yield body, solid, np.concatenate(own)
@@ -106,8 +109,8 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
     distance that is kept from the plate, it is part of that.
     """
     problems = []
-    purge = program.rows_of_types(Kind.PURGE.value)[deposited_row]
-    counted = ~(purge & (deposited[:, :, 2].max(axis=1, initial=0.0) <= machine.clearance_mm))
+    purge, counted = program.rows_of_types(Kind.PURGE.value)[deposited_row], np.ones(len(deposited_row), dtype=np.bool_)
+    counted[purge] = deposited[purge, :, 2].max(axis=1, initial=0.0) > machine.clearance_mm
     printed, done = hull(np.zeros((0, 3)), 0.0), 0
     rows = np.flatnonzero(program.kind == MoveKind.ROTATE)
     if len(rows) > MOST_TURNS:
@@ -120,11 +123,19 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
         before = int(np.searchsorted(deposited_row, row))
         for some in pieces(before - done):
             new = np.arange(done, before)[some][counted[done:before][some]]
-            bead = 0.5 * float(program.width_mm[deposited_row[new]].max(initial=0.0))
-            printed = hull(np.vstack([printed.points_mm, deposited[new].reshape(-1, 3)]), max(bead, printed.bead_mm))
+            bead = 0.5 * float(program.remarks.width_mm[program.remark[deposited_row[new]]].max(initial=0.0))
+            points = [printed.points_mm, *_ends(deposited[new])]
+            printed = hull(np.vstack(points), max(bead, printed.bead_mm))
         done = before
         problems += _turn(program, int(row), printed, machine)
     return problems
+
+
+def _ends(segments: Floats) -> tuple[Floats, Floats]:
+    """The ends of (m, 2, 3) segments, without beginnings that are ends of those before them."""
+    begins = np.ones(len(segments), dtype=np.bool_)
+    begins[1:] = (segments[1:, 0] != segments[:-1, 1]).any(axis=1)
+    return segments[begins, 0], segments[:, 1]
 
 
 def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> Iterator[Finding]:

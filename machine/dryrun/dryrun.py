@@ -1,10 +1,9 @@
 """Dryrun: a G-code text played through the machine's kinematics, without a machine."""
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Future
 from dataclasses import asdict, dataclass
 from math import pi
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,11 +87,15 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
         deposited = beads_of(program, segments, rows, profile)
-        replayed = ahead(replay, program, deposited, profile)  # half of all work, on a core of its own
+        touching = ahead(_touching, program, deposited, profile)  # half of all work, on a core of its own
+        times_s = motion.times_s(program, machine)
         balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
-        known = _findings(text, program, Laid(deposited, replayed, balances), profile)
-        contacts = replayed.result()
-    times_s = motion.times_s(program, machine)
+        moving, of_program = _findings(text, program, deposited, balances, profile)
+        contacts, touches = touching.result()
+        problems = dict.fromkeys([*moving, *touches, *of_program])
+        known = sorted(problems, key=lambda finding: (finding.severity, finding.line))
+    else:
+        times_s = motion.times_s(program, machine)
     dwells = [(event.line, event.value) for event in program.events if event.code == "G4"]
     return DryRun(
         program=program,
@@ -108,26 +111,29 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     )
 
 
-class Laid(NamedTuple):
-    """What is deposited, what lies under it, as soon as that is replayed, and how its interfaces are filled."""
-
-    deposited: Beads
-    replayed: Future[Contacts]
-    interfaces: tuple[InterfaceBalance, ...]
-
-
 def _segments(program: ParsedProgram, rows: NDArray[np.int64], machine: Machine) -> Floats:
     """(m, 2, 3) ends of rows in the workpiece frame; some at a time, for what it takes to turn them is ten times as much."""
     segments = np.empty((len(rows), 2, 3))
     for some in pieces(len(rows)):
-        for side, places in enumerate((program.start, program.end)):
-            segments[some, side] = workpiece_path(machine, places[rows[some]])
+        mine = rows[some]
+        segments[some, 1] = workpiece_path(machine, program.end[mine])
+        begins = np.ones(len(mine), dtype=np.bool_)  # the others begin where the row before them has ended
+        begins[1:] = (mine[1:] != mine[:-1] + 1) | (program.start[mine[1:]] != program.end[mine[:-1]]).any(axis=1)
+        segments[some.start + 1 : some.stop, 0] = segments[some.start : some.stop - 1, 1]
+        segments[some, 0][begins] = workpiece_path(machine, program.start[mine[begins]])
     return segments
 
 
-def _findings(text: Sequence[str], program: ParsedProgram, laid: Laid, profile: Profile) -> list[Finding]:
-    """What speaks against a program, the worst first."""
-    deposited, replayed, balances = laid
+def _touching(program: ParsedProgram, deposited: Beads, profile: Profile) -> tuple[Contacts, list[Finding]]:
+    """What lies under each row, and what is wrong with that."""
+    contacts = replay(program, deposited, profile)
+    return contacts, [*placement.findings(program, deposited, contacts), *layering.findings(program, deposited, contacts)]
+
+
+def _findings(
+    text: Sequence[str], program: ParsedProgram, deposited: Beads, balances: Sequence[InterfaceBalance], profile: Profile
+) -> tuple[list[Finding], list[Finding]]:
+    """What is wrong with the moves of a program, and with the rest of it."""
     segments, rows = deposited.segments_mm, deposited.rows
     moving = [*motion.findings(program, profile.machine), *clearance.findings(program, segments, rows, profile.machine)]
     of_program = [
@@ -139,18 +145,15 @@ def _findings(text: Sequence[str], program: ParsedProgram, laid: Laid, profile: 
         *placement.purged_into(program, deposited),
         *heat.findings(program, profile, own_comments.has_material(text, profile)),
     ]
-    contacts = replayed.result()
-    touching = [*placement.findings(program, deposited, contacts), *layering.findings(program, deposited, contacts)]
-    findings = [*moving, *touching, *of_program]
-    return sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
+    return moving, of_program
 
 
 def _refuse_far_places(program: ParsedProgram) -> None:
     """What is tried along a move takes as long as the move: one of a damaged number would be tried for days."""
-    far = np.abs(program.end[:, :3])
-    rows = np.flatnonzero((far > MOST_MM).any(axis=1))
-    if len(rows):
-        row, axis = rows[0], int(far[rows[0]].argmax())
+    if len(program.line) and np.abs(program.bounds[:, :3]).max() > MOST_MM:
+        far = np.abs(program.end[:, :3])
+        row = int(np.flatnonzero((far > MOST_MM).any(axis=1))[0])
+        axis = int(far[row].argmax())
         place = f"{'XYZ'[axis]} comes to {program.end[row, axis]:g} mm"
         raise GcodeError(f"line {program.line[row]}: {place}: no printer reaches beyond {MOST_MM:g}")
 
@@ -161,11 +164,22 @@ def retractions(program: ParsedProgram) -> int:
     return int((pulled & ~np.concatenate([[False], pulled[:-1]])).sum()) if len(pulled) else 0
 
 
+def _box(segments: Floats, counted: NDArray[np.bool_]) -> list[list[float]]:
+    """Least and greatest X Y Z of segments that count; empty where none does."""
+    if not counted.any():
+        return []
+    least, most = np.full(3, np.inf), np.full(3, -np.inf)
+    for some in pieces(len(segments)):
+        points = segments[some][counted[some]].reshape(-1, 3)
+        least, most = np.minimum(least, points.min(axis=0, initial=np.inf)), np.maximum(most, points.max(axis=0, initial=-np.inf))
+    return [least.tolist(), most.tolist()]
+
+
 def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
     travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0)  # a wipe, which pulls back, is none
-    points = run.segments_mm[~program.rows_of_types(Kind.PURGE.value)[run.segment_row]].reshape(-1, 3)
+    box = _box(run.segments_mm, ~program.rows_of_types(Kind.PURGE.value)[run.segment_row])
     return {
         "time_s": run.time_s,
         "filament_mm": float(np.max(program.filament_mm, initial=0.0)),
@@ -175,11 +189,8 @@ def summary(run: DryRun) -> dict[str, Any]:
         "parts": len(program.parts),
         "reorientations": int((program.kind == MoveKind.ROTATE).sum()),
         "retractions": retractions(program),
-        "bounds_mm": [points.min(axis=0).tolist(), points.max(axis=0).tolist()] if len(points) else [],
-        "axes": {
-            letter: [float(program.end[:, k].min()), float(program.end[:, k].max())] if len(program.end) else []
-            for k, letter in enumerate(run.letters)
-        },
+        "bounds_mm": box,
+        "axes": {letter: program.bounds[:, k].tolist() if len(program.end) else [] for k, letter in enumerate(run.letters)},
         "interfaces": [
             {
                 "part": face.part,

@@ -130,7 +130,8 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Findin
     at, first = np.unique(layer[beads], return_index=True)
     rows = np.flatnonzero(beads)[first]
     part = program.part[rows]
-    begun = np.array([np.searchsorted(at, at[part == index][0]) for index in part])
+    _, begins, which = np.unique(part, return_index=True, return_inverse=True)
+    begun = begins[which]
     settled = np.arange(len(at)) - begun >= SETTLED
     still = (blown[at] == 0.0) & settled
     if own:

@@ -14,7 +14,8 @@ from mdp.mesh import Floats
 from slicer.geometry.segments import Segment, squared_distance
 
 NOTHING = -1e9
-BLOCK = 16  # cells of the fine lattice to a side of a coarse one
+SHIFT = 4
+BLOCK = 1 << SHIFT  # cells of the fine lattice to a side of a coarse one
 CELL_MM, MOST_CELLS = 0.15, 6_000_000
 PIECE_MM = 0.25
 
@@ -22,7 +23,11 @@ Point = tuple[float, float, float]
 
 
 class Field(NamedTuple):
-    """(n,) cells, row by row, n = shape[0] shape[1]: height of the plastic, what it was below this layer, which row laid it."""
+    """(n,) cells, row by row, n = shape[0] shape[1]: height of the plastic, what it was below this layer, which row laid it.
+
+    coarse: (b,) greatest height of each block; order: blocks, the highest first, as they were once; highest: (2,) of all, and of
+    what was laid since then.
+    """
 
     origin: Floats
     cell: float
@@ -31,6 +36,7 @@ class Field(NamedTuple):
     below: NDArray[np.float32]
     owner: NDArray[np.int32]
     coarse: Floats
+    order: NDArray[np.int64]
     highest: Floats
 
 
@@ -41,24 +47,26 @@ def empty_field(low: Floats, high: Floats) -> Field:
     shape = np.ceil(size / cell).astype(np.int64) + 1
     count, blocks = int(shape.prod()), (shape + BLOCK - 1) // BLOCK
     heights = (np.full(count, NOTHING, np.float32), np.full(count, NOTHING, np.float32), np.full(count, -1, np.int32))
-    return Field(np.asarray(low, np.float64), cell, shape, *heights, np.full(int(blocks.prod()), NOTHING), np.full(1, NOTHING))
+    coarse, order = np.full(int(blocks.prod()), NOTHING), np.arange(int(blocks.prod()))
+    return Field(np.asarray(low, np.float64), cell, shape, *heights, coarse, order, np.full(2, NOTHING))
+
+
+def in_order(field: Field) -> Field:
+    """The same field, of which a move meets the highest blocks first: most moves are above all of them."""
+    field.highest[1] = NOTHING
+    return field._replace(order=np.argsort(-field.coarse, kind="stable"))
 
 
 @borrower
-def _raise_cell(i: int, j: int, z: float, row: int, field: Field) -> None:
-    """Raise one cell to z; `below` keeps what it was before."""
-    k = i * field.shape[1] + j
-    if z > field.top[k] + 1e-4:
-        field.below[k], field.top[k] = field.top[k], z
-        field.owner[k] = row
-        c = (i // BLOCK) * ((field.shape[1] + BLOCK - 1) // BLOCK) + j // BLOCK
-        field.coarse[c] = max(field.coarse[c], z)
-        field.highest[0] = max(field.highest[0], z)
+def _blocks(cells: int) -> int:
+    """How many blocks so many cells are in."""
+    return (cells + BLOCK - 1) >> SHIFT
 
 
 @borrower
 def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
-    """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along."""
+    """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along. A cell that it raises
+    keeps in `below` what it was before."""
     along = 0 if abs(b[0] - a[0]) >= abs(b[1] - a[1]) else 1
     if a[along] > b[along]:
         a, b = b, a
@@ -67,6 +75,8 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
     slope = (b[across_axis] - a[across_axis]) / length if length > 1e-9 else 0.0
     rise = (b[2] - a[2]) / length if length > 1e-9 else 0.0
     across, cell = half * np.sqrt(1.0 + slope * slope), field.cell
+    wide, blocks = field.shape[1], _blocks(field.shape[1])
+    p_cells, q_cells, p_blocks, q_blocks = (wide, 1, blocks, 1) if along == 0 else (1, wide, 1, blocks)
     first = max(int(np.floor((a[along] - field.origin[along]) / cell)), 0)
     last = min(int(np.floor((b[along] - field.origin[along]) / cell)), field.shape[along] - 1)
     for p in range(first, last + 1):
@@ -77,10 +87,14 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
         if high < low:
             low = high = min(max(int(np.floor(v / cell)), 0), field.shape[across_axis] - 1)
         for q in range(low, high + 1):
-            if along == 0:
-                _raise_cell(p, q, z, row, field)
-            else:
-                _raise_cell(q, p, z, row, field)
+            k = p * p_cells + q * q_cells
+            if z > field.top[k] + 1e-4:
+                field.below[k], field.top[k] = field.top[k], z
+                field.owner[k] = row
+                c = (p >> SHIFT) * p_blocks + (q >> SHIFT) * q_blocks
+                if z > field.coarse[c]:
+                    field.coarse[c] = z
+                    field.highest[0], field.highest[1] = max(field.highest[0], z), max(field.highest[1], z)
 
 
 @borrower
@@ -127,9 +141,12 @@ def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point,
 def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> float:
     """How deep the head goes into the field at most during a level move; 0 up to `slack`."""
     deepest, size, cell = 0.0, BLOCK * field.cell, field.cell
-    wide = (field.shape[1] + BLOCK - 1) // BLOCK
-    for c in range(len(field.coarse)):
+    wide = _blocks(field.shape[1])
+    in_order = field.highest[1] - a[2] <= slack
+    for c in field.order:
         if field.coarse[c] - a[2] <= slack:
+            if in_order:  # neither are those after it
+                break
             continue
         i, j = c // wide, c % wide
         px, py = field.origin[0] + (i + 0.5) * size, field.origin[1] + (j + 0.5) * size

@@ -9,8 +9,10 @@ from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_
 from machine.firmware import dialect_of
 from machine.gcode.commands import EVERY
 from machine.planning.limits import ROUNDING, axis_limits
-from machine.planning.timing import axis_speeds, lengths, move_times
+from machine.planning.timing import TINY, axis_speeds, lengths, move_times
 from machine.reader.parsed import AT_ONCE, MoveKind, ParsedProgram, pieces
+from mdp.kernels.arrays import flags
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
@@ -20,6 +22,7 @@ ROUNDING_MM_S = 1.0 / 60.0  # F is written as a whole number
 STILL = 3  # the measure of what does not move
 WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
 LEVEL_DEG = 0.01
+ROUNDED_UP = 1.0 + 1e-12
 TURNED_DEG = 1e-3
 
 
@@ -37,6 +40,8 @@ def findings(program: ParsedProgram, machine: Machine) -> list[Finding]:
 
 def _outside(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     for axis, (letter, (least, most)) in enumerate(axis_limits(machine).items()):
+        if least - ROUNDING <= program.bounds[0, axis] and program.bounds[1, axis] <= most + ROUNDING:
+            continue
         values = program.end[:, axis]
         unit = "mm" if axis < 3 else "deg"
         allowed = f"allowed is {least:g} to {most:g} {unit} (moves: {{count}})"
@@ -45,18 +50,13 @@ def _outside(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
         yield from per_part(program, below, -values[below], f"{letter} goes to -{{value}} {unit}, {allowed}", code="axis-limit")
 
 
-def deltas(program: ParsedProgram, rows: slice = slice(None)) -> Floats:
-    """(n, 6) changes of X Y Z tilt turn E."""
-    return np.column_stack([program.end[rows] - program.start[rows], program.e_mm[rows]])
-
-
 def times_s(program: ParsedProgram, machine: Machine) -> Floats:
     """(n,) seconds of each row, some at a time: where the machine stands still in between neither knows of the other."""
     stop, seconds, begin = standstills(program), np.empty(len(program.line)), 0
     while begin < len(seconds):
         some = _until_standstill(program, begin)
-        told = (program.feed[some] / 60.0, stop[some], machine, program.acceleration[some])
-        seconds[some], begin = move_times(deltas(program, some), *told), some.stop
+        told = (program.feed[some] / 60.0, stop[some], machine, program.remarks.acceleration[program.remark[some]])
+        seconds[some], begin = move_times(program.changes(some), *told), some.stop
     return seconds
 
 
@@ -64,7 +64,7 @@ def _until_standstill(program: ParsedProgram, begin: int) -> slice:
     """Many rows, with the last of which a run of moves ends that F measures alike; such runs begin and end at a standstill."""
     count, last = AT_ONCE, len(program.line)
     while begin + count < last:
-        _, measure = lengths(deltas(program, slice(begin, begin + count)))
+        _, measure = lengths(program.changes(slice(begin, begin + count)))
         moving = np.flatnonzero(measure < STILL)
         ends = moving[1:][np.diff(measure[moving]) != 0]
         if len(ends):
@@ -82,20 +82,35 @@ def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
 
 def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     names = [*axis_limits(machine), "E"]
-    most, asked, rows = axis_speeds(machine), [np.empty((0, len(names)))], [np.empty(0, dtype=np.int64)]
-    for some in pieces(len(program.line)):
-        change = deltas(program, some)
-        way = np.maximum(lengths(change)[0], 1e-9)
-        speed = np.maximum(np.abs(change) - WRITTEN, 0.0) / way[:, None] * (program.feed[some] / 60.0)[:, None]
-        fast = np.flatnonzero((speed > most * SLACK + ROUNDING_MM_S).any(axis=1))
-        asked.append(speed[fast])
-        rows.append(fast + some.start)
-    speeds, fast = np.concatenate(asked), np.concatenate(rows)
+    most = axis_speeds(machine)
+    told = most * SLACK + ROUNDING_MM_S
+    fast = np.flatnonzero(_are_fast(program.start, program.end, program.e_mm, program.feed, told, WRITTEN))
+    change = program.changes(fast)
+    way = np.maximum(lengths(change)[0], 1e-9)
+    speeds = np.maximum(np.abs(change) - WRITTEN, 0.0) / way[:, None] * (program.feed[fast] / 60.0)[:, None]
     for axis, letter in enumerate(names):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
         message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most[axis]:g} {unit} (moves: {{count}})"
-        too_fast = speeds[:, axis] > most[axis] * SLACK + ROUNDING_MM_S
+        too_fast = speeds[:, axis] > told[axis]
         yield from per_part(program, fast[too_fast], speeds[too_fast, axis], message, code="axis-speed", severity="warning")
+
+
+@kernel
+def _are_fast(start: Floats, end: Floats, e_mm: Floats, feed: Floats, most: Floats, written: Floats) -> NDArray[np.bool_]:
+    """(n,) which rows may ask an axis for more than its most, of X Y Z tilt turn E."""
+    fast = flags(len(feed))
+    for row in range(len(feed)):
+        x, y, z = end[row, 0] - start[row, 0], end[row, 1] - start[row, 1], end[row, 2] - start[row, 2]
+        way = np.sqrt(x * x + y * y + z * z)
+        if way <= TINY:
+            way = np.hypot(end[row, 3] - start[row, 3], end[row, 4] - start[row, 4])
+        if way <= TINY:
+            way = abs(e_mm[row])
+        share = feed[row] / 60.0 * ROUNDED_UP / max(way, TINY)
+        for axis in range(6):
+            change = abs(end[row, axis] - start[row, axis]) if axis < 5 else abs(e_mm[row])
+            fast[row] = fast[row] or (change - written[axis]) * share > most[axis]
+    return fast
 
 
 def _homing(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
@@ -117,15 +132,23 @@ def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
     """The first move of a linear axis that has been neither homed nor given a position."""
     events = sorted((e for e in program.events if e.code in ("G28", "G92")), key=lambda e: e.row)
     for axis, letter in enumerate("XYZ"):
-        moved = np.flatnonzero(np.abs(program.end[:, axis] - program.start[:, axis]) > 1e-9)
-        first = int(moved[0]) if len(moved) else len(program.line)
+        first = _first_moved(program, axis)
         homed = [
             e for e in events if e.row <= first and (letter in e.letters or (e.code == "G28" and not set(e.letters) & set("XYZ")))
         ]
-        if len(moved) and not homed:
+        if first < len(program.line) and not homed:
             severity, unless = unless_own(program, 0, first)
             return [at_row(program, first, severity, "not-homed", f"{letter} moves before it is homed{unless}")]
     return []
+
+
+def _first_moved(program: ParsedProgram, axis: int) -> int:
+    """The first row in which an axis moves; the number of rows where none does."""
+    for some in pieces(len(program.line)):
+        moved = np.abs(program.end[some, axis] - program.start[some, axis]) > 1e-9
+        if moved.any():
+            return int(some.start + moved.argmax())
+    return len(program.line)
 
 
 def _turning_strokes(program: ParsedProgram, machine: Machine) -> Iterable[Finding]:

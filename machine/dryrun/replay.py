@@ -10,14 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, lay_bead
+from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, in_order, lay_bead
 from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
-from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pieces, pose_runs
+from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
 from mdp.head import Head, head_of
+from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
-from mdp.pose import UP, Pose, rotation
+from mdp.pose import UP, Pose, rotation, shift
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -94,26 +95,27 @@ def _field(
     directions: those in which runs print, and the run of each bead.
     """
     before, after = laid
-    least, most = np.full(2, np.inf), np.full(2, -np.inf)
-    for some in pieces(after):
-        places = machine_points(machine, run.pose, deposited.segments_mm[some].reshape(-1, 3))[:, :2]
-        least, most = np.minimum(least, places.min(axis=0)), np.maximum(most, places.max(axis=0))
+    turn, moved = rotation(machine, run.pose), shift(machine, run.pose)
+    least, most = _extent(deposited.segments_mm[:after], turn, moved)
     field = empty_field(least - 3.0, most + 3.0)
-    for some in pieces(before):
-        _lay_turned(deposited, some, run.pose, directions[0][directions[1][some]], machine, field)
-    return field
+    _lay_turned(deposited, directions[1][:before], directions[0], turn, moved, field)
+    return in_order(field)
 
 
-def _lay_turned(deposited: Beads, some: slice, pose: Pose, ups: Floats, machine: Machine, field: Field) -> None:
-    """Lay some earlier beads, printed along (k, 3) ups, into the field of a pose."""
-    turn, width, height = rotation(machine, pose), deposited.width_mm[some], deposited.height_mm[some]
-    ends = machine_points(machine, pose, deposited.segments_mm[some].reshape(-1, 3)).reshape(-1, 2, 3)
-    along = ups @ turn[2]
-    across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
-    middle = turn @ (ups * (0.5 * height)[:, None]).T
-    ends -= middle.T[:, None, :]
-    ends[:, :, 2] += (0.5 * np.abs(along) * height + 0.5 * across * width)[:, None]
-    _lay_beads(ends, np.minimum(0.5 * width, 0.5 * width * along**2 + 0.5 * height * across), deposited.rows[some], field)
+@kernel
+def _extent(segments: Floats, turn: Floats, moved: Floats) -> Floats:
+    """(2, 2) least and greatest X Y of the ends of segments, turned and moved."""
+    extent = table(2, 2)
+    extent[0, 0] = extent[0, 1] = np.inf
+    extent[1, 0] = extent[1, 1] = -np.inf
+    for i in range(len(segments)):
+        for side in range(2):
+            x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
+            for k in range(2):
+                place = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + moved[k]
+                extent[0, k] = min(extent[0, k], place)
+                extent[1, k] = max(extent[1, k], place)
+    return extent
 
 
 def _plate(machine: Machine, pose: Pose) -> Floats:
@@ -126,10 +128,22 @@ def _plate(machine: Machine, pose: Pose) -> Floats:
 
 
 @kernel
-def _lay_beads(ends: Floats, half: Floats, rows: NDArray[np.int64], field: Field) -> None:
-    """Lay (m, 2, 3) beads into a field."""
-    for i in range(len(ends)):
-        lay_bead(ends[i, 0], ends[i, 1], half[i], rows[i], field)
+def _lay_turned(deposited: Beads, laid_in: NDArray[np.int32], ups: Floats, turn: Floats, moved: Floats, field: Field) -> None:
+    """Lay the first beads into a field, turned and moved. laid_in: (m,) the run of each; ups: directions in which runs print."""
+    ends, middle = table(2, 3), floats(3, 0.0)
+    for i in range(len(laid_in)):
+        up, width, height = ups[laid_in[i]], deposited.width_mm[i], deposited.height_mm[i]
+        for k in range(3):
+            middle[k] = 0.5 * height * (up[0] * turn[k, 0] + up[1] * turn[k, 1] + up[2] * turn[k, 2])
+        along = up[0] * turn[2, 0] + up[1] * turn[2, 1] + up[2] * turn[2, 2]
+        across = np.sqrt(max(0.0, 1.0 - along * along))
+        for side in range(2):
+            x, y, z = deposited.segments_mm[i, side, 0], deposited.segments_mm[i, side, 1], deposited.segments_mm[i, side, 2]
+            for k in range(3):
+                ends[side, k] = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + moved[k] - middle[k]
+            ends[side, 2] += 0.5 * abs(along) * height + 0.5 * across * width
+        half = min(0.5 * width, 0.5 * width * along * along + 0.5 * height * across)
+        lay_bead(ends[0], ends[1], half, deposited.rows[i], field)
 
 
 @borrower
@@ -181,13 +195,16 @@ def _classify_support(
     """0: a bead hangs in air, 1: lies on something, 2: overlaps others, 3: only has a neighbour; side: unit vector across."""
     x, y, z, at = place
     (half, height), plate = size, about.plate
-    overlapping, bearing = 0, 0
-    for k in range(-1, 2):
+    middle = _under(place, size, row, False, strokes, about)
+    if middle == 1:  # nearly everywhere: what lies beside does not matter then
+        return 1
+    overlapping, bearing = (1 if middle == 2 else 0), 0
+    for k in range(-1, 2, 2):
         off = 2.0 * INNER * half * k
         under = _under((x + off * side[0], y + off * side[1], z, at), size, row, False, strokes, about)
-        overlapping += (2 if k == 0 else 1) if under == 2 else 0
+        overlapping += 1 if under == 2 else 0
         bearing += 1 if under == 1 else 0
-    if overlapping > 2:
+    if middle == 2 and overlapping > 1:
         return 2
     if bearing > 0 or abs(z - height - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height:
         return 1

@@ -62,11 +62,11 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterato
         return
     pushing = program.kind[rows] == MoveKind.EXTRUDE
     # What is done between two beads must come to nothing, or to the extra push after it.
-    run = np.cumsum(pushing)
+    run = np.cumsum(pushing, dtype=np.int32)
     balance = np.bincount(run, weights=np.where(pushing, 0.0, -e[rows]))
     stood = np.bincount(run, weights=~pushing) > 0
-    turns = np.cumsum(program.kind == MoveKind.ROTATE)[rows]
-    turned = np.diff(turns[np.searchsorted(run, np.arange(len(balance) + 1)).clip(max=len(run) - 1)]) > 0
+    begins = np.searchsorted(run, np.arange(len(balance) + 1, dtype=np.int32)).clip(max=len(run) - 1)
+    turned = np.diff(np.searchsorted(np.flatnonzero(program.kind == MoveKind.ROTATE), rows[begins], side="right")) > 0
     extra = np.where(turned, max(material.prime_extra_mm, material.retract_prime_extra_mm), material.retract_prime_extra_mm)
     inner = np.arange(len(balance))
     over = stood & (balance < -extra - SLACK_MM) & (inner > 0)
@@ -88,13 +88,11 @@ def _far_pulled(program: ParsedProgram) -> Iterator[Finding]:
     beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
     if len(beads) < 2:
         return
-    rows = np.arange(beads[0], beads[-1])
-    last = beads[np.searchsorted(beads, rows, side="right") - 1]
-    pulled = program.filament_mm[last] - program.filament_mm[rows]
-    far = rows[pulled > MOST_PULLED_MM]
-    for mine in by_part(program, far):
-        row = int(mine[0])
-        amount = float(pulled[row - rows[0]])
+    rows, filament_mm = np.setdiff1d(np.arange(beads[0], beads[-1]), beads, assume_unique=True), program.filament_mm
+    pulled = filament_mm[beads[np.searchsorted(beads, rows) - 1]] - filament_mm[rows]  # since the bead before each row
+    far = np.flatnonzero(pulled > MOST_PULLED_MM)
+    for mine in by_part(program, far, rows):
+        row, amount = int(rows[mine[0]]), float(pulled[mine[0]])
         message = f"{amount:.1f} mm of filament are pulled back, {MOST_PULLED_MM:g} mm are allowed: more leaves the hot end"
         yield at_row(program, row, "error", "retraction", message)
 
@@ -104,9 +102,10 @@ def _oozing(program: ParsedProgram) -> list[Finding]:
     if not (program.e_mm < -1e-9).any():
         return []
     beads = program.kind == MoveKind.EXTRUDE
-    pulled = np.cumsum(np.where(beads, 0.0, -program.e_mm))
-    last = np.maximum.accumulate(np.where(beads, np.arange(len(beads)), -1))
-    loose = (program.kind == MoveKind.ROTATE) & (program.part > 0) & (last >= 0) & (pulled - pulled[last] < SLACK_MM)
-    row = int(np.flatnonzero(loose)[0]) if loose.any() else -1
+    pulled, laid = np.cumsum(np.where(beads, 0.0, -program.e_mm)), np.flatnonzero(beads)
+    turns = np.flatnonzero((program.kind == MoveKind.ROTATE) & (program.part > 0))
+    after = np.searchsorted(laid, turns)
+    turns, after = turns[after > 0], after[after > 0]
+    loose = turns[pulled[turns] - pulled[laid[after - 1]] < SLACK_MM]
     message = "the table turns while the filament is not pulled back"
-    return [at_row(program, row, "error", "retraction", message)] if row >= 0 else []
+    return [at_row(program, int(loose[0]), "error", "retraction", message)] if len(loose) else []

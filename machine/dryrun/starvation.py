@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row, by_part
-from machine.dryrun.motion import deltas, standstills
+from machine.dryrun.motion import standstills
 from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
 from machine.gcode.line_text import is_plain_move, read_line
@@ -85,7 +85,7 @@ def _findings(
 
 def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> Feeding:
     """Play a program's lines over a line and its blocks in the printer's planner."""
-    blocks, moving = blocks_of(deltas(program), program.feed / 60.0, standstills(program), machine, program.acceleration)
+    blocks, moving = blocks_of(program.changes(), program.feed / 60.0, standstills(program), machine, program.acceleration)
     own, ahead = _bytes(lines, program.line[moving])
     flags = np.zeros((2, len(own)), dtype=np.bool_)
     line = SerialLine(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)

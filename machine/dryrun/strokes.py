@@ -1,6 +1,5 @@
 """Strokes: a program's rows as the replay takes them: beads with their places and sizes, what each move may touch and span."""
 
-from dataclasses import dataclass
 from math import pi
 from typing import NamedTuple
 
@@ -25,8 +24,7 @@ FILLING = (Kind.SKIN.value, Kind.TOP_SKIN.value, Kind.GAP.value)
 ZIGZAG = 3.0  # spans: infill that turns at a wall may have a line's end, the joint and the next line's end beyond what it crosses
 
 
-@dataclass(frozen=True, eq=False)
-class Beads:
+class Beads(NamedTuple):
     """What was deposited: (m, 2, 3) segments in the workpiece frame, (m,) their rows, widths, heights and lengths."""
 
     segments_mm: Floats
@@ -70,7 +68,8 @@ def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], 
     first_mm, layer_mm = _layers_mm(segments, bool((program.height_mm[rows] > 0).any()), profile)
     width_mm, height_mm, length_mm = np.empty((3, len(rows)))
     for some in pieces(len(rows)):
-        ends, told_mm, of_width_mm = segments[some], program.height_mm[rows[some]], program.width_mm[rows[some]]
+        ends, told = segments[some], program.remark[rows[some]]
+        told_mm, of_width_mm = program.remarks.height_mm[told], program.remarks.width_mm[told]
         usual = np.where(np.maximum(ends[:, 0, 2], ends[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
         height = np.where(told_mm > 0, told_mm, usual)
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -1,7 +1,6 @@
 """Blocks: what a G-code block of a machine may name, and why it cannot be written, before there is a program."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from machine.firmware import dialect_of
 from machine.firmware.dialect import Dialect
@@ -75,17 +74,9 @@ def filled_start(profile: Profile) -> list[str]:
     return [command for line in lines if (command := read_line(line).command)]
 
 
-@dataclass(frozen=True)
-class ColdBlock:
-    """Of a block's lines those that are sent to a machine that is to stay cold, and those that are left out because they run a
-    macro, a file or a cycle of the machine's own, or are not known. Lines that plainly heat are in neither."""
-
-    lines: tuple[str, ...]
-    left_out: tuple[str, ...]
-
-
-def cold_block(lines: Sequence[str], dialect: Dialect) -> ColdBlock:
-    """The filled-in lines of a block that homes, without what heats or waits for heat.
+def cold_block(lines: Sequence[str], dialect: Dialect) -> tuple[list[str], list[str]]:
+    """The filled-in lines of a block that homes, without what heats or waits for heat; and those that are left out because they
+    run a macro, a file or a cycle of the machine's own, or are not known.
 
     Raises MoveError where a line that may heat is one that homes, or stands before it: without it the machine may not be homed
     as it must be. A block without homing is one as a whole, but for a firmware that is homed by hand.
@@ -99,8 +90,8 @@ def cold_block(lines: Sequence[str], dialect: Dialect) -> ColdBlock:
                 f"machine.gcode.start: {line!r} may heat ({heat.value}), and the machine is not homed before it: a machine that "
                 "is to stay cold cannot be homed by this block"
             )
-    kept = tuple(line for line, heat in zip(lines, heats, strict=True) if heat is Heat.COLD)
-    return ColdBlock(kept, tuple(line for line, heat in zip(lines, heats, strict=True) if heat is Heat.UNSURE))
+    kept, unsure = ([line for line, own in zip(lines, heats, strict=True) if own is heat] for heat in (Heat.COLD, Heat.UNSURE))
+    return kept, unsure
 
 
 def refused_lines(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:

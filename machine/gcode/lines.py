@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 AT_ONCE = 4096  # lines
-TEXT_AT_ONCE = 2**16  # characters
+BYTES_AT_ONCE = 2**20
 NEWLINE = 10
 
 
@@ -30,20 +30,25 @@ class Lines(Sequence[str]):
         while some := [_bytes(line) for line in islice(left, AT_ONCE)]:
             sizes.append(np.fromiter(map(len, some), dtype=np.int64, count=len(some)) + 1)
             content += b"\n".join((*some, b""))
-        return cls(_exact(content), np.cumsum(np.concatenate(sizes)))
+        return cls(np.frombuffer(content, dtype=np.uint8), np.cumsum(np.concatenate(sizes)))
 
     @classmethod
     def of_text(cls, pieces: Iterable[str]) -> "Lines":
         """A text that comes in pieces, whose lines end with a line feed."""
-        content, ends = bytearray(), [np.zeros(1, dtype=np.int64)]
-        for text in _joined(pieces):
-            some = _bytes(text)
-            ends.append(np.flatnonzero(np.frombuffer(some, dtype=np.uint8) == NEWLINE) + len(content) + 1)
-            content += some
+        content = bytearray()
+        for text in pieces:
+            content += _bytes(text)
+        return cls.of_bytes(content)
+
+    @classmethod
+    def of_bytes(cls, content: bytes | bytearray) -> "Lines":
+        """A whole text in UTF-8, whose lines end with a line feed; the bytes stay where they are."""
         if content and content[-1] != NEWLINE:
-            content.append(NEWLINE)
-            ends.append(np.array([len(content)]))
-        return cls(_exact(content), np.concatenate(ends))
+            content += b"\n"
+        text, ends = np.frombuffer(content, dtype=np.uint8), [np.zeros(1, dtype=np.int64)]
+        for begin in range(0, len(text), BYTES_AT_ONCE):
+            ends.append(np.flatnonzero(text[begin : begin + BYTES_AT_ONCE] == NEWLINE) + begin + 1)
+        return cls(text, np.concatenate(ends))
 
     def beginning_with(self, word: str) -> list[int]:
         """The places of the lines that begin with a word."""
@@ -87,23 +92,6 @@ class Lines(Sequence[str]):
         return isinstance(other, Sequence) and len(self) == len(other) and all(a == b for a, b in zip(self, other, strict=True))
 
     __hash__ = None  # type: ignore[assignment]
-
-
-def _joined(pieces: Iterable[str]) -> Iterator[str]:
-    """The text in pieces of at least TEXT_AT_ONCE characters, but for the last."""
-    some, size = list[str](), 0
-    for piece in pieces:
-        some.append(piece)
-        size += len(piece)
-        if size >= TEXT_AT_ONCE:
-            yield "".join(some)
-            some, size = [], 0
-    yield "".join(some)
-
-
-def _exact(content: bytearray) -> NDArray[np.uint8]:
-    """The bytes without the room to grow that they have had."""
-    return np.array(content, dtype=np.uint8)
 
 
 def _bytes(text: str) -> bytes:

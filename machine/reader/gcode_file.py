@@ -40,8 +40,12 @@ class GcodeFile:
 
     def lines(self) -> Lines:
         """All lines at once; raises GcodeError."""
-        with self._refusing(), self._open() as file:
-            return Lines.of_text(map(self._text, iter(lambda: file.read(PIECE), "")))
+        with self._refusing():
+            content = self.path.read_bytes()
+            if content.isascii() and b"\r" not in content and b"\0" not in content:  # nearly every file: it is not copied
+                return Lines.of_bytes(content)
+            with self._open() as file:
+                return Lines.of_text(map(self._text, iter(lambda: file.read(PIECE), "")))
 
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the file's bytes; raises GcodeError."""

@@ -50,10 +50,10 @@ def arc(reader: Reader, name: str, words: Words) -> None:
     """G2 and G3 in the X Y plane, by I J or R: rows of chords, the other axes going along evenly."""
     clockwise, before = name == "G2", reader.at.copy()
     shape = {letter: value * reader.modes.unit_mm for letter, value in words if letter in "IJR" and letter not in reader.letters}
-    known = len(reader.rows)
+    known = reader.table.rows
     straight(reader, [(letter, value) for letter, value in words if letter not in shape])
     after = reader.at.copy()
-    del reader.rows[known:]
+    reader.table.rows = known
     start, end = (before[0], before[1]), (after[0], after[1])
     centre = arc_centre(start, end, shape, clockwise)
     radii = [0.0, 0.0] if centre is None else [hypot(p[0] - centre[0], p[1] - centre[1]) for p in (start, end)]
@@ -94,6 +94,7 @@ def follow(reader: Reader, on: bool) -> None:
     """From here on X Y Z are places on the table (TCP), or axis positions again; nothing moves."""
     if on != reader.followed:
         reader.followed = on
+        reader.switches.append(reader.table.rows)
         coordinates = np.array([reader.at[:5]])
         pose = Pose(reader.at[3], reader.at[4])
         moved = followed_places(reader.machine, pose, coordinates[:, :3]) if on else axis_positions(reader.machine, coordinates)

@@ -12,10 +12,10 @@ from machine.reader.codes import BARE_WORDS, VALUED, dispatch
 from machine.reader.macros import macro
 from machine.reader.motion import flush
 from machine.reader.parsed import ParsedProgram
-from machine.reader.plain_moves import Text, letters_of, read_plain_moves
+from machine.reader.plain_moves import read_plain_moves
+from machine.reader.program import program_of
 from machine.reader.remarks import remark
 from machine.reader.state import Reader, Words, reader_of
-from machine.reader.table import Table
 from profiles.errors import GcodeError
 from profiles.machine import Machine
 
@@ -32,19 +32,17 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     Raises GcodeError, with the line, for what is not G-code and for motion codes that are not supported; M codes and
     macros that are not known are counted in `ignored`: code -> (first line, how often).
     """
-    reader, lines = reader_of(machine), Lines.of(lines)
-    table, text, letters, at = Table(reader, len(lines)), Text(lines.content, lines.start), letters_of(reader), 0
+    lines = Lines.of(lines)
+    reader, at = reader_of(machine, len(lines)), 0
     while at < len(lines):
-        line = lines[at]
-        after = read_plain_moves(reader, text, letters, at) if line[:2] in ("G1", "G0") else at
+        after = read_plain_moves(reader, lines, at)
         if after == at:
             reader.number = after = at + 1
-            _line(reader, line)
+            _line(reader, lines[at])
         at = after
-        table.take_some()
     if reader.turning:
         flush(reader)
-    return table.program()
+    return program_of(reader)
 
 
 def _line(reader: Reader, line: str) -> None:

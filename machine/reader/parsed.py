@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.gcode.part_totals import PartTotals
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
 
 AT_ONCE = 16_384  # rows
@@ -95,7 +95,7 @@ class ParsedProgram:
         """(n,) from ;PART: comments, 0 before the first."""
         return self.remarks.part[self.remark]
 
-    @property
+    @cached_property
     def layer(self) -> Indices32:
         """(n,) from ;LAYER_CHANGE comments, counted in each part, 0 before the first."""
         return self.remarks.layer[self.remark]
@@ -126,6 +126,14 @@ class ParsedProgram:
         pushed: Floats = np.cumsum(self.e_mm)
         return pushed
 
+    @cached_property
+    def bounds(self) -> Floats:
+        """(2, 5) least and greatest place of each axis at the ends of moves; infinite where there is none."""
+        least, most = np.full(5, np.inf), np.full(5, -np.inf)
+        for some in pieces(len(self.line)):
+            least, most = np.minimum(least, self.end[some].min(axis=0)), np.maximum(most, self.end[some].max(axis=0))
+        return np.stack([least, most])
+
     @property
     def way_mm(self) -> Floats:
         """(n,) how far X Y Z go in each move."""
@@ -133,6 +141,10 @@ class ParsedProgram:
         for some in pieces(len(way_mm)):
             way_mm[some] = np.linalg.norm(self.end[some, :3] - self.start[some, :3], axis=1)
         return way_mm
+
+    def changes(self, rows: Indices | slice = slice(None)) -> Floats:
+        """(m, 6) of X Y Z tilt turn E, in some rows."""
+        return np.column_stack([self.end[rows] - self.start[rows], self.e_mm[rows]])
 
     def turned_between(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(m - 1,) whether the table stands otherwise after the one than after the other of each two of (m,) rows."""

@@ -1,8 +1,8 @@
-"""Plain moves: a run of usual G0 and G1 lines read at once by a kernel, as `Modes.move` and `straight` would one by one.
+"""Plain moves: runs of usual lines read at once by a kernel, as `Modes.move`, `straight` and `remark` would one by one.
 
-With the comments between them that tell a stroke's width, or a kind that has already occurred, they are 99 lines in a hundred of
-a program. What is not usual ends the run, and the reader takes that line: other letters than the machine's axes and F, a feed
-that is not above 0, a number of more digits than one division reads exactly, other comments.
+G0 and G1 lines and the comments between them are 99 lines in a hundred of a program. What is not usual ends the run, and the
+reader takes that line: other letters than the machine's axes and F, a feed that is not above 0, a number of more digits than one
+division reads exactly, comments of parts and kinds of line that are new.
 """
 
 from itertools import islice
@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.gcode.lines import Lines
 from machine.gcode.modes import E_AXIS
-from machine.reader.state import ACCELERATION, AFTER, BEFORE, FEED, LINE, ROW, TYPE, WIDTH, Reader
+from machine.reader.state import Reader
+from machine.reader.table import TOLD, Columns
 from mdp.kernels.kernel import borrower, kernel
 from mdp.mesh import Floats
 
@@ -22,10 +24,11 @@ Bytes = NDArray[np.uint8]
 LONGEST = 200
 MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
 NONE, F = -1, 6  # what a letter stands for, besides the axes 0 to 5
-MOST_AT_ONCE = 4096  # lines
 MOST_TYPES = 64  # kinds of line; slicers have about 15, a further one ends the run
-WIDTH_IS, TYPE_IS = (np.frombuffer(key, dtype=np.uint8) for key in (b";WIDTH:", b";TYPE:"))
-WHOLE_DIGITS, DECIMALS = 9, 12  # of a width, as machine.reader.remarks reads it
+WHOLE_DIGITS, DECIMALS = 9, 12  # of a width or height, as machine.reader.remarks reads it
+FIRST = (b"G0", b"G1", b";", b"\n")  # of lines that may be plain
+# What the reader has, in floats: the axes, F, then what the comments said, as in a remark, and the number of layers.
+PART, LAYER, TYPE, WIDTH, HEIGHT, LAYERS, STATE = range(7, 14)
 
 
 class Text(NamedTuple):
@@ -35,88 +38,91 @@ class Text(NamedTuple):
     start: NDArray[np.int64]
 
 
-class Meaning(NamedTuple):
-    """What words mean during a run. letters: (256,) axis, F or NONE of each byte; types: the kinds that are known, by number.
+def _text_of(*words: bytes) -> Text:
+    return Text(np.frombuffer(b"".join(words) or b" ", dtype=np.uint8), np.cumsum([0, *map(len, words)]))
 
-    units, steps, offset: (6,) as those of Modes; row: (ROW,) a row with what the comments said. rapid: G0 is as fast as can be.
+
+# What begins a comment that says something; the others say nothing. SINGLE stands alone.
+WIDTH_IS, HEIGHT_IS, TYPE_IS, SINGLE = range(4)
+WORDS = _text_of(b"WIDTH:", b"HEIGHT:", b"TYPE:", b"LAYER_CHANGE", b"LAYER:", b"PART:", b"CONTENTS:", b"UNSUPPORTED:")
+
+
+class Meaning(NamedTuple):
+    """What words mean during a run. letters: (256,) axis, F or NONE of each byte; words: WORDS; types: the kinds that are known,
+    by number. units, steps, offset: (6,) as those of Modes. rapid: G0 is as fast as can be. accelerations: (2,) of moves that
+    push filament, and of others.
     """
 
     letters: NDArray[np.int8]
+    words: Text
     types: Text
     units: Floats
     steps: NDArray[np.bool_]
     offset: Floats
-    row: Floats
     feed_share: float
     rapid: bool
-    travelling: float
+    accelerations: Floats
 
 
-def letters_of(reader: Reader) -> NDArray[np.int8]:
-    """(256,) what each letter stands for in a move."""
-    letters = np.full(256, NONE, dtype=np.int8)
-    letters[ord("F")] = F
-    for letter, axis in reader.letters.items():
-        letters[ord(letter)] = axis
-    return letters
-
-
-def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], first: int) -> int:
-    """Rows of the plain moves from line `first`, counted from 0; returns the first line that is not a plain move, or that was not
-    reached.
+def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
+    """Rows of the plain lines from line `first`, counted from 0; returns the first line that is not plain.
 
     Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row.
     """
-    modes = reader.modes
+    modes, table = reader.modes, reader.table
+    begin = lines.content[lines.start[first] : lines.start[first] + 2].tobytes()
+    if begin not in FIRST and begin[:1] not in FIRST:  # nothing need be got ready
+        return first
     if reader.flow != 1.0 or reader.filament_mm2 or modes.inverse_time or reader.turning or reader.ended:
         return first
-    row = np.array([0.0, *reader.at, *reader.at, 0.0, *reader.remarks(reader.printing)])
-    meaning = Meaning(
-        letters, _types(reader), np.array(modes.units), np.array(modes.steps), np.array(modes.offset), row,
-        reader.feed_share, bool(reader.dialect.rapid), reader.travelling,
-    )  # fmt: skip
-    rows = np.empty((min(MOST_AT_ONCE, len(text.start) - 1 - first), ROW))
-    state = np.array([*reader.at, modes.feed])
-    last, count, move = _read_run(text, meaning, first, state, rows)
-    if last > first:
-        begin = int(text.start[move])
-        reader.type, reader.width = int(row[TYPE]), float(row[WIDTH])
-        reader.number, reader.motion = last, text.text[begin : begin + 2].tobytes().decode("ascii")
-        reader.at[:], modes.feed = state[:6].tolist(), float(state[6])
-        reader.rows.frombytes(rows[:count].tobytes())
-    return last
-
-
-def _types(reader: Reader) -> Text:
-    """The first MOST_TYPES kinds of line seen so far, in the order of their numbers."""
     kinds = [kind.encode("utf-8", "surrogatepass") for kind in islice(reader.types, MOST_TYPES)]
-    return Text(np.frombuffer(b"".join(kinds) or b" ", dtype=np.uint8), np.cumsum([0, *map(len, kinds)]))
+    letters = np.full(256, NONE, dtype=np.int8)
+    for letter, axis in (*reader.letters.items(), ("F", F)):
+        letters[ord(letter)] = axis
+    meaning = Meaning(
+        letters, WORDS, _text_of(*kinds), np.array(modes.units), np.array(modes.steps), np.array(modes.offset),
+        reader.feed_share, bool(reader.dialect.rapid), np.array([reader.printing, reader.travelling]),
+    )  # fmt: skip
+    told = (reader.part, reader.layer, reader.type, reader.width, reader.height)
+    state, at = np.array([*reader.at, modes.feed, *told, reader.layers]), first
+    while True:
+        table.begin(state.tolist(), len(lines) - at)
+        counts = np.array([at, table.rows, table.remarks, -1])
+        _read_run(Text(lines.content, lines.start), meaning, table.columns, state, counts)
+        begun, at, table.rows, table.remarks, move = at, *(int(count) for count in counts)
+        if move >= 0:
+            reader.motion = lines[move][:2]
+        if at == begun or table.remarks < len(table.columns.told):
+            break
+    if at > first:
+        reader.number, reader.at[:], modes.feed = at, state[:F].tolist(), float(state[F])
+        reader.layer, reader.type, reader.layers = (int(state[k]) for k in (LAYER, TYPE, LAYERS))
+        reader.width, reader.height = float(state[WIDTH]), float(state[HEIGHT])
+    return at
 
 
 @kernel
-def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Floats) -> tuple[int, int, int]:
-    """The line after the run, how many rows it has, and the line of its last move.
-
-    state: (7,) axes and feed; updated in place, as are the kind and the width in meaning.row.
-    """
+def _read_run(text: Text, meaning: Meaning, columns: Columns, state: Floats, counts: NDArray[np.int64]) -> None:
+    """counts: the line after the run, rows, remarks, and the line of the last move; they are updated, as is the state."""
     words = np.empty((32, 2))
-    count, line, move = 0, first, first
-    while line < len(text.start) - 1 and line - first < len(rows):
+    line, row, remarks = counts[0], counts[1], counts[2]
+    while line < len(text.start) - 1 and remarks < len(columns.told):
         begin, end = text.start[line], text.start[line + 1]
-        if text.text[begin] == 59:
-            if not _read_remark(text.text, begin, end, meaning):
+        while end > begin and _is_blank(text.text[end - 1]):
+            end -= 1
+        if end == begin or text.text[begin] == 59:
+            if end > begin and not _read_remark(text.text, begin + 1, end, meaning, state):
                 break
             line += 1
             continue
-        word_count = _read_words(text.text, begin, end, meaning.letters, words)
-        if word_count < 0:
+        count = _read_words(text.text, begin, end, meaning.letters, words)
+        if count < 0:
             break
-        for k in range(ROW):
-            rows[count, k] = meaning.row[k]
-        for k in range(6):
-            rows[count, BEFORE + k] = state[k]
-        moved = False
-        for k in range(word_count):
+        if len(columns.starts):
+            for k in range(E_AXIS):
+                columns.starts[row, k] = state[k]
+        moved, filament_mm = False, state[E_AXIS]
+        for k in range(count):
             axis, value = int(words[k, 0]), words[k, 1]
             if axis == F:
                 state[F] = value * meaning.units[0]
@@ -124,53 +130,99 @@ def _read_run(text: Text, meaning: Meaning, first: int, state: Floats, rows: Flo
             moved = True
             value *= meaning.units[axis]
             state[axis] = state[axis] + value if meaning.steps[axis] else value - meaning.offset[axis]
-        if moved:
-            rows[count, LINE] = line + 1
-            for k in range(6):
-                rows[count, AFTER + k] = state[k]
-            quick = meaning.rapid and text.text[begin + 1] == 48
-            rows[count, FEED] = inf if quick else state[F] * meaning.feed_share
-            if rows[count, BEFORE + E_AXIS] == rows[count, AFTER + E_AXIS]:
-                rows[count, ACCELERATION] = meaning.travelling
-            count += 1
-        move = line
         line += 1
-    return line, count, move
+        counts[3] = line - 1
+        if not moved:
+            continue
+        columns.line[row] = line
+        for k in range(E_AXIS):
+            columns.places[row + 1, k] = state[k]
+        columns.e_mm[row] = state[E_AXIS] - filament_mm
+        columns.feed[row] = inf if meaning.rapid and text.text[begin + 1] == 48 else state[F] * meaning.feed_share
+        remarks = _remark(state, meaning.accelerations[0 if state[E_AXIS] != filament_mm else 1], columns.told, remarks)
+        columns.remark[row] = remarks - 1
+        row += 1
+    counts[0], counts[1], counts[2] = line, row, remarks
 
 
 @borrower
-def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning) -> bool:
-    """Whether a comment tells a width, or a kind that is known; it goes into the row then."""
-    while end > begin and (text[end - 1] == 32 or 9 <= text[end - 1] <= 13):
-        end -= 1
-    if _begins(text, begin, end, WIDTH_IS):
-        at, whole, digits, behind = begin + len(WIDTH_IS), 0, 0, -1
-        while at < end:
-            if text[at] == 46 and behind < 0 and digits > 0:
-                behind = 0
-            elif 48 <= text[at] <= 57:
-                whole, digits = 10 * whole + (text[at] - 48), digits + 1
-                behind += behind >= 0
-            else:
-                return False
-            at += 1
-        decimals = max(behind, 0)
-        if digits == 0 or behind == 0 or digits > MOST_DIGITS or digits - decimals > WHOLE_DIGITS or decimals > DECIMALS:
-            return False
-        divisor = 1.0
-        for _ in range(decimals):
-            divisor *= 10.0
-        meaning.row[WIDTH] = whole / divisor
+def _remark(state: Floats, acceleration: float, told: Floats, remarks: int) -> int:
+    """How many remarks there are with that of a row, which may be that of the row before."""
+    last = TOLD - 1
+    same = remarks > 0 and told[remarks - 1, last] == acceleration
+    for k in range(last):
+        same = same and told[remarks - 1, k] == state[PART + k]
+    if same:
+        return remarks
+    for k in range(last):
+        told[remarks, k] = state[PART + k]
+    told[remarks, last] = acceleration
+    return remarks + 1
+
+
+@borrower
+def _is_blank(byte: int) -> bool:
+    return byte == 32 or 9 <= byte <= 13
+
+
+@borrower
+def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Floats) -> bool:
+    """Whether a comment is plain, its sign and the blanks behind it taken off: what it tells is in the state then."""
+    while begin < end and _is_blank(text[begin]):
+        begin += 1
+    if begin == end:
         return True
-    if not _begins(text, begin, end, TYPE_IS):
+    if text[begin] < 32 or text[begin] > 126 or text[end - 1] < 32 or text[end - 1] > 126:  # it may be a blank of another kind
         return False
-    begin += len(TYPE_IS)
-    for kind in range(len(meaning.types.start) - 1):
-        known = meaning.types.text[meaning.types.start[kind] : meaning.types.start[kind + 1]]
-        if end - begin == len(known) and _begins(text, begin, end, known):
-            meaning.row[TYPE] = kind
+    for k in range(len(meaning.words.start) - 1):
+        word = meaning.words.text[meaning.words.start[k] : meaning.words.start[k + 1]]
+        if not _begins(text, begin, end, word):
+            continue
+        begin += len(word)
+        if k in (WIDTH_IS, HEIGHT_IS):
+            value = _read_size(text, begin, end)
+            if value >= 0.0:
+                state[WIDTH + k] = value
+            return value >= 0.0
+        if k == SINGLE and begin == end:
+            state[LAYER] += 1.0
+            state[LAYERS] += 1.0
             return True
-    return False
+        if k != TYPE_IS:
+            return k == SINGLE
+        for kind in range(len(meaning.types.start) - 1):
+            known = meaning.types.text[meaning.types.start[kind] : meaning.types.start[kind + 1]]
+            if end - begin == len(known) and _begins(text, begin, end, known):
+                state[TYPE] = kind
+                return True
+        return False
+    return True
+
+
+@borrower
+def _read_size(text: Bytes, begin: int, end: int) -> float:
+    """The number of a comment; below 0: it is not read here."""
+    whole, digits, behind = 0, 0, -1
+    for at in range(begin, end):
+        if text[at] == 46 and behind < 0 and digits > 0:
+            behind = 0
+        elif 48 <= text[at] <= 57 and digits < MOST_DIGITS:
+            whole, digits = 10 * whole + (text[at] - 48), digits + 1
+            behind += behind >= 0
+        else:
+            return -1.0
+    decimals = max(behind, 0)
+    if digits == 0 or behind == 0 or digits - decimals > WHOLE_DIGITS or decimals > DECIMALS:
+        return -1.0
+    return whole / _power_of_ten(decimals)
+
+
+@borrower
+def _power_of_ten(exponent: int) -> float:
+    power = 1.0
+    for _ in range(exponent):
+        power *= 10.0
+    return power
 
 
 @borrower
@@ -185,8 +237,6 @@ def _begins(text: Bytes, begin: int, end: int, word: Bytes) -> bool:
 @borrower
 def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], words: Floats) -> int:
     """How many words a plain move has, each what it stands for and its value; -1: the line is none."""
-    while end > begin and (text[end - 1] == 32 or 9 <= text[end - 1] <= 13):
-        end -= 1
     if end - begin < 5 or end - begin >= LONGEST or text[begin] != 71 or (text[begin + 1] != 48 and text[begin + 1] != 49):
         return -1
     at, count, named = begin + 2, 0, 0
@@ -213,10 +263,7 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
                 return -1
         if axis == NONE or digits == 0 or digits - behind > 12:
             return -1
-        divisor = 1.0
-        for _ in range(behind):
-            divisor *= 10.0
-        value = whole / divisor
+        value = whole / _power_of_ten(behind)
         if (axis == F and (negative or value <= 0.0)) or named >> axis & 1:  # firmwares do not agree on a word given twice
             return -1
         named |= 1 << axis

@@ -1,6 +1,5 @@
-"""State: what the firmware knows while a text is read, and the rows and events read of late."""
+"""State: what the firmware knows while a text is read, and the rows and events so far."""
 
-from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
@@ -10,11 +9,10 @@ from machine.gcode.modes import E_AXIS, Modes, axes_of
 from machine.gcode.part_totals import PartTotals
 from machine.gcode.words import Word
 from machine.reader.parsed import OWN, Event, Unheld
+from machine.reader.table import Table
 from profiles.machine import Machine
 
 DEFAULT_FEED = 1500.0
-# Columns of a row; BEFORE and AFTER are the first of six places, ROW is how many columns there are.
-LINE, BEFORE, AFTER, FEED, PART, LAYER, TYPE, WIDTH, HEIGHT, ACCELERATION, FOLLOWED, ROW = 0, 1, 7, *range(13, 22)
 Words = list[Word]
 
 
@@ -32,6 +30,7 @@ class Reader:
     letters: Mapping[str, int]
     home: list[float]
     at: list[float]
+    table: Table
     feed_share: float = 1.0  # of M220, by which every F is multiplied
     flow: float = 1.0  # of M221, by which all filament that moves push is
     filament_mm2: float = 0.0  # of M200: E words are then mm3
@@ -58,8 +57,7 @@ class Reader:
     parts: list[int] = field(default_factory=list)
     announced: int = 0
     part_totals: list[PartTotals] = field(default_factory=list)
-    rows: "array[float]" = field(default_factory=lambda: array("d"))
-    taken: int = 0  # rows that were here before
+    switches: list[int] = field(default_factory=list)  # rows from which on X Y Z are places on the table, or no more
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
     replaced: list[tuple[int, str]] = field(default_factory=list)  # lines whose text is shown otherwise than written
@@ -68,15 +66,12 @@ class Reader:
     def row(self, before: list[float], feed: float) -> None:
         """A move from a place to where the machine is now."""
         acceleration = self.printing if self.at[E_AXIS] != before[E_AXIS] else self.travelling
-        self.rows.extend((self.number, *before, *self.at, feed, *self.remarks(acceleration)))
-
-    def remarks(self, acceleration: float) -> tuple[float, ...]:
-        """The columns of a row from PART on."""
-        return (self.part, self.layer, self.type, self.width, self.height, acceleration, self.followed)
+        told = (self.part, self.layer, self.type, self.width, self.height, acceleration)
+        self.table.add(self.number, before, self.at, feed, told)
 
     def note(self, code: str, value: float, letters: str) -> None:
         """Put an event on record, before the next row."""
-        self.events.append(Event(self.number, code, value, letters, self.taken + len(self.rows) // ROW))
+        self.events.append(Event(self.number, code, value, letters, self.table.rows))
 
     def ignore(self, code: str) -> None:
         """Count what is not understood and does not move."""
@@ -89,9 +84,9 @@ class Reader:
         self.note(OWN, 0.0, code)
 
 
-def reader_of(machine: Machine) -> Reader:
-    """A reader that has read nothing: the machine stands at home."""
+def reader_of(machine: Machine, room: int) -> Reader:
+    """A reader that has read nothing, with room for so many rows: the machine stands at home."""
     modes = Modes(axes_of(machine), feed=DEFAULT_FEED, strict=True)
     linear = [min(max(0.0, axis.limits_mm[0]), axis.limits_mm[1]) for axis in (machine.x, machine.y, machine.z)]
     home = [*linear, machine.tilt.zero_deg, machine.turn.zero_deg, 0.0]
-    return Reader(machine, dialect_of(machine), modes, modes.axes.words, home, home.copy())
+    return Reader(machine, dialect_of(machine), modes, modes.axes.words, home, home.copy(), Table(room))

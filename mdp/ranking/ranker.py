@@ -9,13 +9,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Protocol
 
+from mdp.ranking import SUFFIX
 from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.network import Network
 from mdp.ranking.ranking import RankedCandidate
 from profiles.errors import RankerError
 
 CLASSIC, LEARNED = "classic", "learned"
-SUFFIX = ".onnx"
 
 
 class Ranker(Protocol):

@@ -1,4 +1,7 @@
-"""The simulate command: the dry run of a model or a G-code file, its plastic held against the model."""
+"""The simulate command: the dry run of a model or a G-code file, its plastic held against the model.
+
+What only some of its options need is loaded when one of them is given.
+"""
 
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -9,14 +12,9 @@ from machine.app.pipeline.programs import load_program
 from machine.app.requests import STDOUT, ModelRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.report import agreement_line, print_price, print_table
-from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
-from machine.dryrun.starvation import find_starvation
 from machine.firmware.line import check_baud
-from machine.planning.arrange import mesh_moved
-from machine.view.page import print_page
 from mdp.model_file import check_file, locate
-from mdp.read import read_mesh
 from profiles.errors import ProfileError
 
 
@@ -38,15 +36,24 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     program, profile = loaded.program, loaded.profile
     mesh = None if program.decomposition is None else program.decomposition.mesh
     if reference is not None:
+        from machine.planning.arrange import mesh_moved
+        from mdp.read import read_mesh
+
         mesh, _ = read_mesh(locate(reference), profile.process.scale, profile.process.rotate_deg)
         mesh = mesh_moved(mesh, profile.process.place_mm)
     agreed = None
     if mesh is not None:
+        from machine.dryrun.conformity.agreement import agreement
+
         agreed, run = agreement(program.run, mesh, profile)
         program = replace(program, run=run)
     if baud is not None:
+        from machine.dryrun.starvation import find_starvation
+
         program = replace(program, run=find_starvation(program.run, program.lines, profile.machine, baud))
     if outputs.html is not None:
+        from machine.view.page import print_page
+
         write_bytes(outputs.html, print_page(request.name, program, profile, known=loaded.machine_known))
     if outputs.json is not None:
         write_json(

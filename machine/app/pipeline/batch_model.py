@@ -20,7 +20,7 @@ from machine.planning.fit import check_parts
 from mdp.decomposition import Part
 from mdp.joint import joints_of
 from mdp.plans.writing import plan_text
-from mdp.ranking.ranker import SUFFIX
+from mdp.ranking import SUFFIX
 from mdp.save import json_values, part_file
 from profiles.errors import UserError
 from profiles.profile import Profile

@@ -12,7 +12,6 @@ from collections.abc import Iterable
 from contextlib import nullcontext
 from threading import Condition, Thread
 
-from machine.app.pipeline.precompile import DONE, KERNEL
 from machine.app.terminal.progress import Report, reporting, say
 from mdp.kernels.cache import is_cached, keep, trouble
 from mdp.kernels.threads import THREADS
@@ -20,6 +19,7 @@ from profiles.profile import Profile
 
 JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = ("judge",), ("sweep", "search"), ("slice", "dry-run"), ("dry-run",), ("draw",)
 LOOK_S = 0.2
+KERNEL, DONE = "kernel", "done"  # what such a process answers
 COMPILE = "import sys; sys.path[:] = {path!r}; from machine.app.pipeline.precompile import main; main()"
 
 

@@ -76,16 +76,3 @@ def check_parts_named(profile: Profile, parts: int) -> None:
         if settings.part > parts:
             there = "1 alone" if parts == 1 else f"1 to {parts}"
             raise ProfileError(f"part {settings.part} is not there to have {settings.in_words}: the parts are {there}")
-
-
-def refuse_cuts(request: ModelRequest) -> None:
-    """Raise PlanError where a G-code file is to be cut."""
-    for option, value in (("--plan", request.cuts.plan), ("--parts", request.cuts.parts)):
-        if value is not None:
-            raise PlanError(f"{option} {value}: {request.model} is G-code, which is cut already; it goes with a model")
-    if request.copies != 1:
-        raise PlanError(f"--copies {request.copies}: {request.model} is G-code, which is sliced already; it goes with a model")
-    for stop in request.stops:
-        raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
-    for settings in request.profile.parts:
-        raise PlanError(f"--part {settings.part}: {request.model} is G-code, which is sliced already; it goes with a model")

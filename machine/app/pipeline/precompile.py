@@ -17,6 +17,7 @@ import manifold3d as m3
 import numpy as np
 
 from machine.app.pictures.raster import draw
+from machine.app.pipeline.compilers import DONE, KERNEL
 from machine.app.pipeline.pricing import pricing
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import dry_run
@@ -46,7 +47,6 @@ LEANING = np.array([0.0, np.sin(0.2), np.cos(0.2)])
 PLANE = Plane(LEANING, 20.0)
 COARSE = {"layer_height_mm": 0.3, "line_width_mm": 0.6, "first_layer_height_mm": 0.3, "support": "auto", "walls": 2}
 NO_COLLECTION = 100_000  # numba's garbage is little and looking for it a tenth of the time
-KERNEL, DONE = "kernel", "done"
 
 PROGRAM = """;LAYER_CHANGE
 ;TYPE:Outer wall

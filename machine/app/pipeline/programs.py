@@ -6,7 +6,6 @@ from pathlib import Path
 
 from machine.app.embedded_profile import in_words, read_embedded_profile
 from machine.app.pipeline import compilers
-from machine.app.pipeline.given_plan import refuse_cuts
 from machine.app.pipeline.memory import return_large_arrays
 from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
@@ -15,7 +14,7 @@ from machine.dryrun.findings import Finding
 from machine.gcode.lines import Lines
 from machine.program import Program
 from machine.reader.gcode_file import GcodeFile
-from profiles.errors import GcodeError, MoveError
+from profiles.errors import GcodeError, MoveError, PlanError
 from profiles.profile import Profile
 
 
@@ -43,7 +42,7 @@ def load_program(request: ModelRequest) -> LoadedProgram:
         decomposed = decompose_model(request, to_build=True)
         program = build(decomposed.decomposition, decomposed.profile, stops=request.stops)
         return LoadedProgram(request.name, program, decomposed.profile)
-    refuse_cuts(request)
+    _refuse_cuts(request)
     source = Path(request.model)
     lines = read_gcode_lines(source)
     profile, sections = read_embedded_profile(lines, request.profile, request.chosen_sections)
@@ -52,6 +51,19 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     compilers.wait_for(compilers.DRY_RUN)
     known = "machine" in request.chosen_sections or profile.machine is not request.profile.machine
     return LoadedProgram(request.name, Program(lines, dry_run(lines, profile), None), profile, source, known)
+
+
+def _refuse_cuts(request: ModelRequest) -> None:
+    """Raise PlanError where a G-code file is to be cut."""
+    for option, value in (("--plan", request.cuts.plan), ("--parts", request.cuts.parts)):
+        if value is not None:
+            raise PlanError(f"{option} {value}: {request.model} is G-code, which is cut already; it goes with a model")
+    if request.copies != 1:
+        raise PlanError(f"--copies {request.copies}: {request.model} is G-code, which is sliced already; it goes with a model")
+    for stop in request.stops:
+        raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
+    for settings in request.profile.parts:
+        raise PlanError(f"--part {settings.part}: {request.model} is G-code, which is sliced already; it goes with a model")
 
 
 def read_gcode_lines(path: Path) -> Lines:

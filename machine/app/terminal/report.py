@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.program import Program
 from machine.quantities import duration, filament_g, minutes, newtons, percent, price_in_words, price_json
-from machine.view.parts import risky_before_mm2
-from mdp.decomposition import Decomposition, FrontRow
-from mdp.joint import Joint, weakest_of
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
+
+if TYPE_CHECKING:  # what only models have is loaded with them
+    from machine.dryrun.conformity.agreement import Agreement
+    from mdp.decomposition import Decomposition, FrontRow
+    from mdp.joint import Joint
 
 WIDEST = 100  # characters of a line
 NO_BREAK = "\u00a0"  # a space at which no line ends
@@ -29,11 +31,13 @@ def table(rows: list[list[str]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_platform_faces: bool = False) -> str:
+def parts_table(decomposition: "Decomposition", angle_deg: float = 45.0, count_platform_faces: bool = False) -> str:
     """The parts in print order, what would be risky of their faces straight up and what is; then the front.
 
     angle_deg and count_platform_faces as the search had them.
     """
+    from machine.view.parts import risky_before_mm2
+
     rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm3", "share", "risky before", "after mm2"]]
     for part in decomposition.parts:
         angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
@@ -47,9 +51,11 @@ def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_pla
     return table(rows) + effort + front + "\n"
 
 
-def joints_table(joints: Sequence[Joint]) -> str:
+def joints_table(joints: "Sequence[Joint]") -> str:
     """Every joint: its area and seam, how its first layer lies where it is sliced, what it bears, and which is the weakest;
     nothing for a model in one piece."""
+    from mdp.joint import weakest_of
+
     weakest = weakest_of(joints)
     if weakest is None:
         return ""
@@ -67,7 +73,7 @@ def joints_table(joints: Sequence[Joint]) -> str:
     return table(rows) + sentence + "\n\n"
 
 
-def front_table(front: Sequence[FrontRow]) -> str:
+def front_table(front: "Sequence[FrontRow]") -> str:
     """The best decomposition for every number of parts, the one taken marked and why."""
     rows = [["in parts", "needs support mm2", "seams mm", "stairs mm2", "costs mm2", "about", "filament m"]]
     rows += [
@@ -86,7 +92,7 @@ def front_table(front: Sequence[FrontRow]) -> str:
     return "\n".join([head, *(line + reason for line, reason in zip(lines, taken, strict=True))]) + "\n"
 
 
-def estimates(row: FrontRow) -> list[str]:
+def estimates(row: "FrontRow") -> list[str]:
     """About how long a decomposition prints, and metres of filament; dashes where that is not known."""
     return [
         "-" if row.time_s is None else minutes(row.time_s),
@@ -173,7 +179,7 @@ def pins_line(sliced: Sequence[SlicedPart]) -> str:
     return "\n".join(wrap(f"pins: {of_parts}", WIDEST)).replace(NO_BREAK, " ") + "\n" if of_parts else ""
 
 
-def agreement_line(agreed: Agreement) -> str:
+def agreement_line(agreed: "Agreement") -> str:
     """How the plastic agrees with the model."""
     sentence = (
         f"the beads fill {100 * agreed.filled:.1f} % of the model; of their length {100 * agreed.outside:.2f} % lie outside it "

@@ -18,6 +18,12 @@ def test_a_gcode_file_is_read_line_by_line_as_often_as_wanted(tmp_path: Path) ->
     assert list(file) == list(file) == file.lines() == ["G28", "G1 X5 ; ü", "", "M84"]
 
 
+@pytest.mark.parametrize("content", [b"G28\n\nG1 X5", b"G28\n\nG1 X5\n", b"G28\r\rG1 X5\r"])
+def test_a_file_has_the_same_lines_however_they_end(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "p").write_bytes(content)
+    assert GcodeFile(tmp_path / "p").lines() == list(GcodeFile(tmp_path / "p")) == ["G28", "", "G1 X5"]
+
+
 @pytest.mark.parametrize(("content", "words"), [(None, "cannot be read: no such file"), (b"G1 X\0\n", "is not text")])
 def test_a_gcode_file_that_cannot_be_read_is_one_sentence(tmp_path: Path, content: bytes | None, words: str) -> None:
     if content is not None:

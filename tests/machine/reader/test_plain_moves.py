@@ -27,13 +27,14 @@ OTHERS = st.sampled_from(
     ["G90", "G91", "M82", "M83", "G20", "G21", "G92 X3 E0", "M220 S50", "M221 S90", "M221 S100", "M204 P900 T300",
      ";TYPE:Skirt", ";TYPE:Fill", ";TYPE: Skirt", ";TYPE:", ";WIDTH:0.5", ";WIDTH:1", ";WIDTH:.5", ";WIDTH:5.", ";WIDTH:0.12 ",
      ";WIDTH:0.1234567890123456", ";WIDTH:x", ";LAYER_CHANGE", "G1 F600", "g1 x4 y5", "G01 X1",
-     "G1 X1.5Y2", "G1 X1 \t", "M106 S255"]
+     "G1 X1.5Y2", "G1 X1 \t", "M106 S255", ";HEIGHT:0.2", "; HEIGHT:0.3", ";HEIGHT: 1", ";Z:1", ";", "", "; any words",
+    ";LAYER:3", ";LAYER_CHANGED", ";LAYER_CHANGE \t", ";PART:2 of 3", ";\u00a0WIDTH:2", ";WIDTH:2\u3000", ";WIDTHS:2", "G92 X7"]
 )  # fmt: skip
 
 
 def in_turn(lines: list[str]) -> list[str]:
-    """The same lines, none of which is a plain move for its comment."""
-    return [line if line.startswith(";") else f"{line} ;" for line in lines]
+    """The same lines, none of which is plain: comments do not begin their lines, commands have one."""
+    return [f" {line}" if line.startswith(";") else f"{line} ;" for line in lines]
 
 
 def assert_same(first: ParsedProgram, second: ParsedProgram) -> None:
@@ -76,7 +77,7 @@ def test_lines_with_line_ends_and_foreign_letters_are_read_alike() -> None:
     assert_same(parse_gcode(lines, MACHINE), parse_gcode([f"{line}\r\n" for line in lines], MACHINE))
 
 
-def test_a_long_run_is_read_in_pieces() -> None:
+def test_a_long_run_has_a_row_a_line() -> None:
     program = parse_gcode([f"G1 X{k % 7}.{k % 10}" for k in range(10000)], MACHINE)
     assert len(program.line) == 10000
     assert program.line[-1] == 10000
@@ -87,4 +88,11 @@ def test_more_kinds_of_line_than_a_run_knows_are_read_alike() -> None:
     lines = [line for k in (*range(100), *range(100)) for line in (f";TYPE:kind {k}", f"G1 X{k} E1")]
     program = parse_gcode(lines, MACHINE)
     assert [program.types[kind] for kind in program.type] == [f"kind {k}" for k in (*range(100), *range(100))]
+    assert_same(program, parse_gcode(in_turn(lines), MACHINE))
+
+
+def test_more_remarks_than_there_was_room_for_are_read_alike() -> None:
+    lines = [line for k in range(3000) for line in (f";WIDTH:{k / 1000}", f"G1 X{k} E1")]
+    program = parse_gcode(lines, MACHINE)
+    assert program.width_mm.tolist() == [k / 1000 for k in range(3000)]
     assert_same(program, parse_gcode(in_turn(lines), MACHINE))

@@ -200,7 +200,7 @@ def homing_lines(start: list[str], dialect: Dialect) -> list[str]:
         if name != "G92" or "E" in read_letters(rest):
             break
         last += 1
-    return list(cold_block(start[: last + 1], dialect).lines)
+    return cold_block(start[: last + 1], dialect)[0]
 
 
 def jog_target_mm(machine: Machine, at: dict[str, float], axis: str, by_mm: float) -> float:
