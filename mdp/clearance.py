@@ -20,7 +20,7 @@ import numpy as np
 
 from mdp.head import Head, bodies, corners, directions, head_of, lowest_of_hot_end
 from mdp.kernels.arrays import flags, floats, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.pose import UP, Pose, poses, rotation, shift
@@ -153,7 +153,7 @@ def _per_cell(places: Floats, heights: Floats, cell_mm: float, extreme: np.ufunc
     return np.column_stack([(cells[first] + 0.5) * cell_mm, reached]), of_place
 
 
-@borrower
+@no_nrt
 def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head, clearance: float) -> float:
     """The lowest safe height of the tip beside a column that ends at `top`. square: of the distance to its point; beyond: how
     much nearer the column may be."""
@@ -164,7 +164,7 @@ def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head, clea
     return float(top - max(under - clearance, 0.0))
 
 
-@borrower
+@no_nrt
 def _is_under(box: Floats, across: float, along: float, beyond: float) -> bool:
     """Whether a point at that offset from the tip lies under a box enlarged by `beyond`."""
     inside = box[0] - beyond <= across and across <= box[3] + beyond
@@ -317,7 +317,7 @@ def count_divided(corners: Floats, longest: float) -> int:
     return _count_divided(corners, longest)
 
 
-@borrower
+@no_nrt
 def _count_divided(corners: Floats, longest: float) -> int:
     count = 0
     for f in range(len(corners)):
@@ -340,7 +340,7 @@ def subdivide(corners: Floats, longest: float) -> Floats:
     return points.reshape(count, 3, 3)
 
 
-@borrower
+@no_nrt
 def _put(points: Floats, at: int, corners: Floats, shares: tuple[Share, Share, Share], n: int) -> int:
     """Write a triangle into three rows and return the next row. shares: its corners in nth parts of two edges of `corners`."""
     for i, j in shares:
@@ -351,7 +351,7 @@ def _put(points: Floats, at: int, corners: Floats, shares: tuple[Share, Share, S
     return at
 
 
-@borrower
+@no_nrt
 def _divisions(corners: Floats, most: float) -> int:
     """How many pieces each edge of a triangle is divided into."""
     longest = 0.0

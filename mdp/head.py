@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.directions.spread import spread
-from mdp.kernels.kernel import borrower
+from mdp.kernels.kernel import no_nrt
 from mdp.mesh import Floats
 from mdp.pose import UP
 from profiles.frozen import Vector
@@ -68,7 +68,7 @@ def head_of(machine: Machine) -> Head:
     return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes)
 
 
-@borrower
+@no_nrt
 def lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
     """Height above the tip of the hot end's lowest point at a radius; a great number beyond its widest."""
     if radius <= silhouette[0, 0]:

@@ -15,13 +15,13 @@ that are exactly level: they are the top or the bottom of a layer.
 
 import numpy as np
 
-from mdp.kernels.kernel import inlined
+from mdp.kernels.kernel import no_nrt
 from mdp.mesh import Floats
 
 LEVEL_COSINE = 0.9998  # within 1.1 degrees: 10 mm of such a face are one layer of 0.2 mm, it is printed as one
 
 
-@inlined
+@no_nrt
 def step_share(cosine: float) -> float:
     """Height of the steps on a face with that cosine between normal and printing direction, as a share of the layer height."""
     facing = abs(cosine)

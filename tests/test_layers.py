@@ -30,7 +30,7 @@ CONFINED = {
         "machine/calibration/coupon/",
     ),
     "numba": ("mdp/kernels/",),
-    "llvmlite": ("mdp/kernels/target",),
+    "llvmlite": ("mdp/kernels/loading", "mdp/kernels/target"),
     "shapely": ("slicer/strokes/order", "machine/dryrun/placement"),
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.head import Head, lowest_of_hot_end
-from mdp.kernels.kernel import borrower
+from mdp.kernels.kernel import no_nrt
 from mdp.mesh import Floats
 from slicer.geometry.segments import Segment, squared_distance
 
@@ -57,13 +57,13 @@ def in_order(field: Field) -> Field:
     return field._replace(order=np.argsort(-field.coarse, kind="stable"))
 
 
-@borrower
+@no_nrt
 def _blocks(cells: int) -> int:
     """How many blocks so many cells are in."""
     return (cells + BLOCK - 1) >> SHIFT
 
 
-@borrower
+@no_nrt
 def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
     """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along. A cell that it raises
     keeps in `below` what it was before."""
@@ -97,13 +97,13 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
                     field.highest[0], field.highest[1] = max(field.highest[0], z), max(field.highest[1], z)
 
 
-@borrower
+@no_nrt
 def _distance_across(px: float, py: float, a: Point, b: Point) -> float:
     """Distance across, in X and Y alone, of a point from a move."""
     return float(np.sqrt(squared_distance(Segment(a[0], a[1], b[0], b[1]), px, py)))
 
 
-@borrower
+@no_nrt
 def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
     """True when a box that goes with the tip from a to b comes over a square; square: its middle and half of its side."""
     px, py, half = square
@@ -120,7 +120,7 @@ def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
     return low <= high
 
 
-@borrower
+@no_nrt
 def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point, b: Point, head: Head) -> float:
     """How deep the head goes into a column during a level move; 0 up to `slack`.
 
@@ -137,7 +137,7 @@ def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point,
     return deepest
 
 
-@borrower
+@no_nrt
 def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> float:
     """How deep the head goes into the field at most during a level move; 0 up to `slack`."""
     deepest, size, cell = 0.0, BLOCK * field.cell, field.cell
@@ -161,7 +161,7 @@ def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> 
     return deepest
 
 
-@borrower
+@no_nrt
 def depth_of(a: Floats, b: Floats, slack: float, field: Field, head: Head) -> float:
     """How deep the head goes into the field at most during a move; a slanting one in pieces, each at its lowest place."""
     if min(a[2], b[2]) + slack >= field.highest[0]:

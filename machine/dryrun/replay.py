@@ -16,7 +16,7 @@ from machine.kinematics.table import machine_points
 from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
 from mdp.head import Head, head_of
 from mdp.kernels.arrays import floats, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation, shift
 from profiles.machine import Machine
@@ -146,7 +146,7 @@ def _lay_turned(deposited: Beads, laid_in: NDArray[np.int32], ups: Floats, turn:
         lay_bead(ends[0], ends[1], half, deposited.rows[i], field)
 
 
-@borrower
+@no_nrt
 def _under(
     place: tuple[float, float, float, float],
     size: tuple[float, float],
@@ -183,7 +183,7 @@ def _under(
     return 1 if top > z - reach else 0
 
 
-@borrower
+@no_nrt
 def _classify_support(
     place: tuple[float, float, float, float],
     size: tuple[float, float],
@@ -217,13 +217,13 @@ def _classify_support(
     return 0
 
 
-@borrower
+@no_nrt
 def _free_mm(most: float, held: float) -> float:
     """How long the last stretch of a path may be; a path that lies on nothing anywhere spans nothing."""
     return FREE_END * most if held == 1.0 else 0.0
 
 
-@borrower
+@no_nrt
 def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: Floats, contacts: Contacts) -> None:
     """Ends a stretch of beads with nothing under them; stretch: the places in rows of its first and last row, and how much longer
     it is than it may span. pending: (n, 2) of each place what hangs in air there, and what only has a neighbour.

@@ -21,7 +21,7 @@ from machine.gcode.line_text import is_plain_move, read_line
 from machine.planning.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 from machine.reader.parsed import Indices32, ParsedProgram
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
@@ -110,7 +110,7 @@ def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:
     return np.where(first, sizes[at], 0.0), np.where(first, sums[at] - sizes[at] - sums[before], 0.0)
 
 
-@borrower
+@no_nrt
 def _run(now: float, planned: Planned, blocks: Blocks) -> None:
     """Begin and end what begins and ends until now."""
     state, span, entry2 = planned.state, planned.span, planned.entry2
@@ -133,7 +133,7 @@ def _run(now: float, planned: Planned, blocks: Blocks) -> None:
         span[0] = i
 
 
-@borrower
+@no_nrt
 def _wait_for_room(now: float, places: int, planned: Planned, blocks: Blocks) -> float:
     """The time from which on fewer than `places` blocks are planned."""
     state, span = planned.state, planned.span

@@ -6,7 +6,7 @@ from math import acos, atan2, ceil, cos, floor, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 
 FEWEST_CHORDS = 3  # fewer straight moves are not worth an arc
@@ -111,7 +111,7 @@ def _fit_arcs(points: Floats, density: Floats, tolerance: float, runs: NDArray[n
     return count
 
 
-@part
+@helper
 def _circle(points: Floats, density: Floats, i: int, j: int, tolerance: float) -> tuple[bool, float, float, float]:
     """The circle through the first, middle and last of points i..j, and whether all chords keep to it, all one way round."""
     ax, ay = points[i, 0], points[i, 1]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 
 Bytes = NDArray[np.uint8]
@@ -106,7 +106,7 @@ def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_
     return _copy(texts.content, texts.starts[len(paths.starts) - 1], texts.starts[len(paths.starts)], text, at)
 
 
-@part
+@helper
 def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tuple[float, float]:
     """Factor that scales the filament of each step, in proportion to its written length, so that the sum stays; and the factor by
     which the path is slowed. A factor of 0: nothing is redistributed.
@@ -123,7 +123,7 @@ def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tu
     return more, ceil(more * STEPS) / STEPS if more > SAME else 1.0
 
 
-@borrower
+@no_nrt
 def _step_mm(points_mm: Floats, filament_mm: Floats, k: int, more: float) -> float:
     """Filament of the step to point k as it is written; more: factor on the shared filament; 0: each step keeps its own."""
     if more == 0.0:
@@ -135,19 +135,19 @@ def _step_mm(points_mm: Floats, filament_mm: Floats, k: int, more: float) -> flo
     return float(filament_mm[k] * np.sqrt(written) / max(np.sqrt(exact), 1e-12) * more)
 
 
-@borrower
+@no_nrt
 def _thousandths(value_mm: float) -> int:
     return int(np.rint(value_mm * 1000.0))
 
 
-@borrower
+@no_nrt
 def _stands(points_mm: Floats, k: int, known: Whole) -> bool:
     """Whether the tip is at point k already, as it is written."""
     x, y, z = _thousandths(points_mm[k, 0]), _thousandths(points_mm[k, 1]), _thousandths(points_mm[k, 2])
     return bool(x == known[X] and y == known[Y] and z == known[Z])
 
 
-@borrower
+@no_nrt
 def _filament(words: PathWords, filament_mm: float, known: Whole, text: Bytes, at: int) -> int:
     """The word of filament up to what has been pushed: a step, or the sum where the firmware knows no steps."""
     pushed = int(np.rint(filament_mm * 1e5))
@@ -156,7 +156,7 @@ def _filament(words: PathWords, filament_mm: float, known: Whole, text: Bytes, a
     return _word(words.letter, value, FILAMENT_DIGITS, text, at)
 
 
-@borrower
+@no_nrt
 def _feed(units_s: float, known: Whole, text: Bytes, at: int) -> int:
     """The F word where it changes."""
     feed = max(int(np.rint(60.0 * units_s)), 1)
@@ -166,7 +166,7 @@ def _feed(units_s: float, known: Whole, text: Bytes, at: int) -> int:
     return _word(FEED, feed, 0, text, at)
 
 
-@borrower
+@no_nrt
 def _copy(what: Bytes, first: int, end: int, text: Bytes, at: int) -> int:
     for k in range(first, end):
         text[at] = what[k]
@@ -174,7 +174,7 @@ def _copy(what: Bytes, first: int, end: int, text: Bytes, at: int) -> int:
     return at
 
 
-@borrower
+@no_nrt
 def _word(letter: int, value: int, digits: int, text: Bytes, at: int) -> int:
     """A blank, a letter and a whole number with a point before its last digits; returns where the text goes on."""
     text[at], text[at + 1] = SPACE, letter

@@ -10,7 +10,7 @@ from machine.planning.moves import POINTS, RETRACT, Moves, add_point, add_row
 from machine.planning.priming import run_in
 from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
 from mdp.kernels.arrays import floats, longs, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.paths import KINDS, Layer, bead_area_mm2
@@ -79,7 +79,7 @@ def _ways(points_mm: Floats, flat_mm: Floats, starts: Indices, area_mm2: Floats,
     return ways
 
 
-@borrower
+@no_nrt
 def _step_mm(flat_mm: Floats, i: int) -> float:
     """Length of the step to a point."""
     return float(np.hypot(flat_mm[i, 0] - flat_mm[i - 1, 0], flat_mm[i, 1] - flat_mm[i - 1, 1]))

@@ -8,7 +8,7 @@ import numpy as np
 from machine.planning.moves import REORIENT, BeginLayer, BeginPart, MachineProgram, Reorient
 from machine.planning.timing import along, axis_speeds
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from profiles.errors import MoveError
 from profiles.frozen import Limits
@@ -94,7 +94,7 @@ def path_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, axes_mm
     return lowered
 
 
-@borrower
+@no_nrt
 def path_speed(points_mm: Floats, first: int, end: int, speed_mm_s: float, axes_mm_s: Floats) -> float:
     """The same along the path of some of the points."""
     for k in range(first + 1, end):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.pose import Pose
@@ -165,14 +165,14 @@ def _sums(pushed_mm: Floats, counts: Indices) -> Floats:
     return sums
 
 
-@borrower
+@no_nrt
 def add_point(out: Moves, done: Indices, x: float, y: float, z: float, pushed_mm: float) -> None:
     """Write the next point. done (2,): how many points and rows are written."""
     out.ways[done[0], 0], out.ways[done[0], 1], out.ways[done[0], 2], out.ways[done[0], 3] = x, y, z, pushed_mm
     done[0] += 1
 
 
-@borrower
+@no_nrt
 def add_row(out: Moves, done: Indices, what: int, points: int, speed: float, acceleration_mm_s2: float) -> None:
     """Write the next row, the move of the last points, which has neither width nor fan."""
     row = out.rows[done[1]]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 from profiles.machine import Machine
 from slicer.estimate.duration import trapezoid_s
@@ -114,14 +114,14 @@ def _allowed(
     return cruise, acceleration
 
 
-@borrower
+@no_nrt
 def along(most: float, step: float, length: float) -> float:
     """What a move of some length may have when one axis, which makes a step of it, may have at most so much."""
     share = abs(step) / max(length, TINY)
     return most / share if share > 0.0 else np.inf
 
 
-@borrower
+@no_nrt
 def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float) -> float:
     """The greatest speed at a corner: no axis changes its speed by more than the junction speed; 0 where the measure changes."""
     if blocks.measure[before] != blocks.measure[after]:
@@ -134,7 +134,7 @@ def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float)
     return float(v)
 
 
-@borrower
+@no_nrt
 def block_time(blocks: Blocks, i: int, v0: float, v1: float) -> float:
     """Seconds of a block from one speed to another."""
     return trapezoid_s(blocks.length[i], blocks.cruise[i], blocks.acceleration[i], v0, v1)

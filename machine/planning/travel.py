@@ -13,7 +13,7 @@ from machine.planning.limits import Speeds, path_speed, path_speeds, speeds_of
 from machine.planning.moves import MARK, REORIENT, RETRACT, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
 from mdp.clearance import Standing
 from mdp.kernels.arrays import longs, table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.pose import Pose
@@ -122,7 +122,7 @@ def _straight(at_mm: Floats, goal_mm: Floats, speeds: Speeds) -> Moves:
     return Moves(out.ways[1 : done[0]], out.rows[: done[1]])
 
 
-@borrower
+@no_nrt
 def add_travel(out: Moves, done: Indices, between_mm: Floats, goal_mm: Floats, speeds: Speeds) -> None:
     """Write a travel from the last point past (k, 2) places at the goal's height to the goal; it leaves out points where the tip
     stands already, and is left out where it leads nowhere. done: as in add_point."""
@@ -186,7 +186,7 @@ def trail_after(laid: Laid, first: int, end: int, before: Floats, wipe_mm: float
     return trail
 
 
-@borrower
+@no_nrt
 def _suffices(laid: Laid, k: int, wipe_mm: float) -> bool:
     """Whether what was printed before a stroke does not matter for a wipe after it."""
     if laid.wiped[k]:
@@ -194,7 +194,7 @@ def _suffices(laid: Laid, k: int, wipe_mm: float) -> bool:
     return not runs_round(laid.points[laid.starts[k] : laid.starts[k + 1]], laid.width[k])
 
 
-@part
+@helper
 def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
     """The way of a wipe after one stroke.
 

@@ -16,7 +16,7 @@ from machine.gcode.lines import Lines
 from machine.gcode.modes import E_AXIS
 from machine.reader.state import Reader
 from machine.reader.table import TOLD, Columns
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 
 Bytes = NDArray[np.uint8]
@@ -145,7 +145,7 @@ def _read_run(text: Text, meaning: Meaning, columns: Columns, state: Floats, cou
     counts[0], counts[1], counts[2] = line, row, remarks
 
 
-@borrower
+@no_nrt
 def _remark(state: Floats, acceleration: float, told: Floats, remarks: int) -> int:
     """How many remarks there are with that of a row, which may be that of the row before."""
     last = TOLD - 1
@@ -160,12 +160,12 @@ def _remark(state: Floats, acceleration: float, told: Floats, remarks: int) -> i
     return remarks + 1
 
 
-@borrower
+@no_nrt
 def _is_blank(byte: int) -> bool:
     return byte == 32 or 9 <= byte <= 13
 
 
-@borrower
+@no_nrt
 def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Floats) -> bool:
     """Whether a comment is plain, its sign and the blanks behind it taken off: what it tells is in the state then."""
     while begin < end and _is_blank(text[begin]):
@@ -199,7 +199,7 @@ def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Flo
     return True
 
 
-@borrower
+@no_nrt
 def _read_size(text: Bytes, begin: int, end: int) -> float:
     """The number of a comment; below 0: it is not read here."""
     whole, digits, behind = 0, 0, -1
@@ -217,7 +217,7 @@ def _read_size(text: Bytes, begin: int, end: int) -> float:
     return whole / _power_of_ten(decimals)
 
 
-@borrower
+@no_nrt
 def _power_of_ten(exponent: int) -> float:
     power = 1.0
     for _ in range(exponent):
@@ -225,7 +225,7 @@ def _power_of_ten(exponent: int) -> float:
     return power
 
 
-@borrower
+@no_nrt
 def _begins(text: Bytes, begin: int, end: int, word: Bytes) -> bool:
     """Whether a line begins with a word."""
     alike = end - begin >= len(word)
@@ -234,7 +234,7 @@ def _begins(text: Bytes, begin: int, end: int, word: Bytes) -> bool:
     return alike
 
 
-@borrower
+@no_nrt
 def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], words: Floats) -> int:
     """How many words a plain move has, each what it stands for and its value; -1: the line is none."""
     if end - begin < 5 or end - begin >= LONGEST or text[begin] != 71 or (text[begin + 1] != 48 and text[begin + 1] != 49):

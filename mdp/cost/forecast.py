@@ -15,7 +15,7 @@ import numpy as np
 
 from mdp.cost.cost import CostTerms
 from mdp.kernels.arrays import floats, table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
@@ -173,7 +173,7 @@ def _sum_left(surface: Faces, planes: Planes, classes: Classes) -> float:
     return total
 
 
-@borrower
+@no_nrt
 def weight_along(surface: Faces, classes: Classes, cut: int, face: int) -> float:
     """How many times a face counts that is risky along the normal of a cut."""
     source = surface.sources[face]
@@ -182,7 +182,7 @@ def weight_along(surface: Faces, classes: Classes, cut: int, face: int) -> float
     return surface.weight if classes[cut, source] == UNSUPPORTABLE else 1.0 if classes[cut, source] == NEEDS_SUPPORT else 0.0
 
 
-@borrower
+@no_nrt
 def along(points: Floats, row: int, directions: Floats, second_row: int) -> float:
     """Product of a row with a row of another array."""
     product: float = points[row, 0] * directions[second_row, 0] + points[row, 1] * directions[second_row, 1]
@@ -190,7 +190,7 @@ def along(points: Floats, row: int, directions: Floats, second_row: int) -> floa
     return product
 
 
-@part
+@helper
 def find_heights(polygon: Floats, size: int, planes: Planes, cut: int, heights: Floats) -> tuple[float, float]:
     """Put the heights of a polygon's corners above one of some planes into `heights`; the least and the greatest."""
     lowest, highest = np.inf, -np.inf
@@ -200,7 +200,7 @@ def find_heights(polygon: Floats, size: int, planes: Planes, cut: int, heights: 
     return lowest, highest
 
 
-@borrower
+@no_nrt
 def clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
     """Put into `below` what of a convex polygon lies below height 0; the number of its corners."""
     count = 0
@@ -218,7 +218,7 @@ def clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> in
     return count
 
 
-@borrower
+@no_nrt
 def flat_area_mm2(polygon: Floats, size: int, normals: Floats, face: int) -> float:
     """Area of a flat convex polygon with a known unit normal."""
     twice = 0.0
@@ -230,14 +230,14 @@ def flat_area_mm2(polygon: Floats, size: int, normals: Floats, face: int) -> flo
     return 0.5 * twice
 
 
-@part
+@helper
 def rim_per_mm(cosine: float, feather: float) -> float:
     """How much a mm of rim counts where a face's normal has that cosine with the plane's."""
     sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
     return float(weigh_chord(cosine, feather) / max(sine, LEAST_SINE))
 
 
-@borrower
+@no_nrt
 def find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> float:
     """Put the ends (2, 3) of a convex polygon's chord at height 0 into `ends`, first where its outline rises through it; its
     length, mm. The polygon reaches to both sides."""

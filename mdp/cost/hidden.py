@@ -13,7 +13,7 @@ import numpy as np
 from mdp.cut import simplify
 from mdp.directions.spread import spread_like_light
 from mdp.kernels.arrays import floats, ints
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.sweep.rays import TriangleTree, blocked_shares, first_hit, frames_about, triangle_tree
@@ -124,7 +124,7 @@ def _hide(begin: int, end: int, surface: Neighbourhood, radius: float, occluded:
             out[f] = 1.0 - (1.0 - concave) * (1.0 - shade)
 
 
-@borrower
+@no_nrt
 def _gather(surface: Neighbourhood, face: int, radius: float, seen: Ints, near: Ints) -> int:
     """Put the faces around one into `near`, nearest rings first, as far as their middles lie within the radius; their number."""
     middles = surface.middles
@@ -144,7 +144,7 @@ def _gather(surface: Neighbourhood, face: int, radius: float, seen: Ints, near: 
     return count
 
 
-@borrower
+@no_nrt
 def _most_bend(tensor: Floats) -> float:
     """The largest eigenvalue of a symmetric tensor xx, yy, zz, xy, yz, zx (Smith 1961)."""
     xx, yy, zz, xy, yz, zx = tensor[0], tensor[1], tensor[2], tensor[3], tensor[4], tensor[5]

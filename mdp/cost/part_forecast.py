@@ -29,7 +29,7 @@ from mdp.cost.forecast import (
     weight_along,
 )
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import borrower, inlined, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
 from mdp.support_need.patches import Classes
@@ -130,7 +130,7 @@ def _sum_parts(surface: Faces, cuts: Cuts, meeting: Floats) -> Floats:
     return sums.parts
 
 
-@inlined
+@no_nrt
 def _divide(surface: Faces, cuts: Cuts, room: Room, face: int, waiting: int, sums: Sums) -> int:
     """Divide the last triangle that waits among the parts; how many wait afterwards."""
     fan, cut, directions, size = room.fans[waiting], room.cuts[waiting], cuts.planes.directions, 3
@@ -173,7 +173,7 @@ def _divide(surface: Faces, cuts: Cuts, room: Room, face: int, waiting: int, sum
     return waiting
 
 
-@borrower
+@no_nrt
 def _add_fan(room: Room, waiting: int, apex: Floats, cut: int) -> None:
     """Have the triangle of a chord and a point of its plane wait: it closes what remains below the plane."""
     room.fans[waiting], room.cuts[waiting] = cut, cut + 1
@@ -183,7 +183,7 @@ def _add_fan(room: Room, waiting: int, apex: Floats, cut: int) -> None:
         room.corners[3 * waiting + 2, axis] = room.ends[0, axis]
 
 
-@borrower
+@no_nrt
 def _signed(ends: Floats, directions: Floats, first: int, second: int) -> float:
     """Length of a chord along the line in which two planes meet, with the sign of its sense."""
     total = 0.0

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import part, vector_part
+from mdp.kernels.kernel import helper, no_nrt
 
 Floats = NDArray[np.float64]
 
 
-@part
+@helper
 def ints(size: int, value: int) -> NDArray[np.int32]:
     """(size,) whole numbers, all of one value."""
     array = np.empty(size, np.int32)
@@ -17,7 +17,7 @@ def ints(size: int, value: int) -> NDArray[np.int32]:
     return array
 
 
-@part
+@helper
 def floats(size: int, value: float) -> Floats:
     """(size,) numbers, all of one value."""
     array = np.empty(size, np.float64)
@@ -26,7 +26,7 @@ def floats(size: int, value: float) -> Floats:
     return array
 
 
-@part
+@helper
 def table(rows: int, columns: int) -> Floats:
     """(rows, columns) zeros."""
     array = np.empty((rows, columns), np.float64)
@@ -36,7 +36,7 @@ def table(rows: int, columns: int) -> Floats:
     return array
 
 
-@part
+@helper
 def int_table(rows: int, columns: int) -> NDArray[np.int32]:
     """(rows, columns) whole numbers, zeros."""
     array = np.empty((rows, columns), np.int32)
@@ -46,7 +46,7 @@ def int_table(rows: int, columns: int) -> NDArray[np.int32]:
     return array
 
 
-@part
+@helper
 def longs(size: int, value: int) -> NDArray[np.int64]:
     """(size,) whole numbers of 64 bits, all of one value."""
     array = np.empty(size, np.int64)
@@ -55,7 +55,7 @@ def longs(size: int, value: int) -> NDArray[np.int64]:
     return array
 
 
-@part
+@helper
 def flags(size: int) -> NDArray[np.bool_]:
     """(size,) False."""
     array = np.empty(size, np.bool_)
@@ -64,7 +64,7 @@ def flags(size: int) -> NDArray[np.bool_]:
     return array
 
 
-@vector_part
+@no_nrt
 def dot(x: Floats, y: Floats, z: Floats, d: Floats, out: Floats) -> None:
     """Products of (n,) vectors given by their coordinates with one vector."""
     d0, d1, d2 = d[0], d[1], d[2]

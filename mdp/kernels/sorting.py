@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import longs
-from mdp.kernels.kernel import borrower, part
+from mdp.kernels.kernel import helper, no_nrt
 
 
-@part
+@helper
 def counting_sort(keys: NDArray[Any], bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Items sorted by their keys 0 <= key < bins: bin b holds items[first[b] : first[b + 1]], in rising order.
 
@@ -18,7 +18,7 @@ def counting_sort(keys: NDArray[Any], bins: int) -> tuple[NDArray[np.int64], NDA
     return sort_into_bins(keys, keys, bins)
 
 
-@part
+@helper
 def sort_into_bins(low: NDArray[Any], high: NDArray[Any], bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Items sorted into all bins low[k] .. high[k] that item k touches, both included, none where high < low (counting sort).
 
@@ -39,7 +39,7 @@ def sort_into_bins(low: NDArray[Any], high: NDArray[Any], bins: int) -> tuple[ND
     return first, items
 
 
-@borrower
+@no_nrt
 def rank(values: NDArray[Any], x: float, equal: bool) -> int:
     """How many of the rising values lie below x, those equal to it counted or not (binary search)."""
     low, high = 0, len(values)
@@ -52,7 +52,7 @@ def rank(values: NDArray[Any], x: float, equal: bool) -> int:
     return low
 
 
-@borrower
+@no_nrt
 def sort(values: NDArray[Any], begin: int, end: int) -> None:
     """Bring values[begin:end] into rising order, in place (Shell 1959)."""
     gap = (end - begin) // 2
@@ -66,7 +66,7 @@ def sort(values: NDArray[Any], begin: int, end: int) -> None:
         gap = 1 if gap == 2 else gap * 5 // 11
 
 
-@part
+@helper
 def argsort(keys: NDArray[Any]) -> NDArray[np.int64]:
     """(n,) numbers of the keys in rising order, equal keys as they come (merge sort from the bottom up)."""
     order, spare = longs(len(keys), 0), longs(len(keys), 0)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.kernel import borrower, inlined, part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import LinkedFaces
 
@@ -36,7 +36,7 @@ class View(NamedTuple):
     point: Floats
 
 
-@part
+@helper
 def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
     """The way down a face from a place on its edge: ANCHORED where it goes ANCHOR_MM deep, to the base or to what has solid
     beneath it; the number of the patch on which it ends before, LOOSE where that is the own one or none."""
@@ -71,13 +71,13 @@ def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
     return LOOSE
 
 
-@borrower
+@no_nrt
 def corner_of(surface: LinkedFaces, f: int, v: int) -> int:
     """The corner of a face at a vertex."""
     return 0 if surface.faces[f, 0] == v else (1 if surface.faces[f, 1] == v else 2)
 
 
-@part
+@helper
 def outflow(view: View, f: int, corner: int) -> float:
     """How fast water on a face runs out over the edge that begins at a corner; below 0: away from it."""
     vertices, faces, normals, d = view.surface.vertices, view.surface.faces, view.surface.normals, view.direction
@@ -89,13 +89,13 @@ def outflow(view: View, f: int, corner: int) -> float:
     return -(d[0] * p + d[1] * q + d[2] * r) / np.sqrt(size) if size > 0.0 else 0.0
 
 
-@inlined
+@no_nrt
 def _across(x: float, y: float, z: float, nx: float, ny: float, nz: float) -> tuple[float, float, float]:
     """The vector in a face's plane across an edge and out of the face."""
     return y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
 
 
-@borrower
+@no_nrt
 def _put(view: View, f: int, corner: int, share: float) -> float:
     """Go to a place on the edge that begins at a corner; its height."""
     a, b = view.surface.faces[f, corner], view.surface.faces[f, (corner + 1) % 3]
@@ -105,7 +105,7 @@ def _put(view: View, f: int, corner: int, share: float) -> float:
     return float(view.heights[a] + share * (view.heights[b] - view.heights[a]))
 
 
-@part
+@helper
 def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int, float]:
     """The edge, by the corner it begins at, over which water at a point leaves a face, and where on it; -1: none."""
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
@@ -127,7 +127,7 @@ def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int,
     return way_out, min(max(share, 0.0), 1.0)
 
 
-@borrower
+@no_nrt
 def _lower_end(view: View, f: int, corner: int, share: float) -> int:
     """The vertex where water goes on: the end of an edge at which it is, or else the lower one; of a face with no way out its
     lowest corner."""
@@ -143,7 +143,7 @@ def _lower_end(view: View, f: int, corner: int, share: float) -> int:
     return int(a if heights[a] <= heights[b] else b)
 
 
-@part
+@helper
 def _turn(surface: LinkedFaces, first: int, f: int, v: int, forward: bool) -> tuple[int, bool]:
     """The next face around a vertex after one of them, -1 when all were seen; at an open edge the other way round from the
     first."""
@@ -155,7 +155,7 @@ def _turn(surface: LinkedFaces, first: int, f: int, v: int, forward: bool) -> tu
     return (int(g), forward) if g >= 0 and g != first else (-1, forward)
 
 
-@part
+@helper
 def _steepest(view: View, first: int, v: int) -> tuple[int, int]:
     """Where water leaves a vertex: a face and the vertex itself, or a face and the other end of its edge; -1: nowhere."""
     surface, best, way, end = view.surface, LEVEL, -1, v
@@ -176,7 +176,7 @@ def _steepest(view: View, first: int, v: int) -> tuple[int, int]:
     return way, end
 
 
-@borrower
+@no_nrt
 def _slope(view: View, v: int, w: int) -> float:
     """How steep it goes down from one vertex to another."""
     length = 0.0
@@ -185,14 +185,14 @@ def _slope(view: View, v: int, w: int) -> float:
     return float((view.heights[v] - view.heights[w]) / np.sqrt(length)) if length > 0.0 else 0.0
 
 
-@part
+@helper
 def _begins_within(view: View, f: int, corner: int) -> bool:
     """Whether water at a corner of a face runs into it: out over neither of the edges there."""
     before = (corner + 2) % 3
     return outflow(view, f, corner) <= ASIDE and outflow(view, f, before) <= ASIDE and view.surface.areas_mm2[f] > 0.0
 
 
-@borrower
+@no_nrt
 def _end_on_face(view: View, f: int, own: int) -> int:
     """What a way comes to that ends on a level face."""
     if view.cosines[f] > 0.0:
@@ -200,13 +200,13 @@ def _end_on_face(view: View, f: int, own: int) -> int:
     return int(view.number[f]) if _is_others(view, f, own) else LOOSE
 
 
-@borrower
+@no_nrt
 def _is_others(view: View, f: int, own: int) -> bool:
     """Whether a face belongs to another patch."""
     return bool(view.number[f] != SAFE and view.number[f] != own)
 
 
-@borrower
+@no_nrt
 def _end_at_vertex(view: View, first: int, v: int, own: int) -> int:
     """What a way comes to that ends at a vertex: a patch about it, or else the solid beneath a pit."""
     f, forward, pit = first, True, False

@@ -6,7 +6,7 @@ some height and hangs together with a bottom does not depend on how it is cut in
 
 from typing import NamedTuple
 
-from mdp.kernels.kernel import borrower
+from mdp.kernels.kernel import no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.topology.linked_faces import LinkedFaces
 
@@ -22,7 +22,7 @@ class Pool(NamedTuple):
     queue: Ints
 
 
-@borrower
+@no_nrt
 def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool, base_mm: float) -> bool:
     """Whether a patch has a bottom in the air."""
     for f in patch:
@@ -34,7 +34,7 @@ def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool
     return False
 
 
-@borrower
+@no_nrt
 def _is_bottom(surface: LinkedFaces, heights: Floats, v: int) -> bool:
     """Whether no vertex next to one lies lower."""
     at, end = surface.starts[v], surface.starts[v + 1]
@@ -43,7 +43,7 @@ def _is_bottom(surface: LinkedFaces, heights: Floats, v: int) -> bool:
     return bool(at == end)
 
 
-@borrower
+@no_nrt
 def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool, base_mm: float) -> bool:
     """Whether what hangs together with a bottom and lies no higher than DIP_MM above it goes on below it or to the base. If so,
     it has been seen, as far as one had to look."""
@@ -66,7 +66,7 @@ def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool,
     return False
 
 
-@borrower
+@no_nrt
 def _leads_out(seen_bottom: int, bottom: int, heights: Floats) -> bool:
     """Whether another bottom as low, which has a way out, has been found."""
     return bool(seen_bottom != UNSEEN and seen_bottom != bottom and abs(heights[seen_bottom] - heights[bottom]) <= ROUNDING_MM)

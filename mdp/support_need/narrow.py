@@ -1,7 +1,7 @@
 """Narrow: whether a hanging place reaches nowhere far from its anchors (numba kernels)."""
 
 from mdp.kernels.arrays import table
-from mdp.kernels.kernel import borrower, part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.support_need.spans import Sides
 
@@ -10,7 +10,7 @@ ROUNDING_MM = 1e-6  # a place just as far from a side as it may be
 DEEP = 64  # halvings of a triangle, one within the other
 
 
-@borrower
+@no_nrt
 def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Floats, nearest: int) -> int:
     """An anchor within reach of a triangle (6,), x, y of its corners, all of which lies within reach of anchors; -1: some of it
     does not. nearest: the anchor to try first; todo (DEEP, 6): room for triangles."""
@@ -36,13 +36,13 @@ def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Float
     return nearest
 
 
-@part
+@helper
 def triangles_room() -> Floats:
     """Room for the triangles of is_near_anchors."""
     return table(DEEP, 6)
 
 
-@borrower
+@no_nrt
 def _halve(todo: Floats, at: int, split: int) -> None:
     """Put the halves of a triangle in its place and the one after it, cut through the middle of an edge."""
     a, b, c = 2 * split, 2 * ((split + 1) % 3), 2 * ((split + 2) % 3)
@@ -52,7 +52,7 @@ def _halve(todo: Floats, at: int, split: int) -> None:
         todo[at, b + axis] = middle
 
 
-@borrower
+@no_nrt
 def _all_near_one(sides: Sides, t: Floats, reach_mm: float, first: int) -> bool:
     """Whether one anchor lies near all corners of a triangle, and so near all of it."""
     ends, anchored, count = sides.ends, sides.anchored, len(sides.anchored)
@@ -67,7 +67,7 @@ def _all_near_one(sides: Sides, t: Floats, reach_mm: float, first: int) -> bool:
     return False
 
 
-@borrower
+@no_nrt
 def _near_anchor(ends: Floats, anchored: Ints, x: float, y: float, reach_mm: float, first: int) -> int:
     """A anchored side within reach of a place, looked for from a side on; -1: none."""
     count = len(anchored)
@@ -78,7 +78,7 @@ def _near_anchor(ends: Floats, anchored: Ints, x: float, y: float, reach_mm: flo
     return -1
 
 
-@borrower
+@no_nrt
 def _is_near(ends: Floats, e: int, x: float, y: float, reach_mm: float) -> bool:
     """Whether a place lies within reach of a side."""
     ax, ay, bx, by = ends[e, 0], ends[e, 1], ends[e, 2] - ends[e, 0], ends[e, 3] - ends[e, 1]

@@ -11,7 +11,7 @@ import numpy as np
 
 from mdp.directions.frame import FramedDirections
 from mdp.kernels.arrays import floats, table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.support_need.patches import Classes
 from mdp.topology.linked_faces import LinkedFaces
@@ -69,14 +69,14 @@ def find_over_air(
             out[row, f] = int(counts.airy_area[p] > MOST * counts.area[p] if few else counts.airy[p] > MOST * counts.sampled[p])
 
 
-@part
+@helper
 def _no_counts(count: int) -> Counts:
     """Of so many flat places."""
     zeros = table(4, count)
     return Counts(floats(count, np.inf), floats(count, -np.inf), zeros[0], zeros[1], zeros[2], zeros[3])
 
 
-@borrower
+@no_nrt
 def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Counts) -> None:
     """How low and how high the flat places reach."""
     for f in range(len(faces)):
@@ -86,13 +86,13 @@ def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Counts) -> No
             counts.least[p], counts.most[p] = min(counts.least[p], z), max(counts.most[p], z)
 
 
-@borrower
+@no_nrt
 def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
     """Whether nothing in the cell of a place that looks up lies lower."""
     return bool(lowest[int(y) * (CELLS + 2) + int(x)] > z)
 
 
-@borrower
+@no_nrt
 def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: int, counts: Counts) -> None:
     """Look down from those places of a raster that lie on a face, one row after the other."""
     a, b, c = face[0], face[1], face[2]
@@ -118,7 +118,7 @@ def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: in
                 counts.airy[patch] += int(_is_airy(lowest, x, y, z - slack_mm))
 
 
-@borrower
+@no_nrt
 def _share_over_air(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> float:
     """The share of a small face over air, by its middle and places near its corners."""
     airy = 0
@@ -132,7 +132,7 @@ def _share_over_air(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -
     return 0.25 * airy
 
 
-@part
+@helper
 def _see(vertices: Floats, d: Floats, frame: Floats, seen: Floats) -> float:
     """Fill the places of the vertices in cells across the direction and their heights in mm; the size of a cell, mm."""
     low, high = floats(2, np.inf), floats(2, -np.inf)
@@ -149,7 +149,7 @@ def _see(vertices: Floats, d: Floats, frame: Floats, seen: Floats) -> float:
     return cell
 
 
-@borrower
+@no_nrt
 def _lay(seen: Floats, face: Ints, least: float, most: float, lowest: Floats) -> None:
     """Lay a face into the cells that it touches of the grid of lowest surfaces, as high as its plane is at their middles, within
     the extent of its flat place."""

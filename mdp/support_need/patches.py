@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mdp.directions.frame import FramedDirections
 from mdp.kernels.arrays import dot, floats, ints
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.support_need.descent import SAFE, View
 from mdp.support_need.dips import UNSEEN, Pool, begins_in_air
@@ -78,7 +78,7 @@ def classify(begin_row: int, end_row: int, surface: LinkedFaces, along: FramedDi
                     out[row, f] = CARRIES_ITSELF
 
 
-@borrower
+@no_nrt
 def _find_risky(view: View, risky_below: float, risky: Ints) -> int:
     """List the faces that overhang and rest on nothing, UNNUMBERED, all others SAFE; how many there are."""
     faces, heights, cosines, number, many = view.surface.faces, view.heights, view.cosines, view.number, 0
@@ -97,7 +97,7 @@ def _find_risky(view: View, risky_below: float, risky: Ints) -> int:
     return many - resting
 
 
-@borrower
+@no_nrt
 def _find_patches(view: View, risky: Ints, patches: Patches) -> int:
     """Number all overhanging faces, those alike that hang together; how many patches there are."""
     neighbours, number, faces, own, size, at = view.surface.neighbours, view.number, patches.faces, 0, 0, 0
@@ -118,7 +118,7 @@ def _find_patches(view: View, risky: Ints, patches: Patches) -> int:
     return own
 
 
-@part
+@helper
 def _measure(view: View, patches: Patches, own: int, frame: Floats) -> Patch:
     """A patch along the direction."""
     vertices, corners, neighbours = view.surface.vertices, view.surface.faces, view.surface.neighbours
@@ -137,7 +137,7 @@ def _measure(view: View, patches: Patches, own: int, frame: Floats) -> Patch:
     return Patch(own, faces, frame, area, high - low, around)
 
 
-@part
+@helper
 def _carries_itself(view: View, patches: Patches, patch: Patch, pool: Pool, limits: Limits) -> bool:
     if patch.area_mm2 < limits.least_mm2 - ROUNDING_MM2:
         return True
@@ -154,7 +154,7 @@ def _carries_itself(view: View, patches: Patches, patch: Patch, pool: Pool, limi
     return True
 
 
-@part
+@helper
 def _is_held(view: View, patch: Patch, sides: Sides, longest_mm: float, width_mm: float) -> bool:
     """Whether a patch is narrow or lines span it."""
     reach_mm = NARROW * width_mm
@@ -163,7 +163,7 @@ def _is_held(view: View, patch: Patch, sides: Sides, longest_mm: float, width_mm
     return spans(sides, patch.area_mm2, longest_mm, width_mm)
 
 
-@part
+@helper
 def _is_narrow(surface: LinkedFaces, patch: Patch, sides: Sides, reach_mm: float) -> bool:
     """Whether no place of a patch lies further than that from the nearest anchor."""
     todo, triangle, nearest = triangles_room(), floats(6, 0.0), 0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import borrower, part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.support_need.descent import ANCHORED, LOOSE, SAFE, View, corner_of, descend, outflow
 from mdp.support_need.spans import Sides
@@ -31,14 +31,14 @@ class Patches(NamedTuple):
     waiting: Ints
 
 
-@borrower
+@no_nrt
 def is_rim(neighbours: Ints, number: Ints, f: int, corner: int) -> bool:
     """Whether a patch ends at the edge of its face that begins at a corner."""
     g = neighbours[f, corner]
     return bool(g < 0 or number[g] == SAFE)
 
 
-@part
+@helper
 def seen_along(vertices: Floats, v: int, frame: Floats) -> tuple[float, float]:
     """A vertex seen along the direction."""
     x: float = vertices[0, v] * frame[0, 0] + vertices[1, v] * frame[0, 1] + vertices[2, v] * frame[0, 2]
@@ -46,7 +46,7 @@ def seen_along(vertices: Floats, v: int, frame: Floats) -> tuple[float, float]:
     return x, y
 
 
-@part
+@helper
 def find_sides(view: View, patches: Patches, own: int, frame: Floats, at_best: bool) -> Sides:
     """The sides of a patch seen along the direction, cut where anchors end. at_best: anchored wherever the solid goes down beside
     them at all: found at once, and most patches cannot do with these either."""
@@ -78,7 +78,7 @@ def find_sides(view: View, patches: Patches, own: int, frame: Floats, at_best: b
     return Sides(ends[:count], anchored[:count])
 
 
-@part
+@helper
 def _see_edge(view: View, f: int, corner: int, frame: Floats, line: Floats) -> None:
     """An edge seen along the direction, x, y, x, y."""
     vertices, faces = view.surface.vertices, view.surface.faces
@@ -86,7 +86,7 @@ def _see_edge(view: View, f: int, corner: int, frame: Floats, line: Floats) -> N
     line[2], line[3] = seen_along(vertices, faces[f, (corner + 1) % 3], frame)
 
 
-@part
+@helper
 def _add(ends: Floats, count: int, line: Floats, begin: float, end: float) -> int:
     """Add the piece of a line between two shares of it; how many there are then."""
     for axis in range(2):
@@ -95,7 +95,7 @@ def _add(ends: Floats, count: int, line: Floats, begin: float, end: float) -> in
     return count + 1
 
 
-@part
+@helper
 def _length(view: View, f: int, corner: int) -> float:
     """Of an edge, mm."""
     a, b, squared = view.surface.faces[f, corner], view.surface.faces[f, (corner + 1) % 3], 0.0
@@ -104,7 +104,7 @@ def _length(view: View, f: int, corner: int) -> float:
     return float(np.sqrt(squared))
 
 
-@part
+@helper
 def _count_samples(view: View, f: int, corner: int) -> int:
     """At how many places of an edge of the rim one looks down: both its ends and no further than STEP_MM apart."""
     g = view.surface.neighbours[f, corner]
@@ -114,7 +114,7 @@ def _count_samples(view: View, f: int, corner: int) -> int:
     return 1 if length_mm <= SHORT_MM else int(np.ceil(length_mm / STEP_MM)) + 1
 
 
-@part
+@helper
 def _share(view: View, f: int, corner: int, k: int, samples: int) -> float:
     """Where on an edge the place k lies at which one looks down; those at its ends a little within it."""
     if samples == 1:
@@ -123,13 +123,13 @@ def _share(view: View, f: int, corner: int, k: int, samples: int) -> float:
     return min(max(k / (samples - 1), inside), 1.0 - inside)
 
 
-@borrower
+@no_nrt
 def rests(faces: Ints, heights: Floats, f: int, base_mm: float) -> bool:
     """Whether all of a face lies on the base."""
     return bool(max(heights[faces[f, 0]], heights[faces[f, 1]], heights[faces[f, 2]]) <= base_mm)
 
 
-@part
+@helper
 def _may_anchor(view: View, f: int, corner: int) -> bool:
     """Whether the surface beyond an edge of a patch's rim goes down from it or rests on the base."""
     surface, g = view.surface, view.surface.neighbours[f, corner]
@@ -139,7 +139,7 @@ def _may_anchor(view: View, f: int, corner: int) -> bool:
     return bool(down or rests(surface.faces, view.heights, g, view.base_mm))
 
 
-@part
+@helper
 def _find_change(view: View, patches: Patches, f: int, corner: int, low: float, high: float) -> float:
     """Where between two places of an edge an anchor ends or begins."""
     first = _is_anchored(view, patches, f, corner, low)
@@ -152,14 +152,14 @@ def _find_change(view: View, patches: Patches, f: int, corner: int, low: float, 
     return 0.5 * (low + high)
 
 
-@part
+@helper
 def _is_anchored(view: View, patches: Patches, f: int, corner: int, share: float) -> bool:
     """Whether a place of a patch's rim is an anchor."""
     end = _look_down(view, f, corner, share)
     return end == ANCHORED or (end > 0 and _is_held(view, patches, end))
 
 
-@part
+@helper
 def _look_down(view: View, f: int, corner: int, share: float) -> int:
     """What the way down beyond a place of a patch's rim comes to."""
     if not _may_anchor(view, f, corner):
@@ -170,7 +170,7 @@ def _look_down(view: View, f: int, corner: int, share: float) -> int:
     return descend(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3]), 1.0 - share, view.number[f])
 
 
-@part
+@helper
 def _is_held(view: View, patches: Patches, asked: int) -> bool:
     """Whether a patch has an anchor somewhere, or rests on another one that has."""
     if patches.held[asked] == UNKNOWN:

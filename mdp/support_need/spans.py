@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints
-from mdp.kernels.kernel import part
+from mdp.kernels.kernel import helper
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Ints
 
@@ -25,7 +25,7 @@ class Sides(NamedTuple):
     anchored: Ints
 
 
-@part
+@helper
 def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> bool:
     """Whether lines of one direction span a place of that area, none longer than that; they lie a line width apart or further."""
     if longest_mm <= 0.0 or len(sides.anchored) == 0:
@@ -43,7 +43,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
     return False
 
 
-@part
+@helper
 def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
     """How far the sides reach across lines at an angle, all together and those that are no anchors."""
     ends, whole, loose = sides.ends, 0.0, 0.0
@@ -54,7 +54,7 @@ def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
     return whole, loose
 
 
-@part
+@helper
 def _angles(ends: Floats) -> Floats:
     """Directions worth trying, radians: along and across the two that most of the rim runs in, and others evenly."""
     length, turned = floats(BINS, 0.0), floats(BINS, 0.0)
@@ -79,7 +79,7 @@ def _angles(ends: Floats) -> Floats:
     return angles
 
 
-@part
+@helper
 def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_mm: float) -> bool:
     """Whether lines at an angle span the place. The middle line is tried first, it tells the most."""
     ends, count = sides.ends, len(sides.anchored)

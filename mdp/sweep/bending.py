@@ -14,7 +14,7 @@ import numpy as np
 
 from mdp.directions.frame import frame_across
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
@@ -64,7 +64,7 @@ def _most_stress(faces: Ints, heights: Floats, across: Floats, crumb: float, cou
     return most
 
 
-@part
+@helper
 def _find_shells(faces: Ints, heights: Floats) -> Ints:
     """(n,) for vertices above 0 one that stands for all that edges above 0 join them with, -1 for the others."""
     shells = ints(len(heights), -1)
@@ -82,7 +82,7 @@ def _find_shells(faces: Ints, heights: Floats) -> Ints:
     return shells
 
 
-@part
+@helper
 def _measure(faces: Ints, heights: Floats, across: Floats, shells: Ints) -> tuple[Floats, Section]:
     """(n,) the volume between each shell and the plane, below 0 where the solid lies outside, and the section."""
     volumes, count = floats(len(heights), 0.0), 0
@@ -100,7 +100,7 @@ def _measure(faces: Ints, heights: Floats, across: Floats, shells: Ints) -> tupl
     return volumes, section
 
 
-@borrower
+@no_nrt
 def _volume(faces: Ints, f: int, heights: Floats, across: Floats) -> float:
     """What a face adds to the volume above the plane: its area seen along the normal times the heights of what lies above."""
     total, alone, above = 0.0, 0.0, 0
@@ -115,7 +115,7 @@ def _volume(faces: Ints, f: int, heights: Floats, across: Floats) -> float:
     return float(twice * (alone if above == 1 else total - alone) / 6.0)
 
 
-@part
+@helper
 def _cross(faces: Ints, f: int, heights: Floats, across: Floats, shells: Ints, section: Section, at: int) -> int:
     """Put the segment in which a face crosses height 0 at a place of the section; 1 where it does, else 0."""
     crosses = 0
@@ -130,7 +130,7 @@ def _cross(faces: Ints, f: int, heights: Floats, across: Floats, shells: Ints, s
     return crosses
 
 
-@part
+@helper
 def _find_pieces(section: Section, volumes: Floats) -> None:
     """Give the segments of every void to the piece around it, -1 where there is none: of the shells in whose section the void's
     lies the one with the least."""
@@ -148,7 +148,7 @@ def _find_pieces(section: Section, volumes: Floats) -> None:
         shells[k] = holders[shells[k]]
 
 
-@borrower
+@no_nrt
 def _find_holder(section: Section, volumes: Floats, areas: Floats, around: Ints, own: int) -> int:
     """The shell of positive volume and least area whose outline runs around the middle of a segment. around: zeros, (n,)."""
     segments, shells = section
@@ -189,7 +189,7 @@ def greatest_stress_per_moment(edges: Floats) -> float:
     return greatest if len(edges) > 0 else np.inf
 
 
-@borrower
+@no_nrt
 def add_edge(edge: Floats, moments: Floats) -> None:
     """Add what an edge, x, y, x, y, has of a section's MOMENTS."""
     p, q, r, s = edge[0], edge[1], edge[2], edge[3]
@@ -202,7 +202,7 @@ def add_edge(edge: Floats, moments: Floats) -> None:
     moments[XY] += (p * s + 2.0 * p * q + 2.0 * r * s + r * q) * twice / 24.0
 
 
-@borrower
+@no_nrt
 def stress_per_moment(moments: Floats, x: float, y: float) -> float:
     """|J^-1 p| of a point p of a section, 1/mm3; infinite where the section has no second moments."""
     area = moments[AREA]

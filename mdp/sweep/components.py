@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import int_table, ints
-from mdp.kernels.kernel import borrower, inlined, part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.overhang import PLATFORM_TOLERANCE_MM
@@ -56,7 +56,7 @@ class MergeTree(NamedTuple):
     up: bool
 
 
-@borrower
+@no_nrt
 def find_critical(cosines: Floats, flatness: Floats, heights: Floats, rings: Rings, critical: Ints) -> int:
     """Vertices that are not regular, or have no single ring of neighbours; returns how many. cosines: of vertex normals and d."""
     starts, neighbours = rings.starts, rings.neighbours
@@ -75,21 +75,21 @@ def find_critical(cosines: Floats, flatness: Floats, heights: Floats, rings: Rin
     return many
 
 
-@inlined
+@no_nrt
 def before(heights: Floats, a: int, b: int, up: bool) -> bool:
     """Whether a comes before b: strictly lower, ties by number; the reverse for a sweep from the top (up)."""
     lower: bool = heights[a] < heights[b] or (heights[a] == heights[b] and a < b)
     return lower != up
 
 
-@part
+@helper
 def grow_tree(view: View, rings: Rings, up: bool) -> MergeTree:
     """A merge tree of which nothing is known yet."""
     heights = view.grid.heights
     return MergeTree(heights, rings, view.critical, ints(len(heights), -1), ints(len(heights), 0), up)
 
 
-@borrower
+@no_nrt
 def find_leaf(tree: MergeTree, v: int) -> int:
     """The leaf of a vertex; labels all vertices on the way. The vertices that are leaves are labelled already."""
     heights, starts, neighbours = tree.heights, tree.rings.starts, tree.rings.neighbours
@@ -107,7 +107,7 @@ def find_leaf(tree: MergeTree, v: int) -> int:
     return int(leaf[v])
 
 
-@part
+@helper
 def number_leaves(tree: MergeTree) -> Ints:
     """Number the vertices at which components begin; returns them."""
     starts, neighbours = tree.rings.starts, tree.rings.neighbours
@@ -123,7 +123,7 @@ def number_leaves(tree: MergeTree) -> Ints:
     return leaves[:size]
 
 
-@part
+@helper
 def join_at_saddles(tree: MergeTree) -> Ints:
     """(j, 3): two leaves whose components meet, and the vertex at which they do."""
     starts, neighbours = tree.rings.starts, tree.rings.neighbours
@@ -144,7 +144,7 @@ def join_at_saddles(tree: MergeTree) -> Ints:
     return joins[:size]
 
 
-@part
+@helper
 def anchor_of(topology: Topology, v: int) -> int:
     """The face that a ray from a vertex into the solid meets; below 0: none."""
     if topology.anchors[v] == UNKNOWN:
@@ -154,7 +154,7 @@ def anchor_of(topology: Topology, v: int) -> int:
     return int(topology.anchors[v])
 
 
-@part
+@helper
 def join_to_anchors(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floats) -> Ints:
     """(j, 3): the leaf at a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
     heights, faces, up = tree.heights, topology.triangles.faces, tree.up
@@ -178,7 +178,7 @@ def join_to_anchors(tree: MergeTree, leaves: Ints, topology: Topology, cosines: 
     return joins[:size]
 
 
-@part
+@helper
 def join_leaves(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floats) -> Ints:
     """(j, 3): two leaves whose components join, at a saddle or through solid, and the vertex at which they do."""
     saddles, anchored = join_at_saddles(tree), join_to_anchors(tree, leaves, topology, cosines)
@@ -192,7 +192,7 @@ def join_leaves(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floa
     return joins
 
 
-@part
+@helper
 def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
     """The first column that is not below each join."""
     columns = ints(len(joins), 0)
@@ -201,7 +201,7 @@ def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
     return columns
 
 
-@borrower
+@no_nrt
 def _stands_on(tree: MergeTree, v: int, vertices: Floats) -> bool:
     """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
     starts, neighbours = tree.rings.starts, tree.rings.neighbours
@@ -212,7 +212,7 @@ def _stands_on(tree: MergeTree, v: int, vertices: Floats) -> bool:
     return False
 
 
-@part
+@helper
 def count_pieces(topology: Topology, view: View, pieces: Ints) -> None:
     """Components below each offset that do not reach the platform."""
     heights, n = view.grid.heights, view.grid.columns
@@ -231,7 +231,7 @@ def count_pieces(topology: Topology, view: View, pieces: Ints) -> None:
     _count(begun, standing_from, joins, join_columns(joins, view.grid), pieces[:n])
 
 
-@part
+@helper
 def _count(begun: Ints, standing_from: Ints, joins: Ints, columns: Ints, pieces: Ints) -> None:
     """Join leaves in the order of the offsets and count the components that hang free."""
     size, n = len(begun), len(pieces)

@@ -9,7 +9,7 @@ single piece stands on the whole section.
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import borrower, part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.sweep.components import (
@@ -29,7 +29,7 @@ from mdp.topology.union_find import root, singletons
 LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
 
 
-@part
+@helper
 def find_contact_areas(rows: Rows, topology: Topology, view: View, crumb: float, wanted: Ints, contact_area: Floats) -> None:
     """Lower each offset's contact area, given as its section, to the least section of a piece above it that is at least `crumb`
     steps high.
@@ -80,7 +80,7 @@ def find_contact_areas(rows: Rows, topology: Topology, view: View, crumb: float,
                 contact_area[column] = min(contact_area[column], areas[starts[piece] + column - ended[piece]])
 
 
-@part
+@helper
 def _find_lifetimes(leaves: Ints, joins: Ints, grid: OffsetGrid) -> tuple[Ints, Ints, Ints]:
     """For every leaf: the column below which it begins, the one below which it has gone, and the leaf it goes into."""
     heights, n, size = grid.heights, grid.columns, len(leaves)
@@ -99,7 +99,7 @@ def _find_lifetimes(leaves: Ints, joins: Ints, grid: OffsetGrid) -> tuple[Ints, 
     return begun, ended, elder
 
 
-@part
+@helper
 def _count_several(begun: Ints, ended: Ints, wanted: Ints) -> Ints:
     """(n + 1,) how many of the wanted columns before each have several pieces above them."""
     n = len(wanted)
@@ -115,7 +115,7 @@ def _count_several(begun: Ints, ended: Ints, wanted: Ints) -> Ints:
     return several
 
 
-@borrower
+@no_nrt
 def _section(points: Floats, face: tuple[int, int, int], grid: OffsetGrid, column: int, ends: Floats) -> float:
     """A face's share of the area within the section's outline: half the triangle of its crossing segment and the origin."""
     (i, j, k), heights, d = face, grid.heights, grid.direction

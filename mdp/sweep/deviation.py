@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdp.kernels.arrays import ints
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Mesh
 from mdp.sweep.rays import DEPTH, LEAF_FACES, TriangleTree, triangle_tree
@@ -41,7 +41,7 @@ def _nearest(begin: int, end: int, tree: TriangleTree, places: Floats, reach_2: 
         out[k] = least
 
 
-@borrower
+@no_nrt
 def _from_box(tree: TriangleTree, node: int, place: Floats) -> float:
     """Squared distance of a place from a node's box."""
     total = 0.0
@@ -51,7 +51,7 @@ def _from_box(tree: TriangleTree, node: int, place: Floats) -> float:
     return total
 
 
-@borrower
+@no_nrt
 def _from_face(p: Floats, q: Floats, r: Floats, place: Floats) -> float:
     """Squared distance of a place from a triangle: from its plane where the place lies over it, else from its nearest edge."""
     ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -69,7 +69,7 @@ def _from_face(p: Floats, q: Floats, r: Floats, place: Floats) -> float:
     return min(_from_edge(p, q, place), _from_edge(q, r, place), _from_edge(r, p, place))
 
 
-@borrower
+@no_nrt
 def _from_edge(p: Floats, q: Floats, place: Floats) -> float:
     """Squared distance of a place from a line between two points."""
     along, length = 0.0, 0.0

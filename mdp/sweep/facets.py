@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, ints, longs, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
@@ -216,7 +216,7 @@ def _flatness(vertices: Floats, faces: Ints, normals: Floats, vertex_normals: Fl
     return flat
 
 
-@borrower
+@no_nrt
 def _altitude(p: Floats, q: Floats, r: Floats) -> float:
     """Least altitude of a triangle."""
     ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]

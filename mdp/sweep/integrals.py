@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import dot, floats, int_table, table
-from mdp.kernels.kernel import inlined, part, vector_part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask
 from mdp.support_need.patches import NEEDS_SUPPORT, Classes
@@ -78,7 +78,7 @@ class Block(NamedTuple):
     crossed: Ints
 
 
-@vector_part
+@no_nrt
 def find_heights(x: Floats, y: Floats, z: Floats, d: Floats, step: float, heights: Floats) -> tuple[int, int]:
     """Fill the heights of all vertices; returns the first offset's number and the count of offsets in between."""
     d0, d1, d2 = d[0], d[1], d[2]
@@ -92,7 +92,7 @@ def find_heights(x: Floats, y: Floats, z: Floats, d: Floats, step: float, height
     return begin, max(int(np.ceil(most)) - begin, 0)
 
 
-@vector_part
+@no_nrt
 def _range(values: Floats) -> tuple[float, float]:
     """Least and greatest value; four of each, for one alone waits for the value before."""
     a, b, c, d = 1e300, 1e300, 1e300, 1e300
@@ -106,20 +106,20 @@ def _range(values: Floats) -> tuple[float, float]:
     return min(a, b, c, d), max(p, q, r, s)
 
 
-@inlined
+@no_nrt
 def column_over(height: float) -> int:
     """The number of offsets strictly below a height: the first column that is not below it."""
     return max(int(np.ceil(height)), 0)
 
 
-@part
+@helper
 def cut_block(rows: Floats, places: Ints, size: int) -> Block:
     """A block of `size` faces in (6, BLOCK) and (2, BLOCK) arrays."""
     low, middle, high = rows[0, :size], rows[1, :size], rows[2, :size]
     return Block(low, middle, high, rows[3, :size], rows[4, :size], rows[5, :size], places[0, :size], places[1, :size])
 
 
-@vector_part
+@no_nrt
 def sort_heights(a: Indices, b: Indices, c: Indices, heights: Floats, block: Block) -> None:
     low, middle, high = block.low, block.middle, block.high
     for k in range(len(low)):
@@ -129,7 +129,7 @@ def sort_heights(a: Indices, b: Indices, c: Indices, heights: Floats, block: Blo
         middle[k] = max(least, min(most, r))
 
 
-@vector_part
+@no_nrt
 def find_ramps(block: Block) -> None:
     """The first column each face crosses and how many, and the two factors of its share above an offset."""
     low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
@@ -144,20 +144,20 @@ def find_ramps(block: Block) -> None:
         crossed[k] = np.int32(max(np.ceil(high[k]), 0.0)) - np.int32(first)
 
 
-@inlined
+@no_nrt
 def share_above(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
     """Share of a face above an offset that it crosses."""
     return 1.0 - (c - low) * (c - low) * rise if c < middle else (high - c) * (high - c) * fall
 
 
-@inlined
+@no_nrt
 def moment_above(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
     """First moment about an offset of the share of a face above it."""
     mean, up, down = (low + middle + high) * THIRD, c - low, high - c
     return mean - c + up * up * rise * up * THIRD if c < middle else down * down * fall * down * THIRD
 
 
-@vector_part
+@no_nrt
 def _weigh(ahead: float, block: Block, area: Floats, moment: Floats) -> None:
     """Weighted share and moment of each face above the column that lies `ahead` columns after its first."""
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
@@ -168,7 +168,7 @@ def _weigh(ahead: float, block: Block, area: Floats, moment: Floats) -> None:
         moment[k] = inside * moment_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@vector_part
+@no_nrt
 def _add_volumes(block: Block, shares: Floats, integrals: Floats) -> None:
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
     column, crossed = block.column, block.crossed
@@ -188,7 +188,7 @@ def _add_volumes(block: Block, shares: Floats, integrals: Floats) -> None:
             integrals[b + ahead, 3] += weight[k] * moment_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@part
+@helper
 def integrate_volume(rows: Rows, grid: OffsetGrid, section: Floats, volume: Floats) -> None:
     """Cross-section at (mm2) and volume above (mm3) each offset, by the divergence theorem."""
     corners, vectors, d, n = rows.corners, rows.vectors_mm2, grid.direction, grid.columns
@@ -212,7 +212,7 @@ def integrate_volume(rows: Rows, grid: OffsetGrid, section: Floats, volume: Floa
         volume[column] = (integrals[column, 3] + first_moment - column * whole) * grid.step_mm
 
 
-@part
+@helper
 def _select(surface: Overhangs, needs: Needs, d: Floats, chosen: Ints, kind: Ints) -> int:
     """The faces that need support either way, with 1: upright only, 2: along d only, 3: both, 4 and 5: as 2 and 3, and along d
     they are unsupportable, 6 and 7: as 3 and 5, and no cut can save them; returns how many."""
@@ -232,14 +232,14 @@ def _select(surface: Overhangs, needs: Needs, d: Floats, chosen: Ints, kind: Int
     return many
 
 
-@inlined
+@no_nrt
 def _class(needs: Needs, f: int) -> int:
     """What a face that is risky along the direction needs."""
     source = needs.sources[f]
     return int(needs.classes[source]) if source >= 0 else NEEDS_SUPPORT
 
 
-@vector_part
+@no_nrt
 def _pick(chosen: Ints, surface: Overhangs, picked: Indices, weight: Floats) -> None:
     """Corners (3, k) and areas of the chosen faces."""
     corners, areas = surface.corners, surface.areas_mm2
@@ -250,7 +250,7 @@ def _pick(chosen: Ints, surface: Overhangs, picked: Indices, weight: Floats) -> 
         weight[k] = areas[chosen[k]]
 
 
-@vector_part
+@no_nrt
 def _cover(ahead: float, block: Block, area: Floats) -> None:
     """Weighted share of each face above the column that lies `ahead` columns after its first."""
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
@@ -260,7 +260,7 @@ def _cover(ahead: float, block: Block, area: Floats) -> None:
         area[k] = inside * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@vector_part
+@no_nrt
 def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> None:
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
     column, crossed = block.column, block.crossed
@@ -275,7 +275,7 @@ def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> N
             integrals[b + ahead, which + 1] += weight[k] * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@part
+@helper
 def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scratch: Ints, out: Areas) -> None:
     """Risky areas above each offset: printed straight up, and along the direction, there weighted by what the faces need.
 
@@ -310,7 +310,7 @@ def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scr
         out.hopeless[column] = lost + airy_lost
 
 
-@part
+@helper
 def find_lowest(z: Floats, edges: Indices, grid: OffsetGrid, watched: float, lowest: Floats) -> None:
     """Least z above each offset, among vertices and crossings of edges, lowest first, below the watched height."""
     heights, n = grid.heights, grid.columns

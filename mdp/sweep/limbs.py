@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import dot, flags, ints
-from mdp.kernels.kernel import borrower, inlined, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
@@ -239,7 +239,7 @@ def cylinders_cut(remainder: Remainder, cylinders: tuple[Cylinder, ...], plane: 
     return tuple(cylinder for cylinder in cylinders if np.isin(cylinder.faces, sources).any())
 
 
-@inlined
+@no_nrt
 def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
     """What cutting off a piece would gain and lose, without the cost of a cut; seam_mm: for a RIM in steps."""
     stairs, seam = value(pieces, piece, STAIRS), seam_mm * value(pieces, piece, RIM)
@@ -248,7 +248,7 @@ def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
     return float(value(pieces, piece, UP) + stairs_up - residual), float(residual - min(stairs, stairs_up))
 
 
-@borrower
+@no_nrt
 def _keep_row(rows: LimbRows, row: int, key: float, column: int, tops: Ints) -> None:
     """Keep a candidate if it is the best of its limbs within a span of offsets; in a full table the worst one makes room."""
     place = _same_limbs(rows, row, column, tops)
@@ -267,7 +267,7 @@ def _keep_row(rows: LimbRows, row: int, key: float, column: int, tops: Ints) -> 
             rows.tops[row, place, limb] = tops[limb]
 
 
-@borrower
+@no_nrt
 def _same_limbs(rows: LimbRows, row: int, column: int, tops: Ints) -> int:
     """The place of the candidate with the same limbs in the same span of offsets; NONE: there is none."""
     place = NONE
@@ -280,7 +280,7 @@ def _same_limbs(rows: LimbRows, row: int, column: int, tops: Ints) -> int:
     return place
 
 
-@borrower
+@no_nrt
 def _is_allowed(grid: LimbGrid, row: int, offset_mm: float) -> bool:
     """Whether a plane avoids the zones that stay whole."""
     allowed = True
@@ -289,7 +289,7 @@ def _is_allowed(grid: LimbGrid, row: int, offset_mm: float) -> bool:
     return allowed
 
 
-@borrower
+@no_nrt
 def _may_be_cut(pieces: Pieces, piece: int, column: int, grid: LimbGrid, least_mm: float) -> bool:
     """Whether the head clears the table under a piece, and its contact area is large enough."""
     if min(pieces.low[piece, 0], pieces.low[piece, 1]) < least_mm:
@@ -299,7 +299,7 @@ def _may_be_cut(pieces: Pieces, piece: int, column: int, grid: LimbGrid, least_m
     return bool(stands and pieces.low[piece, 0] > -np.inf)
 
 
-@borrower
+@no_nrt
 def _offer(out: LimbRows, row: int, column: int, tops: Ints, costs: tuple[float, float], grid: LimbGrid) -> None:
     """Keep a candidate that gains enough. costs: gain and loss without the cost of a cut."""
     gain, lost = costs[0] - grid.cut_mm2, costs[1] + grid.cut_mm2
@@ -307,7 +307,7 @@ def _offer(out: LimbRows, row: int, column: int, tops: Ints, costs: tuple[float,
         _keep_row(out, row, TRADE_OFF * lost - gain, column, tops)
 
 
-@borrower
+@no_nrt
 def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: LimbGrid, tops: tuple[Ints, Ints]) -> None:
     """Keep every piece above a column that gains enough, and all that gain together where they are several but not all.
 
@@ -391,7 +391,7 @@ def _mark_limbs(scars: Scars, topology: Topology, planes: PointedPlanes) -> Mask
     return marked
 
 
-@part
+@helper
 def _find_chosen(scars: Scars, row: int, topology: Topology, planes: PointedPlanes, pieces: Pieces, chosen: Ints) -> int:
     """Lower a plane to its offset and fill `chosen` with the pieces that its points lie on. Returns how many there are, 0 where
     any of the points lies on none."""
@@ -416,7 +416,7 @@ def _find_chosen(scars: Scars, row: int, topology: Topology, planes: PointedPlan
     return many
 
 
-@borrower
+@no_nrt
 def _nearest(point: Floats, points: Floats, parent: Ints, farthest_mm2: float) -> int:
     """The vertex above the plane that is nearest to a point; NONE where none is within the distance."""
     nearest, least = NONE, farthest_mm2

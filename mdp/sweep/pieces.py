@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import borrower, inlined, part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
@@ -62,7 +62,7 @@ class Order(NamedTuple):
     faces: NDArray[np.int64]
 
 
-@part
+@helper
 def make_pieces(size: int, faces: int) -> Pieces:
     """Room for the pieces of a solid with that many vertices and faces."""
     return Pieces(
@@ -82,7 +82,7 @@ def make_pieces(size: int, faces: int) -> Pieces:
     )
 
 
-@part
+@helper
 def begin(pieces: Pieces, scars: Scars, row: int, grid: OffsetGrid, topology: Topology) -> Order:
     """Lay out vertices and faces along a direction, the plane above all of them. grid.heights are those of the pieces."""
     normals, corners, d = topology.vertex_normals, scars.overhangs.corners, grid.direction
@@ -99,7 +99,7 @@ def begin(pieces: Pieces, scars: Scars, row: int, grid: OffsetGrid, topology: To
     return Order(starts, vertices, face_starts, faces)
 
 
-@part
+@helper
 def descend(pieces: Pieces, column: int, order: Order, topology: Topology) -> None:
     """Move the plane down to a column from the one above it."""
     _enter(pieces, order.vertices[order.starts[column + 1] : order.starts[column + 2]], topology)
@@ -109,26 +109,26 @@ def descend(pieces: Pieces, column: int, order: Order, topology: Topology) -> No
     _cross(pieces, column, topology)
 
 
-@inlined
+@no_nrt
 def value(pieces: Pieces, piece: int, which: int) -> float:
     """One of the SUMS of a piece; for MOMENT see `volume`."""
     total: float = pieces.whole[piece, which] + pieces.crossing[piece, which]
     return total
 
 
-@borrower
+@no_nrt
 def volume(pieces: Pieces, piece: int, column: int) -> float:
     """Volume of a piece above a column, in steps times mm2."""
     return float(value(pieces, piece, MOMENT) - column * pieces.whole[piece, SECTION])
 
 
-@inlined
+@no_nrt
 def _add(sums: Floats, a: int, other: Floats, b: int) -> None:
     for which in range(len(SUMS)):
         sums[a, which] += other[b, which]
 
 
-@borrower
+@no_nrt
 def _join(pieces: Pieces, a: int, b: int) -> None:
     """Join the pieces of two vertices; the lesser of the vertices that stand for them stands for both."""
     p, q = root(pieces.parent, a), root(pieces.parent, b)
@@ -143,7 +143,7 @@ def _join(pieces: Pieces, a: int, b: int) -> None:
         pieces.top[p] = pieces.top[q]
 
 
-@part
+@helper
 def _enter(pieces: Pieces, vertices: NDArray[np.int64], topology: Topology) -> None:
     """Begin a piece at each vertex that comes to lie above the plane, and join it to its neighbours there."""
     starts, neighbours = topology.rings.starts, topology.rings.neighbours
@@ -170,7 +170,7 @@ def _enter(pieces: Pieces, vertices: NDArray[np.int64], topology: Topology) -> N
                         _join(pieces, v, w)
 
 
-@part
+@helper
 def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
     """What each face, when it lies wholly above, adds to the SUMS of its piece; MOMENT is left out, RIM is a weight."""
     surface, needs, rims = scars.overhangs, scars.needs, scars.rims
@@ -193,7 +193,7 @@ def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
             weights[f, STAIRS] = rims.stair_areas_mm2[f] * step_share(cosine)
 
 
-@borrower
+@no_nrt
 def _cross(pieces: Pieces, column: int, topology: Topology) -> None:
     """Add the faces that have come to lie wholly above a column to their pieces, and the shares of those that cross it."""
     faces, points, heights, c = topology.triangles.faces, topology.triangles.vertices, pieces.heights, float(column)
@@ -221,7 +221,7 @@ def _cross(pieces: Pieces, column: int, topology: Topology) -> None:
     pieces.counts[1] = still
 
 
-@borrower
+@no_nrt
 def _forget_crossing(pieces: Pieces) -> None:
     """Clear what the pieces have from faces that cross, and drop the vertices that stand for a piece no longer."""
     still = 0
@@ -236,7 +236,7 @@ def _forget_crossing(pieces: Pieces) -> None:
     pieces.counts[0] = still
 
 
-@borrower
+@no_nrt
 def _add_share(pieces: Pieces, piece: int, f: int, c: float, heights: tuple[float, float, float]) -> None:
     """Add the share of a face above c to its piece. heights: of its corners, the lowest first."""
     lowest, middle, highest = heights

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import borrower, inlined, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 
@@ -58,7 +58,7 @@ def _boxes(vertices: Floats, faces: Ints, leaves: int) -> tuple[Floats, Floats]:
     return low, high
 
 
-@inlined
+@no_nrt
 def _enters(tree: TriangleTree, node: int, origin: Floats, inverse: Floats, reach: float) -> bool:
     """Whether a ray, given by the inverse of its direction, meets a node's box within reach."""
     low, high = tree.low, tree.high
@@ -72,7 +72,7 @@ def _enters(tree: TriangleTree, node: int, origin: Floats, inverse: Floats, reac
     return meets
 
 
-@borrower
+@no_nrt
 def _distance(p: Floats, q: Floats, r: Floats, origin: Floats, ray: Floats) -> float:
     """Distance along the ray to a triangle (Moeller and Trumbore, edges included), infinite for a miss."""
     e1x, e1y, e1z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -91,7 +91,7 @@ def _distance(p: Floats, q: Floats, r: Floats, origin: Floats, ray: Floats) -> f
     return t if t > 0.0 else np.inf
 
 
-@part
+@helper
 def first_hit(tree: TriangleTree, origin: Floats, ray: Floats, reach: float, own_vertex: int, facing: float) -> int:
     """The first face met along `ray` within reach whose normal has at least the cosine `facing` with it; -1: none.
 

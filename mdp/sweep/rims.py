@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import dot, floats, int_table, table
-from mdp.kernels.kernel import inlined, kernel, part, vector_part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
 from mdp.sweep.facets import Indices
@@ -44,7 +44,7 @@ class ScarsAbove(NamedTuple):
     stairs: Floats
 
 
-@inlined
+@no_nrt
 def weigh_chord(cosine: float, feather: float) -> float:
     """How much a chord counts where a face's normal has that cosine with the plane's, times the sine of the angle between.
 
@@ -55,7 +55,7 @@ def weigh_chord(cosine: float, feather: float) -> float:
     return sine + feather * max(facing - COT_30 * sine, 0.0)
 
 
-@vector_part
+@no_nrt
 def _weigh_rims(cosines: Floats, areas: Floats, weights: Floats, feather: float, out: Floats) -> None:
     """Twice the area times the sine of the angle between face and plane: the longest chord times the extent across the planes;
     weighted."""
@@ -63,13 +63,13 @@ def _weigh_rims(cosines: Floats, areas: Floats, weights: Floats, feather: float,
         out[k] = 2.0 * areas[k] * weights[k] * weigh_chord(cosines[k], feather)
 
 
-@inlined
+@no_nrt
 def chord_at(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
     """Length of a face's chord at an offset that it crosses, of its longest chord times its extent."""
     return (c - low) * rise if c < middle else (high - c) * fall
 
 
-@vector_part
+@no_nrt
 def _measure_chords(ahead: float, block: Block, length: Floats) -> None:
     """Weighted chord of each face at the column that lies `ahead` columns after its first."""
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
@@ -79,7 +79,7 @@ def _measure_chords(ahead: float, block: Block, length: Floats) -> None:
         length[k] = inside * chord_at(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@vector_part
+@no_nrt
 def _add_rims(block: Block, lengths: Floats, rim: Floats) -> None:
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
     column, crossed = block.column, block.crossed
@@ -92,13 +92,13 @@ def _add_rims(block: Block, lengths: Floats, rim: Floats) -> None:
             rim[b + ahead] += weight[k] * chord_at(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@vector_part
+@no_nrt
 def _weigh_stairs(cosines: Floats, areas: Floats, out: Floats) -> None:
     for k in range(len(out)):
         out[k] = areas[k] * step_share(cosines[k])
 
 
-@vector_part
+@no_nrt
 def _share_columns(ahead: float, block: Block, share: Floats) -> None:
     """Share of each face above the column that lies `ahead` columns after its first."""
     low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
@@ -107,7 +107,7 @@ def _share_columns(ahead: float, block: Block, share: Floats) -> None:
         share[k] = share_above(c, low[k], middle[k], high[k], rise[k], fall[k]) if c < high[k] else 0.0
 
 
-@vector_part
+@no_nrt
 def _add_stairs(block: Block, shares: Floats, up: Floats, along: Floats, sums: Floats) -> None:
     """Add stairs printed straight up and along the direction: those of faces wholly above, and of the shares of those crossed."""
     low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
@@ -128,7 +128,7 @@ def _add_stairs(block: Block, shares: Floats, up: Floats, along: Floats, sums: F
             sums[b + ahead, 3] += q * share
 
 
-@part
+@helper
 def integrate_scars(surface: Rims, grid: OffsetGrid, out: ScarsAbove) -> None:
     """Weighted length of the rim that a cut at each offset leaves on the surface, mm, and the stairs above it, mm2."""
     corners, normals, n, counted = surface.corners, surface.normals, grid.columns, len(surface.stair_areas_mm2) > 0

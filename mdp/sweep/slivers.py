@@ -8,7 +8,7 @@ that looks the other way; near an acute edge the other face looks aside, that is
 import numpy as np
 
 from mdp.kernels.arrays import flags, floats
-from mdp.kernels.kernel import inlined, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
 from mdp.overhang import Mask
 from mdp.plane import Plane
@@ -21,7 +21,7 @@ SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a s
 OPPOSITE_COSINE = 0.8  # two faces of one wall or rod look opposite ways, within 37 degrees
 
 
-@inlined
+@no_nrt
 def _note(cosine: float, height: float, n: int, above: Floats, below: Floats) -> None:
     b = min(column_over(height), n)
     if cosine < 0.0:
@@ -30,7 +30,7 @@ def _note(cosine: float, height: float, n: int, above: Floats, below: Floats) ->
         above[b - 1] = min(above[b - 1], height)
 
 
-@part
+@helper
 def find_slivers(rows: Rows, grid: OffsetGrid, cosines: Floats, fragile: Floats) -> None:
     """Distance from each offset up to the next surface looking along the direction and down to the next one looking against it.
 

@@ -1,11 +1,11 @@
 """Union-find inside kernels: sets that grow together, each known by one of its members (paths halved)."""
 
 from mdp.kernels.arrays import ints
-from mdp.kernels.kernel import inlined, part
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Ints
 
 
-@part
+@helper
 def singletons(size: int) -> Ints:
     """The parents of so many members of which none have been joined."""
     parent = ints(size, 0)
@@ -14,7 +14,7 @@ def singletons(size: int) -> Ints:
     return parent
 
 
-@inlined
+@no_nrt
 def root(parent: Ints, member: int) -> int:
     """The member that stands for all that one has been joined with."""
     while parent[member] != member:
@@ -23,7 +23,7 @@ def root(parent: Ints, member: int) -> int:
     return member
 
 
-@part
+@helper
 def join(parent: Ints, a: int, b: int) -> None:
     """Join two sets; the lesser of the members that stand for them stands for both."""
     p, q = root(parent, a), root(parent, b)

@@ -5,13 +5,13 @@ once by more than the junction speed, and none accelerates faster than it may.
 from math import sqrt
 
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 
 TINY = 1e-9  # mm, mm/s or a cosine, instead of a division by 0
 
 
-@borrower
+@no_nrt
 def trapezoid_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, v0: float, v1: float) -> float:
     """Seconds of a straight move from one speed to another: a trapezoid of speeds, or a triangle where it gets no faster."""
     peak = min(speed_mm_s, sqrt(0.5 * (v0 * v0 + v1 * v1) + acceleration_mm_s2 * length_mm))

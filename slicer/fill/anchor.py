@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import flags, floats, longs
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats
 from slicer.geometry.clip import Border, Indices, Pieces
@@ -48,7 +48,7 @@ def anchor_lines(pieces: Pieces, border: Border, limits: Limits, group: Indices 
     return np.split(out[:n].copy(), starts[1:count])
 
 
-@part
+@helper
 def _way(edges: Floats) -> Floats:
     """(m + 1,) way along all contours to the beginning of each edge, mm."""
     way: Floats = floats(len(edges) + 1, 0.0)
@@ -57,7 +57,7 @@ def _way(edges: Floats) -> Floats:
     return way
 
 
-@part
+@helper
 def _contours(pieces: Pieces, border: Border) -> Indices:
     """(2 k,) contour on which each end lies."""
     of, contour = longs(len(border.edges), 0), longs(2 * len(pieces.ends), 0)
@@ -69,7 +69,7 @@ def _contours(pieces: Pieces, border: Border) -> Indices:
     return contour
 
 
-@part
+@helper
 def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
     """(2 k,) way along all contours to each end."""
     points, bounds, ends = pieces
@@ -82,7 +82,7 @@ def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
     return along_border
 
 
-@part
+@helper
 def _next_ends(along_border: Floats, contour: Indices, offsets: Indices, way: Floats) -> tuple[Indices, Floats]:
     """Of each end the next one on its contour, which may be itself, and how far it is."""
     order = argsort(along_border)
@@ -102,7 +102,7 @@ def _next_ends(along_border: Floats, contour: Indices, offsets: Indices, way: Fl
     return after, gap
 
 
-@part
+@helper
 def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> tuple[Indices, Indices]:
     """Of each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
     partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
@@ -132,7 +132,7 @@ def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> t
     return partner, sense
 
 
-@part
+@helper
 def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, limits: Limits) -> Floats:
     """Of each end the length of its hook, negative for a way back along the border."""
     hooks: Floats = floats(len(after), 0.0)
@@ -151,7 +151,7 @@ def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, limits
     return hooks
 
 
-@part
+@helper
 def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Floats:
     """Of each end the length of its run along the border, to its partner or as a hook; negative: backward."""
     runs: Floats = floats(len(partner), 0.0)
@@ -162,7 +162,7 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
     return runs
 
 
-@borrower
+@no_nrt
 def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: Border, way: Floats) -> int:
     """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
 
@@ -188,7 +188,7 @@ def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border:
     return n + 1
 
 
-@borrower
+@no_nrt
 def _append_piece(out: Floats, n: int, pieces: Pieces, end: int) -> int:
     """Appends the points of a piece, beginning at one of its ends; returns the new n."""
     first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
@@ -199,7 +199,7 @@ def _append_piece(out: Floats, n: int, pieces: Pieces, end: int) -> int:
     return n
 
 
-@part
+@helper
 def _reverse(out: Floats, first: int, end: int) -> None:
     """Turns round the order of points first .. end - 1."""
     for k in range((end - first) // 2):

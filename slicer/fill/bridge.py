@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdp.kernels.arrays import floats, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 from mdp.support_need.spans import ROUNDING_MM
 from slicer.bead import Bead
@@ -115,7 +115,7 @@ def _angles(sides: Floats) -> list[float]:
     return [*np.unique(own).tolist(), *(np.pi * np.arange(TURNS) / TURNS).tolist()]
 
 
-@part
+@helper
 def _rows_at(sides: Floats, angle: float, width_mm: float) -> Floats:
     """(n, 3) lines of a width across a place at an angle, begin, end and height in the frame turned by it."""
     cos, sin = np.cos(angle), np.sin(angle)
@@ -132,7 +132,7 @@ def _rows_at(sides: Floats, angle: float, width_mm: float) -> Floats:
     return rows
 
 
-@part
+@helper
 def _held_ends(row: Floats, anchors: Floats, angle: float) -> int:
     """How many ends of a line lie on an anchor."""
     cos, sin, held = np.cos(angle), np.sin(angle), 0

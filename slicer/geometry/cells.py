@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import longs
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import sort_into_bins
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, contours, edges_of
@@ -54,7 +54,7 @@ def _cells_of(edges: Floats, loop: Indices, begins: Indices) -> Cells:
     return sort_edges(edges, loop, begins)
 
 
-@part
+@helper
 def sort_edges(edges: Floats, loop: Indices, begins: Indices) -> Cells:
     """The cells of edges."""
     x0, y0, x1, y1 = 1e9, 1e9, -1e9, -1e9
@@ -69,7 +69,7 @@ def sort_edges(edges: Floats, loop: Indices, begins: Indices) -> Cells:
     return Cells(edges, loop, begins, grid, first, items)
 
 
-@part
+@helper
 def _columns(grid: Grid, segment: Segment, low: float, high: float) -> tuple[int, int]:
     """First and last column that a segment touches between the heights low and high; the last below the first: none."""
     x0, y0, x1, y1 = segment
@@ -85,14 +85,14 @@ def _columns(grid: Grid, segment: Segment, low: float, high: float) -> tuple[int
     return max(first, 0), min(last, grid.columns - 1)
 
 
-@part
+@helper
 def _rows(grid: Grid, y0: float, y1: float) -> tuple[int, int]:
     """First and last row that what lies between two heights touches."""
     first, last = int((min(y0, y1) - MARGIN_MM - grid.y) / grid.size_mm), int((max(y0, y1) + MARGIN_MM - grid.y) / grid.size_mm)
     return max(first, 0), min(last, grid.rows - 1)
 
 
-@part
+@helper
 def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
     """first and items of Cells. An edge is a run of cells in every row that it touches."""
     many = 0
@@ -114,7 +114,7 @@ def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
     return first, items
 
 
-@part
+@helper
 def _near(cells: Cells, r: int, segment: Segment) -> tuple[int, int]:
     """Which of the items lie in the cells that a segment touches in a row: from and to."""
     grid = cells.grid
@@ -123,7 +123,7 @@ def _near(cells: Cells, r: int, segment: Segment) -> tuple[int, int]:
     return (cells.first[r * grid.columns + a], cells.first[r * grid.columns + b + 1]) if a <= b else (0, 0)
 
 
-@part
+@helper
 def crossings(cells: Cells, segment: Segment, shares: Floats, crossed: Indices) -> int:
     """Fills in where (0..1, rising) and which edges a segment crosses; returns how many, -1 where there is no room for them."""
     low, high = _rows(cells.grid, segment.y0, segment.y1)
@@ -149,7 +149,7 @@ def crossings(cells: Cells, segment: Segment, shares: Floats, crossed: Indices) 
     return n
 
 
-@part
+@helper
 def free(cells: Cells, segment: Segment) -> bool:
     """Whether a segment crosses no edge."""
     low, high = _rows(cells.grid, segment.y0, segment.y1)
@@ -161,7 +161,7 @@ def free(cells: Cells, segment: Segment) -> bool:
     return True
 
 
-@borrower
+@no_nrt
 def within(cells: Cells, x: float, y: float) -> bool:
     """Whether a point lies in the polygons: the edges that a ray to the right crosses, each counted in one cell."""
     grid = cells.grid
@@ -178,7 +178,7 @@ def within(cells: Cells, x: float, y: float) -> bool:
     return odd
 
 
-@part
+@helper
 def nearest(cells: Cells, x: float, y: float, reach: float) -> tuple[float, float, int]:
     """The nearest point of any edge within reach, and its edge; edge -1: none."""
     grid = cells.grid

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import ints, longs, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.kernels.sorting import rank, sort_into_bins
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
@@ -42,7 +42,7 @@ def cross_sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
     return [[loop for loop in loops[a:b] if len(loop) > 2] for a, b in pairwise(bounds)]
 
 
-@part
+@helper
 def _spans(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Ints, Ints]:
     """Per face the first and the last layer it crosses; the last is less than the first where it crosses none."""
     first, last = ints(len(faces), 0), ints(len(faces), 0)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdp.kernels.arrays import flags, floats
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.geometry.segments import Segment, squared_distance
@@ -30,7 +30,7 @@ def lengths_mm(points: Floats, starts: Indices) -> Floats:
     return out
 
 
-@borrower
+@no_nrt
 def length_between(points: Floats, first: int, end: int) -> float:
     """Length of the polyline of some of the points, seen from above."""
     total = 0.0

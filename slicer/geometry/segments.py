@@ -7,7 +7,7 @@ no crossing is counted twice or missed at a vertex.
 from math import inf
 from typing import Any, NamedTuple
 
-from mdp.kernels.kernel import borrower
+from mdp.kernels.kernel import no_nrt
 from mdp.mesh import Floats
 
 
@@ -20,19 +20,19 @@ class Segment(NamedTuple):
     y1: float
 
 
-@borrower
+@no_nrt
 def edge(edges: Floats, e: int) -> Segment:
     """One of (n, 4) edges x0 y0 x1 y1."""
     return Segment(edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3])
 
 
-@borrower
+@no_nrt
 def orientation(line: Segment, x: float, y: float) -> float:
     """Twice the signed area of the triangle of a line's two points and a third: positive where that lies to the left."""
     return float((line.x1 - line.x0) * (y - line.y0) - (line.y1 - line.y0) * (x - line.x0))
 
 
-@borrower
+@no_nrt
 def crossing(segment: Segment, crossed: Segment) -> float:
     """Where (0..1) a segment crosses another one; -1 where it does not."""
     if (orientation(segment, crossed.x0, crossed.y0) > 0.0) == (orientation(segment, crossed.x1, crossed.y1) > 0.0):
@@ -43,7 +43,7 @@ def crossing(segment: Segment, crossed: Segment) -> float:
     return float(start / (start - end))
 
 
-@borrower
+@no_nrt
 def crosses_any(segment: Segment, edges: Floats) -> bool:
     """Whether a segment crosses any of the (n, 4) edges."""
     left, right = min(segment.x0, segment.x1), max(segment.x0, segment.x1)
@@ -59,7 +59,7 @@ def crosses_any(segment: Segment, edges: Floats) -> bool:
     return False
 
 
-@borrower
+@no_nrt
 def clamp_projection(along: float, square: float) -> float:
     """Where (0..1) on a segment its point nearest to another one lies.
 
@@ -68,14 +68,14 @@ def clamp_projection(along: float, square: float) -> float:
     return min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
 
 
-@borrower
+@no_nrt
 def nearest_share(segment: Segment, x: float, y: float) -> float:
     """Where (0..1) on a segment the point nearest to x, y lies."""
     dx, dy = segment.x1 - segment.x0, segment.y1 - segment.y0
     return clamp_projection((x - segment.x0) * dx + (y - segment.y0) * dy, dx * dx + dy * dy)
 
 
-@borrower
+@no_nrt
 def squared_distance(segment: Segment, x: float, y: float) -> float:
     """Square of the distance between a point and a segment."""
     share = nearest_share(segment, x, y)
@@ -83,7 +83,7 @@ def squared_distance(segment: Segment, x: float, y: float) -> float:
     return float((px - share * (segment.x1 - segment.x0)) ** 2 + (py - share * (segment.y1 - segment.y0)) ** 2)
 
 
-@borrower
+@no_nrt
 def squared_distance_to_any(edges: Floats, x: float, y: float) -> float:
     """Square of the distance between a point and the nearest of (n, 4) edges; infinite without edges."""
     least = inf
@@ -92,7 +92,7 @@ def squared_distance_to_any(edges: Floats, x: float, y: float) -> float:
     return least
 
 
-@borrower
+@no_nrt
 def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
     """Square of the distance between a point and the segment from a to b; each three numbers."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -102,7 +102,7 @@ def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
     return float(x * x + y * y + z * z)
 
 
-@borrower
+@no_nrt
 def level_crossing(segment: Segment, y: float) -> float:
     """Where (x) a segment goes through the height y; -inf where it does not. What an even-odd test counts to one side."""
     if (segment.y0 > y) == (segment.y1 > y):
@@ -110,7 +110,7 @@ def level_crossing(segment: Segment, y: float) -> float:
     return float(segment.x0 + (y - segment.y0) / (segment.y1 - segment.y0) * (segment.x1 - segment.x0))
 
 
-@borrower
+@no_nrt
 def inside(edges: Floats, x: float, y: float) -> bool:
     """Whether a point lies in the polygons of (n, 4) edges, by the even-odd rule."""
     odd = False

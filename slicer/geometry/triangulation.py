@@ -7,7 +7,7 @@ import manifold3d
 import numpy as np
 
 from mdp.kernels.arrays import flags, ints, longs, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices, Ints
 from mdp.topology.linked_faces import opposites
 from slicer.geometry.segments import Segment, orientation
@@ -108,13 +108,13 @@ def _with_samples(corners: Ints, across: Ints, first: Indices, between: Indices)
     return tails, twins
 
 
-@borrower
+@no_nrt
 def doubled_area(points: Floats, a: int, b: int, c: int) -> float:
     """Twice the signed area of a triangle of three of the points."""
     return orientation(Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1]), points[c, 0], points[c, 1])
 
 
-@borrower
+@no_nrt
 def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
     """Whether p lies clearly inside the circle through a, b, c (counter-clockwise)."""
     x, y = points[p, 0], points[p, 1]

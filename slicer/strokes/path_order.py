@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, longs, table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
 
 REACH = 200  # exchanges reach so far along the order, less far in an order of more than a thousand paths
@@ -65,7 +65,7 @@ def order_paths(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], tip: Flo
     return order, flips
 
 
-@part
+@helper
 def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float) -> Order:
     """The order that goes to the nearest path each time."""
     order, flips = longs(len(starts), 0), flags(len(starts))
@@ -89,13 +89,13 @@ def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y:
     return order, flips
 
 
-@part
+@helper
 def _exit(sequence: _Sequence, i: int) -> tuple[float, float]:
     """Where path i is left; i = -1: where all begins."""
     return (sequence.x, sequence.y) if i < 0 else (sequence.ends[i, 2], sequence.ends[i, 3])
 
 
-@part
+@helper
 def _gap(sequence: _Sequence, i: int, j: int) -> float:
     """Travel from path i to path j as they run now; i = -1: from where all begins; j = n: no travel."""
     if j == len(sequence.ends):
@@ -104,7 +104,7 @@ def _gap(sequence: _Sequence, i: int, j: int) -> float:
     return float(np.hypot(sequence.ends[j, 0] - x, sequence.ends[j, 1] - y))
 
 
-@part
+@helper
 def _reversed_ends(sequence: _Sequence, k: int) -> tuple[float, float, float, float]:
     """Where path k is entered and left when the stretch around it runs the other way."""
     ends = sequence.ends
@@ -113,7 +113,7 @@ def _reversed_ends(sequence: _Sequence, k: int) -> tuple[float, float, float, fl
     return ends[k, 2], ends[k, 3], ends[k, 0], ends[k, 1]
 
 
-@borrower
+@no_nrt
 def _mirror(sequence: _Sequence, i: int, j: int) -> None:
     """The paths i..j in reverse order, each as it runs."""
     order, flips, fixed, ends, _, _ = sequence
@@ -126,7 +126,7 @@ def _mirror(sequence: _Sequence, i: int, j: int) -> None:
         i, j = i + 1, j - 1
 
 
-@part
+@helper
 def _reverse(sequence: _Sequence, i: int, j: int) -> None:
     """The stretch i..j the other way round."""
     _mirror(sequence, i, j)
@@ -137,7 +137,7 @@ def _reverse(sequence: _Sequence, i: int, j: int) -> None:
                 sequence.ends[k, axis], sequence.ends[k, 2 + axis] = sequence.ends[k, 2 + axis], sequence.ends[k, axis]
 
 
-@part
+@helper
 def _reverse_stretches(sequence: _Sequence, reach: int) -> float:
     """2-opt: reverses stretches where that saves travel; returns how much."""
     n, ends = len(sequence.order), sequence.ends
@@ -163,7 +163,7 @@ def _reverse_stretches(sequence: _Sequence, reach: int) -> float:
     return gained
 
 
-@part
+@helper
 def _move_neighbours(sequence: _Sequence, reach: int) -> float:
     """Or-opt: moves up to MOST_MOVED neighbours elsewhere where that saves travel; returns how much."""
     n, ends = len(sequence.order), sequence.ends
@@ -195,7 +195,7 @@ def _move_neighbours(sequence: _Sequence, reach: int) -> float:
     return gained
 
 
-@borrower
+@no_nrt
 def _rotate(sequence: _Sequence, i: int, last: int, to: int) -> None:
     """Paths i..last put behind path `to`, all as they run: what lies on both sides of a place changes sides."""
     low, high = (i, to) if to > last else (to + 1, last)

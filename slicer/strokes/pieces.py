@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import flags, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.bead import EVEN_MM
@@ -81,7 +81,7 @@ def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats, out: 
     return count
 
 
-@part
+@helper
 def _with_small_steps(points: Floats) -> Floats:
     """The line (n, 3) with points added where its width changes by more than EVEN_MM from one to the next."""
     size = 1
@@ -100,7 +100,7 @@ def _with_small_steps(points: Floats) -> Floats:
     return out
 
 
-@part
+@helper
 def _ends(line: Floats) -> Mask:
     """(n,) True for the points of a line (n, 3) at which a piece ends: pieces are as long as the widths allow."""
     ends = flags(len(line))

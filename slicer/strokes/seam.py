@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead
@@ -39,7 +39,7 @@ SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, 
 SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
 
 
-@part
+@helper
 def corner_strength(loop: Floats, i: int) -> float:
     """How much a corner the vertex of a loop (n, 2), solid on its left, is: 0 up to SMOOTH_DEG of turn, from SHARP_DEG on 1 where
     it is an inner one and -1 where it is an outer one."""
@@ -54,7 +54,7 @@ def corner_strength(loop: Floats, i: int) -> float:
     return float(strength if cross < 0.0 else -strength)
 
 
-@part
+@helper
 def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
     """The point ARM_MM along the loop from a vertex, forward or backward."""
     n, left, at = len(loop), ARM_MM, i
@@ -290,14 +290,14 @@ def _point_at(loop: Floats, share: float) -> tuple[float, float]:
     return loop[first, 0], loop[first, 1]
 
 
-@part
+@helper
 def _side(loop: Floats, i: int) -> Segment:
     """The side from a vertex of a loop to the next one."""
     after = (i + 1) % len(loop)
     return Segment(loop[i, 0], loop[i, 1], loop[after, 0], loop[after, 1])
 
 
-@part
+@helper
 def _project(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
     """Distance from a point to a loop, the side that is nearest and how far along it."""
     least, at, share = np.inf, 0, 0.0
@@ -361,7 +361,7 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
     return at, share, free
 
 
-@part
+@helper
 def _clear(interfaces: SeamLimits, x: float, y: float) -> bool:
     """Whether a place at their height keeps clear of all interface edges."""
     for e in range(len(interfaces.edges)):

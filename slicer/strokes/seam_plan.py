@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import longs, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 from slicer.geometry.polygons import contours
 from slicer.sections import Sections
@@ -98,7 +98,7 @@ def _offered(loop: Floats) -> tuple[Floats, Floats]:
     return places, strengths
 
 
-@part
+@helper
 def _cheapest(places: Places, best: Floats, outline: int, below: int) -> tuple[int, float]:
     """The place of an outline that costs least with all on it and the way to it from a place below, and that cost; below -1:
     there is none."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import flags, floats, table
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.kernels.sorting import rank, sort
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
@@ -99,7 +99,7 @@ def _split(points: Floats, starts: Indices, wanted: Mask, sides: Sides, shortest
     return count
 
 
-@part
+@helper
 def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None:
     """Runs of steps shorter than that take after their neighbours, those within last so that none is overlooked for a gap.
 
@@ -135,7 +135,7 @@ def _cut(points: Floats, sides: Sides, out: Floats, marks: Mask) -> int:
     return _cut_into(points, sides.edges, sides.lows, sides.tallest, out, marks)
 
 
-@part
+@helper
 def _cut_into(points: Floats, sides: Floats, lows: Floats, tallest: float, out: Floats, marks: Mask) -> int:
     """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
 

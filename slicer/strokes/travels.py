@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats, longs
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import outer_wall_width_mm
@@ -146,7 +146,7 @@ def _leaves(safe: Cells, since: Floats, to: Floats) -> NDArray[np.bool_]:
     return out
 
 
-@part
+@helper
 def _enter(safe: Cells, track: Cells, x: float, y: float, reach: float) -> tuple[float, float, bool]:
     """Where a detour from a point begins: there, or where it reaches the track's inside; and whether it does."""
     if within(track, x, y):
@@ -180,7 +180,7 @@ def _comb(safe: Cells, track: Cells, straight: Segment, longest: float, reach: f
     return n if total <= longest else 0
 
 
-@part
+@helper
 def _follow(track: Cells, straight: Segment, longest: float, path: Floats) -> int:
     """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by.
 
@@ -214,7 +214,7 @@ def _follow(track: Cells, straight: Segment, longest: float, path: Floats) -> in
     return n + 1
 
 
-@part
+@helper
 def _go_round(track: Cells, stretch: _Stretch, longest: float, path: Floats, n: int) -> tuple[int, float]:
     """Appends the shorter of the two stretches of a loop from row n on.
 
@@ -231,7 +231,7 @@ def _go_round(track: Cells, stretch: _Stretch, longest: float, path: Floats, n: 
     return end, least
 
 
-@part
+@helper
 def _walk(track: Cells, stretch: _Stretch, longest: float, sense: int, path: Floats, n: int) -> tuple[int, float]:
     """Appends a stretch forward (1) or backward (-1) until it is too long; the new number of rows and the length."""
     begin, end = track.begins[track.loop[stretch.leaving]], track.begins[track.loop[stretch.leaving] + 1]
@@ -245,7 +245,7 @@ def _walk(track: Cells, stretch: _Stretch, longest: float, sense: int, path: Flo
     return n + 2, length + np.hypot(stretch.x - path[n, 0], stretch.y - path[n, 1])
 
 
-@part
+@helper
 def _pull_taut(safe: Cells, path: Floats, count: int) -> int:
     """Leaves as few points of a path as the border allows, in reverse order; returns how many, 0 when it crosses the border."""
     n, i, last = 1, 0, count - 1
@@ -264,7 +264,7 @@ def _pull_taut(safe: Cells, path: Floats, count: int) -> int:
     return n
 
 
-@part
+@helper
 def _sees(safe: Cells, path: Floats, i: int, j: int) -> bool:
     """Whether the straight line between two points of a path crosses no border."""
     return free(safe, Segment(path[i, 0], path[i, 1], path[j, 0], path[j, 1]))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdp.kernels.arrays import table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
 from mdp.overhang import Mask
 from slicer.geometry.cells import cells_of
@@ -36,13 +36,13 @@ def way_of_wipe(points: Floats, width_mm: float, wipe_mm: float) -> Floats:
     return first_length(wipe_trail(points, width_mm), wipe_mm)
 
 
-@borrower
+@no_nrt
 def runs_round(points: Floats, width_mm: float) -> bool:
     """Whether a path ends where it begins, or nearly."""
     return bool(distance(points, 0, len(points) - 1) <= width_mm and length_between(points, 0, len(points)) > RING * width_mm)
 
 
-@borrower
+@no_nrt
 def distance(points: Floats, i: int, k: int) -> float:
     """Between two of the points (n, 2 or 3)."""
     squared = 0.0
@@ -51,7 +51,7 @@ def distance(points: Floats, i: int, k: int) -> float:
     return float(np.sqrt(squared))
 
 
-@part
+@helper
 def wipe_trail(points: Floats, width_mm: float) -> Floats:
     """The way of a wipe after a stroke (n, 2 or 3): on along a ring, over its seam; back along a line."""
     count, onward = len(points), runs_round(points, width_mm)
@@ -64,7 +64,7 @@ def wipe_trail(points: Floats, width_mm: float) -> Floats:
     return trail
 
 
-@part
+@helper
 def first_length(way: Floats, length: float) -> Floats:
     """The first `length` mm of a polyline (n, 2 or 3), or all of it; without points that repeat."""
     first: Floats = table(len(way), way.shape[1])

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints, Mesh
 
 Image = NDArray[np.uint8]
@@ -130,7 +130,7 @@ class Light(NamedTuple):
     direction: Floats
 
 
-@part
+@helper
 def _dot(a: Any, b: Any) -> float:
     """Written out: numba's own would need scipy."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
@@ -177,7 +177,7 @@ def z_buffer(screen: Floats, width: int, height: int) -> tuple[Floats, Ints]:
     return depth, face
 
 
-@borrower
+@no_nrt
 def _lit_share(shadow: Floats, x: float, y: float, d: float, bias: float) -> float:
     """Share of the shadow map's texels around a point that see it: percentage-closer filtering over 5 x 5 texels."""
     column, row = int(x), int(y)

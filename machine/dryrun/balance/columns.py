@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
 
 NOTHING = -1e9
@@ -68,7 +68,7 @@ def laid(bars: Bars, mm3: Floats, lattice: Lattice) -> Floats:
     return plastic
 
 
-@part
+@helper
 def _spread(a: Floats, b: Floats, half: float, mm3: float, lattice: Lattice, plastic: Floats) -> int:
     """Add mm3 to every column whose middle lies within half of the line from a to b, and tell how many do."""
     dx, dy, count = b[0] - a[0], b[1] - a[1], 0
@@ -89,7 +89,7 @@ def _spread(a: Floats, b: Floats, half: float, mm3: float, lattice: Lattice, pla
     return count
 
 
-@part
+@helper
 def _columns(middle: float, reach: float, axis: int, lattice: Lattice) -> tuple[int, int]:
     """The first and the last column whose middle lies so near to a place along an axis."""
     first = int(np.ceil((middle - reach - lattice.origin[axis]) / lattice.cell - 0.5))
@@ -137,7 +137,7 @@ def tops(bars: Bars, lattice: Lattice) -> Floats:
     return top
 
 
-@borrower
+@no_nrt
 def _leaves_end(x: float, y: float, up: Floats, half: float, height: float) -> float:
     """Height at which an upright line leaves the round end of a bar: a cylinder below the end of its top, seen from there.
 
@@ -161,7 +161,7 @@ def _leaves_end(x: float, y: float, up: Floats, half: float, height: float) -> f
     return high if low <= high else NOTHING
 
 
-@part
+@helper
 def _leaves(x: float, y: float, slabs: tuple[tuple[float, float, float, float, float], ...]) -> float:
     """Height at which an upright line leaves what is common to slabs, each the places p with least <= n . p <= most."""
     low, high = NOTHING, -NOTHING

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from mdp.kernels.arrays import floats, longs
-from mdp.kernels.kernel import kernel, part
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Mesh
 from slicer.geometry.segments import squared_distance_in_space
 from slicer.paths import Kind
@@ -158,7 +158,7 @@ def _nearest(points: Floats, corners: Floats, columns: Columns, most: float) -> 
     return distances, nearest
 
 
-@part
+@helper
 def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
     """Distance of a point from a triangle: inside its prism the height, else the nearest edge."""
     ab, ac, ap = b - a, c - a, p - a
@@ -172,11 +172,11 @@ def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
     return float(np.sqrt(nearest))
 
 
-@part
+@helper
 def _dot(a: Floats, b: Floats) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@part
+@helper
 def _cross(a: Floats, b: Floats) -> Floats:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

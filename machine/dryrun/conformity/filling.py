@@ -15,7 +15,7 @@ from machine.dryrun.dryrun import DryRun
 from machine.dryrun.strokes import beads_of
 from machine.reader.parsed import pose_runs
 from mdp.kernels.arrays import flags, floats, longs
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Mesh
 from mdp.pose import rotation
 from profiles.profile import Profile
@@ -106,7 +106,7 @@ class Bar(NamedTuple):
     height: float
 
 
-@borrower
+@no_nrt
 def _in_bar(p: Floats, bar: Bar) -> bool:
     """True when a point lies in the bar."""
     d, up, half = bar.d, bar.up, bar.half

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, ints, longs
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Ints
 from slicer.walls.variable.rule import Rule, bead_count
@@ -56,7 +56,7 @@ def count_beads(across: Ints, skeleton: Skeleton, rule: Rule) -> Counts:
     return _spread(across, skeleton, rule, beads)
 
 
-@part
+@helper
 def _pieces(across: Ints, skeleton: Skeleton, value: Ints) -> _Pieces:
     """The pieces of the central axis with one value."""
     size = len(skeleton.radii)
@@ -86,7 +86,7 @@ def _pieces(across: Ints, skeleton: Skeleton, value: Ints) -> _Pieces:
     return _Pieces(of, many, length, low, high)
 
 
-@part
+@helper
 def _drop_stubs(across: Ints, skeleton: Skeleton, pieces: _Pieces, shortest: float) -> None:
     """Short pieces from which a thicker place goes on are none, nor is a mere point, the middle of something round."""
     rises = flags(pieces.many)
@@ -100,7 +100,7 @@ def _drop_stubs(across: Ints, skeleton: Skeleton, pieces: _Pieces, shortest: flo
             skeleton.central[h] = False
 
 
-@part
+@helper
 def _smooth(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> bool:
     """Short stretches take the count of the longest neighbour that suits their thickness; whether any did."""
     pieces = _pieces(across, skeleton, beads)
@@ -123,7 +123,7 @@ def _smooth(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> bool:
     return changed
 
 
-@borrower
+@no_nrt
 def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
     """Whether so many beads fit into places from one half thickness to another with widths that can be printed."""
     if count == 0:
@@ -138,7 +138,7 @@ def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
     return share * rest_low > rule.least - rule.round and share * rest_high < rule.most - rule.round
 
 
-@part
+@helper
 def _spread(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> Counts:
     """Corners and what lies between parts of the axis belong to the thickest place that they lead up to.
 
@@ -156,12 +156,12 @@ def _spread(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> Counts
     return Counts(beads, radii, dots)
 
 
-@borrower
+@no_nrt
 def _on_axis(skeleton: Skeleton, t: int) -> bool:
     return bool(skeleton.central[3 * t] or skeleton.central[3 * t + 1] or skeleton.central[3 * t + 2])
 
 
-@part
+@helper
 def _roots(across: Ints, skeleton: Skeleton) -> NDArray[np.int64]:
     """(m,) the node on the axis, or the thickest one, to which the way up from each node leads."""
     radii = skeleton.radii

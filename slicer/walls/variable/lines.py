@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, longs, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from slicer.walls.variable.counts import Counts
 from slicer.walls.variable.rule import Rule, depth_of, loops_of, middle_width, spacing_of
@@ -104,7 +104,7 @@ def _cut_back(line: Line) -> Line:
     return replace(line, points=np.vstack([point, line.points[first + 1 :]]), widths=line.widths[first:])
 
 
-@borrower
+@no_nrt
 def _joined(across: Ints, skeleton: Skeleton, counts: Counts, h: int) -> bool:
     """Whether a line runs across an inner side."""
     if across[h] < 0 or not skeleton.central[h]:
@@ -153,14 +153,14 @@ def trace_chains(across: Ints, skeleton: Skeleton, counts: Counts, rule: Rule) -
     )  # fmt: skip
 
 
-@borrower
+@no_nrt
 def _add(skeleton: Skeleton, counts: Counts, rule: Rule, t: int, out: Chains, n: int) -> int:
     out.points[n, 0], out.points[n, 1] = skeleton.centres[t, 0], skeleton.centres[t, 1]
     out.widths[n] = middle_width(rule, counts.beads[t], skeleton.radii[t])
     return n + 1
 
 
-@borrower
+@no_nrt
 def _taken(across: Ints, skeleton: Skeleton, counts: Counts, rule: Rule, t: int) -> float:
     """How much of a line the loop takes that runs across its end, where more beads lie side by side beyond it."""
     taken, level = 0.0, loops_of(rule, counts.beads[t])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, longs, table
-from mdp.kernels.kernel import borrower, kernel, part
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
 from slicer.geometry.polyline import length_between
 from slicer.geometry.triangulation import Triangulation
@@ -80,7 +80,7 @@ def lay_loops(
     return points[:n].copy(), widths[:n].copy(), starts[: count + 1].copy()
 
 
-@part
+@helper
 def _trace(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> _Ribs:
     """The ribs of all loops of a level."""
     across = triangulation.across
@@ -120,7 +120,7 @@ def _trace(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rul
     return _Ribs(out.feet[:n], out.ways[:n], out.reach[:n], out.depth[:n], out.spacing[:n], out.starts[: loops + 1])
 
 
-@borrower
+@no_nrt
 def _add(out: _Ribs, n: int, foot: tuple[float, float], way: tuple[float, float], reach: float) -> int:
     out.feet[n, 0], out.feet[n, 1] = foot
     out.ways[n, 0], out.ways[n, 1] = way
@@ -128,7 +128,7 @@ def _add(out: _Ribs, n: int, foot: tuple[float, float], way: tuple[float, float]
     return n + 1
 
 
-@borrower
+@no_nrt
 def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: _Ribs, n: int) -> int:
     """Adds the place on the rib of a corner; in the tip of a triangle in a corner of the polygon, that on its bisector."""
     points, tails, across = triangulation
@@ -141,7 +141,7 @@ def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: _Ribs, n
     return _add(out, n, (fx, fy), ((x - fx) / long, (y - fy) / long), long)
 
 
-@borrower
+@no_nrt
 def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], out: _Ribs, n: int) -> int:
     """Adds the mitre between two ribs from one point, where the polygon's outline turns into it."""
     points, tails, _ = triangulation
@@ -163,7 +163,7 @@ def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, 
     return n
 
 
-@borrower
+@no_nrt
 def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, out: _Ribs, n: int) -> int:
     """Adds the place where the loop crosses the axis on the way to a node beyond it."""
     t, beyond = nodes

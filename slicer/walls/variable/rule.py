@@ -7,7 +7,7 @@ take what is left. Bead i, counted from the boundary, is named by its spacing s,
 
 from typing import NamedTuple
 
-from mdp.kernels.kernel import borrower
+from mdp.kernels.kernel import no_nrt
 
 ADD = 0.7  # of a spacing: from this on what two beads leave between them gets a bead of its own
 ROOM = 1.5  # spacings: narrower places between all walls get one bead
@@ -29,13 +29,13 @@ class Rule(NamedTuple):
     most: float
 
 
-@borrower
+@no_nrt
 def nominal(rule: Rule, level: int) -> float:
     """Spacing of bead `level` where there is room."""
     return rule.outer if level == 0 else rule.inner
 
 
-@borrower
+@no_nrt
 def bead_count(rule: Rule, radius: float) -> int:
     """How many beads lie across a place with that half thickness; 2 walls + 2: all walls, and more than a bead between them."""
     if 2.0 * radius < FEATURE * rule.least:
@@ -51,13 +51,13 @@ def bead_count(rule: Rule, radius: float) -> int:
     return 2 * rule.walls + 1 if rest < max(min(ROOM * rule.inner, widest), narrowest) else 2 * rule.walls + 2
 
 
-@borrower
+@no_nrt
 def loops_of(rule: Rule, count: int) -> int:
     """How many of the beads run along both sides of a place."""
     return min(count // 2, rule.walls)
 
 
-@borrower
+@no_nrt
 def spacing_of(rule: Rule, count: int, radius: float, level: int) -> float:
     """Spacing of loop `level` where `count` beads lie across a place with that half thickness."""
     own = nominal(rule, level)
@@ -71,7 +71,7 @@ def spacing_of(rule: Rule, count: int, radius: float, level: int) -> float:
     return max(min(own, 0.5 * (rest - narrowest)), narrowest)
 
 
-@borrower
+@no_nrt
 def depth_of(rule: Rule, count: int, radius: float, level: int) -> float:
     """How deep below the boundary the centreline of loop `level` runs."""
     depth = 0.5 * rule.round
@@ -80,7 +80,7 @@ def depth_of(rule: Rule, count: int, radius: float, level: int) -> float:
     return depth + 0.5 * spacing_of(rule, count, radius, level)
 
 
-@borrower
+@no_nrt
 def middle_width(rule: Rule, count: int, radius: float) -> float:
     """Width of the bead in the middle of a place with an odd count."""
     rest = 2.0 * radius

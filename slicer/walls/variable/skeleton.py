@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, ints, table
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 from slicer.geometry.segments import Segment, nearest_share, orientation
 from slicer.geometry.triangulation import Triangulation
@@ -35,13 +35,13 @@ class Skeleton(NamedTuple):
     central: NDArray[np.bool_]
 
 
-@borrower
+@no_nrt
 def after(h: int) -> int:
     """The next half-edge of the same triangle."""
     return h - 2 if h % 3 == 2 else h + 1
 
 
-@borrower
+@no_nrt
 def before(h: int) -> int:
     """The half-edge before in the same triangle."""
     return h + 2 if h % 3 == 0 else h - 1
@@ -87,7 +87,7 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
     return out
 
 
-@borrower
+@no_nrt
 def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
     """Whether a node lies beyond the boundary, seen from its triangle: needles in a neck have their centres anywhere."""
     points, tails, across = triangulation
@@ -106,7 +106,7 @@ def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
     return True
 
 
-@borrower
+@no_nrt
 def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Fills in the circumcentre of a triangle."""
     points, tails, _ = triangulation
@@ -122,7 +122,7 @@ def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) ->
     out.centres[t, 1] = points[a, 1] + (bx * c2 - cx * b2) / doubled
 
 
-@borrower
+@no_nrt
 def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Puts a node into its triangle, where that has no circumcentre of use."""
     points, tails, _ = triangulation
@@ -131,7 +131,7 @@ def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
         out.centres[t, axis] = (points[a, axis] + points[b, axis] + points[c, axis]) / 3.0
 
 
-@borrower
+@no_nrt
 def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -> float:
     """Fills in the foot of a corner, on the two sides that meet there; returns how far it is from its node."""
     x, y = out.centres[h // 3, 0], out.centres[h // 3, 1]
@@ -148,7 +148,7 @@ def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -
     return least
 
 
-@borrower
+@no_nrt
 def _centre(out: Skeleton, ends: tuple[int, int], short: float, long: float) -> bool:
     """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other.
 
@@ -165,7 +165,7 @@ def _centre(out: Skeleton, ends: tuple[int, int], short: float, long: float) -> 
     return True
 
 
-@borrower
+@no_nrt
 def _slope2(out: Skeleton, h: int) -> float:
     """Square of how fast the radius changes along the axis across side h: cosine of half the angle between its two ribs."""
     t, next_side = h // 3, after(h)

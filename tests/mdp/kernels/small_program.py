@@ -11,7 +11,7 @@ from mdp.kernels import cache
 KERNEL_FILE = (
     "from mdp.kernels.kernel import kernel\nfrom mdp.far import PART, far\n\n\n@kernel\ndef near(x):\n    return far(x) + PART\n"
 )
-PART_FILE = "from mdp.kernels.kernel import part\n\nPART = 1.0\n\n\n@part\ndef far(x):\n    return 10.0 * x\n"
+PART_FILE = "from mdp.kernels.kernel import helper\n\nPART = 1.0\n\n\n@helper\ndef far(x):\n    return 10.0 * x\n"
 
 
 def write_program(folder: Path) -> Path:

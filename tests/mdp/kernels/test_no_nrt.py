@@ -1,0 +1,46 @@
+"""Helpers without numba's runtime: what they must not do would free an array twice or never, and nobody would see it."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+NUMBERS = {"None", "int", "float", "bool", "Segment", "tuple[int, int]", "tuple[float, float]", "tuple[float, float, float]"}
+NUMERIC = (
+    "abs",
+    "arccos",
+    "arctan2",
+    "ceil",
+    "cos",
+    "degrees",
+    "floor",
+    "hypot",
+    "radians",
+    "rint",
+    "sin",
+    "sqrt",
+    "int32",
+    "uint32",
+)
+
+
+def test_no_helper_without_the_runtime_gives_an_array_back() -> None:
+    helpers = _decorated("no_nrt")
+    assert len(helpers) > 30
+    assert {ast.unparse(function.returns) for function in helpers if function.returns} <= NUMBERS
+
+
+def test_helpers_without_the_runtime_call_no_others_and_make_no_array() -> None:
+    helpers = _decorated("no_nrt")
+    others = {function.name for kind in ("helper", "kernel") for function in _decorated(kind)}
+    others -= {function.name for function in helpers}
+    calls = {ast.unparse(node.func) for function in helpers for node in ast.walk(function) if isinstance(node, ast.Call)}
+    assert calls & others == set()
+    assert {call for call in calls if call.startswith("np.")} <= {f"np.{name}" for name in NUMERIC}
+
+
+def _decorated(kind: str) -> list[ast.FunctionDef]:
+    """All functions of the packages with a decorator."""
+    paths = [path for package in ("mdp", "slicer", "machine") for path in (ROOT / package).rglob("*.py")]
+    nodes = [node for path in paths for node in ast.walk(ast.parse(path.read_text("utf-8")))]
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    return [function for function in functions if kind in map(ast.unparse, function.decorator_list)]
