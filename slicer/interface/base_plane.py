@@ -3,6 +3,7 @@
 That of a limb, beside which earlier parts stand above it, counts only near the limb.
 """
 
+import atexit
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -39,6 +40,10 @@ def shadow_of(limb: Part) -> Polygons:
 def room_of(limb: Part) -> Polygons:
     """The area of a limb's base plane over which it and its support are printed."""
     return offset_round(shadow_of(limb), AROUND_MM)
+
+
+atexit.register(shadow_of.cache_clear)  # as base_section
+atexit.register(room_of.cache_clear)
 
 
 def limb_planes(part: Part, later: Sequence[Part], heights: Heights, beside_mm: float) -> dict[int, "BasePlane"]:

@@ -1,5 +1,6 @@
 """Interface: what a part finds beneath and beside it, in its own frame."""
 
+import atexit
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -23,6 +24,9 @@ BASES_KEPT = 64
 def base_section(part: Part) -> Polygons:
     """The face with which a part stands on its base plane, in its frame."""
     return clean(cross_sections(part.in_part_frame(), np.array([BELOW_MM]))[0])
+
+
+atexit.register(base_section.cache_clear)  # polygons left when Python ends would make manifold3d print a list of leaks
 
 
 def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:

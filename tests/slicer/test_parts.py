@@ -105,3 +105,20 @@ def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -
                 os.kill(process, signal.SIGKILL)
             raise
         assert parent.returncode == -ended_by
+
+
+ENDING = """
+from slicer.interface.base_plane import room_of
+from slicer.parts import slice_parts
+from tests.shapes import box
+from tests.slicer.hand import cut, profile
+
+parts = cut(box(6, 6, 4), ((0.0, 0.0, 1.0), 2.0))
+slice_parts(parts, profile("process.interlock=pins"))
+room_of(parts[1])
+"""
+
+
+def test_nothing_is_printed_when_python_ends() -> None:
+    done = subprocess.run([sys.executable, "-c", ENDING], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
