@@ -108,11 +108,13 @@ def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -
 
 
 ENDING = """
+import gc
 from slicer.interface.base_plane import room_of
 from slicer.parts import slice_parts
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
+gc.freeze()  # as the program does when it has started
 parts = cut(box(6, 6, 4), ((0.0, 0.0, 1.0), 2.0))
 slice_parts(parts, profile("process.interlock=pins"))
 room_of(parts[1])
