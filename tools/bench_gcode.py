@@ -8,11 +8,12 @@ import numpy as np
 
 from machine.firmware import dialects
 from machine.gcode.writer import elapsed_s, write_gcode
-from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel
+from machine.planning.moves import MARK, REORIENT, TRAVEL, BeginLayer, BeginPart, MachineProgram, Mark, Moves, Reorient
 from machine.reader.parse import parse_gcode
+from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.profile import load
-from slicer.paths import Kind
+from slicer.paths import NUMBER, Kind
 
 STROKES, PER_STROKE, LAYERS_A_PART = 5000, 200, 50
 
@@ -20,19 +21,27 @@ STROKES, PER_STROKE, LAYERS_A_PART = 5000, 200, 50
 def program() -> MachineProgram:
     """Five parts at five poses, twenty strokes of 200 short lines a layer."""
     chance = np.random.default_rng(1)
-    start = np.array([[0.0, 0.0, 10.0], [0.0, 0.0, 10.0]])
-    moves: list[Move] = [Travel(start, 10.0), Travel(start, 10.0)]
+    start = np.array([[0.0, 0.0, 10.0]])
+    pieces, marks = [_moves(TRAVEL, start, 10.0), _moves(TRAVEL, start, 10.0)], list[Mark]()
     for k in range(STROKES):
         layer, part = k // 20, k // (20 * LAYERS_A_PART)
         if k % (20 * LAYERS_A_PART) == 0:
             pose = Pose(5.0 * part, 10.0 * part)
-            moves += [Reorient(pose, 20.0), BeginPart(part + 1, pose, LAYERS_A_PART)]
+            pieces += [_moves(REORIENT, start, 20.0), _moves(MARK, start[:0], 0.0)]
+            marks += [Reorient(pose, 20.0), BeginPart(part + 1, pose, LAYERS_A_PART)]
         if k % 20 == 0:
-            moves.append(BeginLayer(part + 1, layer % LAYERS_A_PART + 1, 0.2 * layer + 0.2, 0.2, 1.0))
+            pieces.append(_moves(MARK, start[:0], 0.0))
+            marks.append(BeginLayer(part + 1, layer % LAYERS_A_PART + 1, 0.2 * layer + 0.2, 0.2, 1.0))
         angle = np.cumsum(chance.uniform(0, 0.05, PER_STROKE + 1))
         points = np.column_stack([40 * np.cos(angle), 40 * np.sin(angle), np.full(PER_STROKE + 1, 0.2 * (layer + 1))])
-        moves.append(Stroke(Kind.INNER_WALL, points, np.full(PER_STROKE, 0.05), 40.0, 0.45))
-    return MachineProgram.of("bench", tuple(moves))
+        pieces.append(_moves(NUMBER[Kind.INNER_WALL], points, 40.0, 0.05, 0.45))
+    return MachineProgram.of("bench", pieces, marks)
+
+
+def _moves(what: int, points: Floats, speed: float, filament_mm: float = 0.0, width_mm: float = np.nan) -> Moves:
+    """One move that pushes as much filament on the way to each of its points but the first."""
+    pushed = np.where(np.arange(len(points)) > 0, filament_mm, 0.0)
+    return Moves(np.column_stack([points, pushed]), np.array([[what, len(points), speed, width_mm, np.nan, np.inf]]))
 
 
 def main() -> None:

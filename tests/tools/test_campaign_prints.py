@@ -75,10 +75,11 @@ def test_how_a_run_ended_is_told_by_its_code_and_its_sentence(code: int, said: s
 def test_runs_of_the_real_program_end_as_they_should_and_stand_in_the_table(tmp_path: Path) -> None:
     vertices, faces = form(SMALL.source)
     write_stl(tmp_path / "large.stl", 20.0 * vertices, faces)
-    large = Run("models", "large", str(tmp_path / "large.stl"))
+    write_stl(tmp_path / "slow.stl", 5.0 * vertices, faces)
+    large, slow = (Run("models", name, str(tmp_path / f"{name}.stl")) for name in ("large", "slow"))
     records = [
         run_print(SMALL, tmp_path, Limits(), keep=True),
-        run_print(SMALL, tmp_path, Limits(core_s=1), keep=False),
+        run_print(slow, tmp_path, Limits(core_s=1), keep=False),
         run_print(large, tmp_path, Limits(), keep=False),
     ]
     assert [record and record["outcome"] for record in records] == [PRINTED, KILLED, REFUSED]
@@ -89,7 +90,8 @@ def test_runs_of_the_real_program_end_as_they_should_and_stand_in_the_table(tmp_
     assert (records[0]["parts"], records[0]["suspect"]) == (1, [])
     assert (tmp_path / "kept" / "forms_stairs-001.gcode").exists()
     rows = table([record for record in records if record]).splitlines()
-    assert rows[2].startswith("| forms | 2 | 1 (50.0%) | 0 | 0 | 0 | 1 | 0 |")
+    assert rows[2].startswith("| forms | 1 | 1 (100.0%) | 0 | 0 | 0 | 0 | 0 |")
+    assert rows[3].startswith("| models | 2 | 0 (0.0%) | 1 | 0 | 0 | 1 | 0 |")
     assert "plate" in rows[-1] or "axis" in rows[-1] or "reach" in rows[-1]
 
 
