@@ -14,7 +14,7 @@ import numpy as np
 from mdp.decomposition import Part
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
-from mdp.mesh import Floats, Ints, Mesh
+from mdp.mesh import Floats, Indices, Ints, Mesh
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
@@ -41,7 +41,7 @@ class Heights:
         """(n,) lower sides of the layers."""
         return self.tip_mm - self.height_mm
 
-    def __getitem__(self, layers: slice) -> "Heights":
+    def __getitem__(self, layers: slice | Indices) -> "Heights":
         return Heights(self.tip_mm[layers], self.height_mm[layers], self.cut_mm[layers])
 
     def __add__(self, above: "Heights") -> "Heights":

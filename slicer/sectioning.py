@@ -11,7 +11,7 @@ from profiles.profile import Profile
 from slicer.bead import first_layer_process
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset, opening
-from slicer.heights import layer_heights, limb_planes_mm
+from slicer.heights import Heights, layer_heights, limb_planes_mm
 from slicer.interface.compensation import compensate, compensate_elephant_foot
 from slicer.interface.interface import plastic_below
 from slicer.interface.interlock import cut_grooves
@@ -32,10 +32,23 @@ def section_part(
 
     Raises SliceError when the part's mesh is not closed, or too high to be meant.
     """
+    return section_layers(part, profile, heights_of(part, profile, later), earlier, later, pins)
+
+
+def heights_of(part: Part, profile: Profile, later: Sequence[Part]) -> Heights:
+    """Where the layers of a part lie; raises SliceError when it is too high to be meant."""
+    profile, on_platform = vase_profile(profile.of_part(part.index)), part.index == 1
+    pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
+    return layer_heights(part.in_part_frame(), profile, on_platform, pedestal_mm, limb_planes_mm(part, later))
+
+
+def section_layers(
+    part: Part, profile: Profile, heights: Heights, earlier: Sequence[Part], later: Sequence[Part], pins: Pins = NONE
+) -> Sections:
+    """The sections of some of a part's layers, rising from its first to its last one, as section_part."""
     of_print, profile = profile, vase_profile(profile.of_part(part.index))
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    heights = layer_heights(mesh, profile, on_platform, pedestal_mm, limb_planes_mm(part, later))
     pedestal = pedestal_layers(heights.tip_mm, pedestal_mm)
     whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, heights.cut_mm)]
     nozzle_mm = profile.machine.head.nozzle_mm
