@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import borrower, kernel
+from mdp.kernels.arrays import floats, longs, table
+from mdp.kernels.kernel import borrower, kernel, part
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from profiles.profile import Profile
@@ -21,12 +21,30 @@ TINY = 1e-9  # mm, mm/s or a cosine, instead of a division by 0
 
 
 class Pace(NamedTuple):
-    """What bounds the moves of a layer: speed and acceleration of travels, acceleration of each axis, speed change at corners."""
+    """What bounds the moves of a layer: accelerations of X and Y and of Z, speed change at corners; speed and acceleration of
+    travels, speed of lifts, how far one lifts, speed and length of a wipe."""
 
+    axes_mm_s2: float
+    z_mm_s2: float
+    junction_mm_s: float
     travel_mm_s: float
     travel_mm_s2: float
-    axes_mm_s2: float
-    junction_mm_s: float
+    lift_mm_s: float
+    lift_mm: float
+    wipe_mm_s: float
+    wipe_mm: float
+
+
+class Moves(NamedTuple):
+    """Buffers for moves one after the other, as many as `count` tells: direction (n, 3), length, cruise speed, acceleration, and the
+    greatest speed at which each begins."""
+
+    direction: Floats
+    length: Floats
+    cruise: Floats
+    ramp: Floats
+    begin: Floats
+    count: Indices
 
 
 @borrower
@@ -43,34 +61,47 @@ def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> fl
     return trapezoid_s(length_mm, speed_mm_s, acceleration_mm_s2, 0.0, 0.0)
 
 
-def retraction_s(profile: Profile) -> float:
-    """Seconds that pulling back with its wipe, lifting, lowering and priming add to a travel."""
-    process, material, machine = profile.process, profile.material, profile.machine
-    filament_mm_s, filament_mm_s2 = min(material.retract_speed_mm_s, machine.extruder_speed_mm_s), machine.extruder_acceleration_mm_s2
-    pulled_mm, primed_mm = material.retract_mm, material.retract_mm + material.retract_prime_extra_mm
-    if pulled_mm <= 0.0:
-        back_s = 0.0
-    elif material.wipe_mm > 0.0:
-        back_s = line_s(material.wipe_mm, min(process.travel_speed_mm_s, material.wipe_mm * filament_mm_s / pulled_mm), axes_mm_s2(profile))
-    else:
-        back_s = line_s(pulled_mm, filament_mm_s, filament_mm_s2)
-    lift_s = line_s(process.lift_mm, min(process.lift_speed_mm_s, machine.z.speed_mm_s), machine.z.acceleration_mm_s2)
-    return back_s + 2.0 * lift_s + (line_s(primed_mm, filament_mm_s, filament_mm_s2) if primed_mm > 0.0 else 0.0)
+def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
+    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions.
 
-
-def strokes_s(strokes: Strokes, speeds_mm_s: Floats, profile: Profile, first_layer: bool) -> float:
-    """Seconds of a layer's strokes at their (k,) speeds, with the travels between them and their retractions."""
-    machine, told = profile.machine, stroke_accelerations(profile, first_layer)
+    tip: (2,) where the layer below ends.
+    """
+    told = stroke_accelerations(profile, first_layer)
     most = np.full(len(KINDS), np.inf) if told is None else np.array([told[kind] for kind in KINDS])
-    pace = Pace(
-        min(profile.process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s),
-        travel_mm_s2(profile) or np.inf,
-        axes_mm_s2(profile),
-        machine.junction_speed_mm_s,
+    pace, places = _pace(profile), Way(strokes.points, strokes.starts, strokes.approach, strokes.approach_starts)
+    moving_s = _way_s(places, tip, (speeds_mm_s, most[strokes.kind]), strokes.retract, pace)
+    rise_s = line_s(profile.process.layer_height_mm, pace.lift_mm_s, pace.z_mm_s2)
+    return float(moving_s + rise_s + int(strokes.retract.sum()) * _standing_s(profile))
+
+
+def _pace(profile: Profile) -> Pace:
+    process, material, machine = profile.process, profile.material, profile.machine
+    travel_mm_s = min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s)
+    wipe_mm = material.wipe_mm if material.retract_mm > 0.0 else 0.0
+    return Pace(
+        axes_mm_s2=axes_mm_s2(profile),
+        z_mm_s2=machine.z.acceleration_mm_s2,
+        junction_mm_s=machine.junction_speed_mm_s,
+        travel_mm_s=travel_mm_s,
+        travel_mm_s2=travel_mm_s2(profile) or np.inf,
+        lift_mm_s=min(process.lift_speed_mm_s, machine.z.speed_mm_s),
+        lift_mm=process.lift_mm,
+        wipe_mm_s=min(travel_mm_s, wipe_mm * _filament_mm_s(profile) / max(material.retract_mm, TINY)),
+        wipe_mm=wipe_mm,
     )
-    places = Way(strokes.points, strokes.starts, strokes.approach, strokes.approach_starts)
-    moving_s = _way_s(places, speeds_mm_s, most[strokes.kind], strokes.retract, pace)
-    return moving_s + int(strokes.retract[1:].sum()) * retraction_s(profile)
+
+
+def _filament_mm_s(profile: Profile) -> float:
+    return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+
+
+def _standing_s(profile: Profile) -> float:
+    """Seconds that the filament moves alone for one retraction."""
+    material, ramp = profile.material, profile.machine.extruder_acceleration_mm_s2
+    if material.retract_mm <= 0.0:
+        return 0.0
+    primed_s = line_s(material.retract_mm + material.retract_prime_extra_mm, _filament_mm_s(profile), ramp)
+    return primed_s if material.wipe_mm > 0.0 else primed_s + line_s(material.retract_mm, _filament_mm_s(profile), ramp)
 
 
 class Way(NamedTuple):
@@ -82,40 +113,69 @@ class Way(NamedTuple):
     approach_starts: Indices
 
 
+@borrower
+def _add(moves: Moves, step: tuple[float, float, float], cruise: float, told: float, stands: bool, pace: Pace) -> None:
+    """Append a straight move; stands: the machine stands still before it."""
+    length = sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+    n = moves.count[0]
+    if length <= STANDING_MM:
+        return
+    ux, uy, uz = step[0] / length, step[1] / length, step[2] / length
+    moves.length[n], moves.cruise[n] = length, cruise
+    moves.ramp[n] = min(told, pace.axes_mm_s2 / max(abs(ux), abs(uy), TINY), pace.z_mm_s2 / max(abs(uz), TINY))
+    if stands or n == 0:
+        moves.begin[n] = 0.0
+    else:
+        x, y, z = moves.direction[n - 1]
+        change = max(abs(ux - x), abs(uy - y), abs(uz - z), TINY)
+        moves.begin[n] = min(cruise, moves.cruise[n - 1], pace.junction_mm_s / change)
+    moves.direction[n, 0], moves.direction[n, 1], moves.direction[n, 2] = ux, uy, uz
+    moves.count[0] += 1
+
+
 @kernel
-def _way_s(way: Way, speeds: Floats, most: Floats, retract: Mask, pace: Pace) -> float:
-    """Seconds of strokes one after the other, from a stand to a stand; where a travel retracts it stands before and after."""
-    room = len(way.points) + len(way.approach) + 1
-    length, cruise, ramp, corner = floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), floats(room + 1, 0.0)
-    n = 0
-    x, y, ux, uy = way.points[0, 0], way.points[0, 1], 0.0, 0.0
+def _way_s(way: Way, tip: Floats, bounds: tuple[Floats, Floats], retract: Mask, pace: Pace) -> float:
+    """Seconds of strokes one after the other, from a stand to a stand; a travel that retracts wipes and lifts, and ends at a
+    stand, where the filament is primed."""
+    speeds, most = bounds
+    room = len(way.points) + len(way.approach) + 4 * len(speeds) + 1
+    moves = Moves(table(room, 3), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(1, 0))
+    x, y = tip[0], tip[1]
     for k in range(len(speeds)):
-        a, b = way.approach_starts[k], way.approach_starts[k + 1]
-        before = b - a
-        for step in range(before + way.starts[k + 1] - way.starts[k]):
-            travels = step <= before
-            if step < before:
-                nx, ny = way.approach[a + step, 0], way.approach[a + step, 1]
+        first, n = way.starts[k], moves.count[0]
+        if retract[k]:
+            if n > 0:
+                begun = way.starts[k - 1]
+                apart = sqrt((x - way.points[begun, 0]) ** 2 + (y - way.points[begun, 1]) ** 2)
+                wipe = pace.wipe_mm if apart <= way.points[begun, 2] else -pace.wipe_mm  # on along a ring, back along a line
+                ux, uy = moves.direction[n - 1, 0], moves.direction[n - 1, 1]
+                _add(moves, (wipe * ux, wipe * uy, 0.0), pace.wipe_mm_s, np.inf, pace.wipe_mm <= 0.0, pace)
+            _add(moves, (0.0, 0.0, pace.lift_mm), pace.lift_mm_s, np.inf, pace.wipe_mm <= 0.0, pace)
+        for i in range(way.approach_starts[k], way.approach_starts[k + 1] + 1):
+            if i < way.approach_starts[k + 1]:
+                x1, y1 = way.approach[i, 0], way.approach[i, 1]
             else:
-                nx, ny = way.points[way.starts[k] + step - before, 0], way.points[way.starts[k] + step - before, 1]
-            dx, dy = nx - x, ny - y
-            long = sqrt(dx * dx + dy * dy)
-            if long <= STANDING_MM:
-                continue
-            dx, dy = dx / long, dy / long
-            length[n], cruise[n] = long, pace.travel_mm_s if travels else speeds[k]
-            told = pace.travel_mm_s2 if travels else most[k]
-            ramp[n] = min(pace.axes_mm_s2 / max(abs(dx), abs(dy), TINY), told)
-            stands = n == 0 or (retract[k] and (step == 0 or step == before + 1))
-            if not stands:
-                change = max(abs(dx - ux), abs(dy - uy), TINY)
-                corner[n] = min(cruise[n], cruise[n - 1], pace.junction_mm_s / change)
-            x, y, ux, uy = nx, ny, dx, dy
-            n += 1
+                x1, y1 = way.points[first, 0], way.points[first, 1]
+            _add(moves, (x1 - x, y1 - y, 0.0), pace.travel_mm_s, pace.travel_mm_s2, False, pace)
+            x, y = x1, y1
+        if retract[k]:
+            _add(moves, (0.0, 0.0, -pace.lift_mm), pace.lift_mm_s, np.inf, False, pace)
+        for i in range(first + 1, way.starts[k + 1]):
+            step = (way.points[i, 0] - way.points[i - 1, 0], way.points[i, 1] - way.points[i - 1, 1], 0.0)
+            _add(moves, step, speeds[k], most[k], retract[k] and i == first + 1, pace)
+        x, y = way.points[way.starts[k + 1] - 1, 0], way.points[way.starts[k + 1] - 1, 1]
+    return _moves_s(moves)
+
+
+@part
+def _moves_s(moves: Moves) -> float:
+    """Seconds of moves that end at a stand; changes where they begin."""
+    n, begin = moves.count[0], moves.begin
+    begin[n] = 0.0
     for i in range(n - 1, -1, -1):
-        corner[i] = min(corner[i], sqrt(corner[i + 1] ** 2 + 2.0 * ramp[i] * length[i]))
+        begin[i] = min(begin[i], sqrt(begin[i + 1] ** 2 + 2.0 * moves.ramp[i] * moves.length[i]))
     seconds = 0.0
     for i in range(n):
-        corner[i + 1] = min(corner[i + 1], sqrt(corner[i] ** 2 + 2.0 * ramp[i] * length[i]))
-        seconds += trapezoid_s(length[i], cruise[i], ramp[i], corner[i], corner[i + 1])
+        begin[i + 1] = min(begin[i + 1], sqrt(begin[i] ** 2 + 2.0 * moves.ramp[i] * moves.length[i]))
+        seconds += trapezoid_s(moves.length[i], moves.cruise[i], moves.ramp[i], begin[i], begin[i + 1])
     return float(seconds)

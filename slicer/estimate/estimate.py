@@ -7,15 +7,20 @@ from math import pi
 import numpy as np
 
 from mdp.decomposition import Part
+from mdp.mesh import Floats
+from profiles.process import Process
 from profiles.profile import Profile
-from slicer.estimate.hanging import rough_support, thick_support
+from slicer.bead import INTERFACE_WIDTH
+from slicer.estimate.hanging import support_lengths_mm, thick_support
 from slicer.estimate.layer import sections_near, sliced_layers
-from slicer.estimate.rough import choose_layers, rough_layers
+from slicer.estimate.rough import choose_layers, rough_lengths_mm
+from slicer.paths import bead_area_mm2
 from slicer.sectioning import heights_of
 from slicer.strokes.vase import vase_profile
 
 SAMPLES = 12  # layers of a print
 FEWEST = 4  # layers of a part
+LAYER_S, SLOWER = 0.3, 1.4
 TURN_S = 2.0  # of the table before a part
 
 
@@ -48,13 +53,40 @@ def _estimate_part(part: Part, whole: Profile, later: Sequence[Part], samples: i
     heights, profile, on_platform = heights_of(part, whole, later), vase_profile(whole.of_part(part.index)), part.index == 1
     process, filament_mm2 = profile.process, 0.25 * pi * profile.material.diameter_mm**2
     support = thick_support(part, heights, profile, later)
-    rough = rough_layers(part.in_part_frame(), heights, process, on_platform) + rough_support(support, heights, process)
-    layers, begins = choose_layers(rough.time_s, 1, samples)
+    drawn_mm = np.hstack(
+        [
+            rough_lengths_mm(part.in_part_frame(), heights, process, on_platform),
+            support_lengths_mm(support, heights, process, on_platform),
+        ]
+    )
+    bead_mm2 = bead_area_mm2(process.line_width_mm, heights.height_mm)
+    rough_s, rough_mm3 = _rough_s(drawn_mm, process), 1e-6 + drawn_mm.sum(axis=1) * bead_mm2
+    layers, begins = choose_layers(rough_s, 1, samples)
     real = sliced_layers(sections_near(part, whole, heights, layers, later), support, layers)
-    scale_s = np.add.reduceat(rough.time_s, begins) / rough.time_s[layers]
-    scale_mm3 = np.add.reduceat(rough.mm3, begins) / rough.mm3[layers]
+    scale_s = np.add.reduceat(rough_s, begins) / rough_s[layers]
+    scale_mm3 = np.add.reduceat(rough_mm3, begins) / rough_mm3[layers]
     total = Estimate(float(scale_s @ real[:, 0]), float(scale_mm3 @ real[:, 1]) / filament_mm2, float(scale_mm3 @ real[:, 2]))
     if on_platform:
-        return total
+        return total + _purged(profile)
     heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
     return total + Estimate(TURN_S + heating_s, profile.material.prime_extra_mm, 0.0)
+
+
+def _purged(profile: Profile) -> Estimate:
+    """The line before a print."""
+    process, material, length_mm = profile.process, profile.material, profile.machine.purge_mm
+    mm3 = length_mm * bead_area_mm2(INTERFACE_WIDTH * process.line_width_mm, process.first_layer_height_mm) * material.flow
+    return Estimate(length_mm / process.first_layer_speed_mm_s, mm3 / (0.25 * pi * material.diameter_mm**2), 0.0)
+
+
+def _rough_s(drawn_mm: Floats, process: Process) -> Floats:
+    """(n,) seconds of layers with (n, 5) mm of walls, skin, infill, support and dense support."""
+    speeds = (
+        process.inner_wall_speed_mm_s,
+        process.skin_speed_mm_s,
+        process.infill_speed_mm_s,
+        process.support_speed_mm_s,
+        process.support_interface_speed_mm_s,
+    )
+    least_s = np.minimum(process.least_layer_time_s, drawn_mm.sum(axis=1) / process.least_speed_mm_s)
+    return LAYER_S + np.maximum(SLOWER * drawn_mm @ (1.0 / np.array(speeds)), least_s)

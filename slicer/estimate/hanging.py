@@ -1,23 +1,21 @@
 """Hanging: the support of a part from few thick layers, by the rules of the real ones."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.mesh import Indices, Mesh
+from mdp.mesh import Floats, Indices, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.support_need.need import needs_support
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import spacing_mm, with_line_width
-from slicer.estimate.rough import Rough
+from slicer.bead import spacing_mm
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, edges
 from slicer.heights import Heights
 from slicer.overhangs import find_overhangs
-from slicer.paths import bead_area_mm2
 from slicer.sections import Neighbours, Sections
 from slicer.support.support import own_supports
 from slicer.walls.brim import plate_outline
@@ -49,7 +47,7 @@ def thick_support(part: Part, heights: Heights, profile: Profile, later: Sequenc
     thick = _thick_layers(float(heights.tip_mm[0]), top_mm, 0.5 * float(heights.height_mm.min()))
     outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in cross_sections(mesh, thick.cut_mm)]
     # A thick layer stands for what hangs anywhere in it: the gaps, less than half a thick layer, are lost in that.
-    coarse = {"support_interface_layers": 1, "support_bottom_interface_layers": 1, "support_gap_mm": 0.0, "support_bottom_gap_mm": 0.0}
+    coarse = {"support_interface_layers": 2, "support_bottom_interface_layers": 1, "support_gap_mm": 0.0, "support_bottom_gap_mm": 0.0}
     sections = Sections(
         part=part,
         earlier=(),
@@ -72,19 +70,19 @@ def thick_support(part: Part, heights: Heights, profile: Profile, later: Sequenc
     return ThickSupport(which, tops - heights.cut_mm < roof_mm, supports.areas, supports.dense)
 
 
-def rough_support(support: ThickSupport, heights: Heights, process: Process) -> Rough:
-    """What the layers of a part take for its support."""
-    width, high = process.support_line_width_mm or process.line_width_mm, heights.height_mm
-    extents = np.array([(area.area(), _around_mm(area), dense.area()) for area, dense in zip(support.areas, support.dense, strict=True)])
-    area, around, dense = np.vstack([extents.reshape(-1, 3), np.zeros(3)])[support.which].T
-    dense = np.where(support.closed, dense, 0.0)
-    spacing = spacing_mm(width, high)
-    walls_mm = process.support_walls * around
+def support_lengths_mm(support: ThickSupport, heights: Heights, process: Process, on_platform: bool) -> Floats:
+    """(n, 2) sparse and dense lines of the support of every layer of a part."""
+    extents = np.zeros((len(support.areas) + 1, 3))
+    for k, (area, dense) in enumerate(zip(support.areas, support.dense, strict=True)):
+        extents[k] = area.area(), _around_mm(area), dense.area()
+    area, around, close = extents[support.which].T
+    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, heights.height_mm)
+    walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
+    if on_platform:
+        density[0] = process.support_foot_density
     inside = np.maximum(area - walls_mm * spacing, 0.0)
-    dense = np.minimum(dense, inside)
-    sparse_mm, dense_mm = walls_mm + (inside - dense) * process.support_density / spacing, dense * process.support_interface_density / spacing
-    time_s = sparse_mm / process.support_speed_mm_s + dense_mm / process.support_interface_speed_mm_s
-    return Rough(time_s, (sparse_mm + dense_mm) * bead_area_mm2(width, high))
+    dense = np.minimum(np.where(support.closed, close, 0.0), inside)
+    return np.column_stack([walls_mm + (inside - dense) * density / spacing, dense * process.support_interface_density / spacing])
 
 
 def _around_mm(area: Polygons) -> float:

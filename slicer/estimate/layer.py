@@ -9,11 +9,11 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Indices
 from profiles.profile import Profile
 from slicer.bead import with_line_width
-from slicer.estimate.duration import line_s, retraction_s, strokes_s
+from slicer.estimate.duration import strokes_s
 from slicer.estimate.hanging import ThickSupport
 from slicer.fill.infill import pattern_density
-from slicer.fill.region import Cover, Region, regions, shell_layers
-from slicer.geometry.polygons import Polygons, union
+from slicer.fill.region import Cover, Region, beside_cuts, shell_layers, solid_bottom_layers, sparse_area, split_inside
+from slicer.geometry.polygons import Polygons
 from slicer.heights import Heights
 from slicer.interface.cut_walls import CutWalls, cut_walls
 from slicer.interface.model import Model, model_around
@@ -26,9 +26,7 @@ from slicer.strokes.order import order_beads
 from slicer.strokes.overhanging import split_overhangs, strengthen_overhangs
 from slicer.strokes.pieces import in_pieces
 from slicer.strokes.seam import NO_LIMITS, NO_SEAMS, Surroundings, place_seams, rear_of
-from slicer.strokes.speed import axes_mm_s2, first_layer_speeds, speeds_mm_s
-from slicer.strokes.strokes import Strokes
-from slicer.strokes.travels import travels
+from slicer.strokes.speed import first_layer_speeds, speeds_mm_s
 from slicer.support.support import Supports
 
 SUPPORT = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
@@ -39,7 +37,7 @@ def sections_near(part: Part, profile: Profile, heights: Heights, layers: Indice
     """The sections of a part's layers, empty but for the lowest, the highest, some layers and as many beside them as shells look."""
     top, bottom = shell_layers(profile.of_part(part.index).process)
     count = len(heights.tip_mm)
-    near = layers[:, None] + np.arange(-max(bottom, 1) - 1, max(top, 1) + 2)
+    near = layers[:, None] + np.array([*_steps(top, bottom), -1, 0, 1, top])
     kept = np.unique(np.clip(np.append(near, [0, count - 1]), 0, count - 1))
     some = section_layers(part, profile, heights[kept], (), later)
 
@@ -63,10 +61,20 @@ def sections_near(part: Part, profile: Profile, heights: Heights, layers: Indice
     )
 
 
+def _steps(top: int, bottom: int) -> tuple[int, ...]:
+    """Which layers above and below one tell how far it is covered: the farthest of its shells but one, which the layer below asks
+    for, too, and what is next to it."""
+    return tuple({min(1, top - 1), top - 1, -bottom} - {0, -1} if top else {-bottom} - {0})
+
+
 def sliced_layers(sections: Sections, support: ThickSupport, layers: Indices) -> Floats:
     """(n, 3) seconds, mm3 and mm3 of support of each of some layers."""
     shells = _shells(sections, support, layers)
-    return np.array([_taken(shells, layer) for layer in layers.tolist()]).reshape(-1, 3)
+    tip, taken = rear_of(sections.mesh.bounds_mm), []
+    for layer in layers.tolist():
+        figures, tip = _taken(shells, layer, tip)
+        taken.append(figures)
+    return np.array(taken)
 
 
 def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shells:
@@ -81,12 +89,10 @@ def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shell
         own, height_mm = processes[layer], float(sections.heights.height_mm[layer])
         [own] = strengthen_overhangs([own], [sections.own[layer]], sections.below(layer))
         walled = cut_walls(sections.own[layer], model.sections[layer], own, height_mm=height_mm, nozzle_mm=nozzle_mm, usual=process.walls)
-        below = none
-        if layer:
-            below = _region(sections, model, walled, layer - 1)
-        shells[layer] = Shell(own, walled.walls, walled.ending, _region(sections, model, walled, layer), (), empty)
+        region, lower = _region(sections, model, walled, layer)
+        shells[layer] = Shell(own, walled.walls, walled.ending, region, (), empty)
         if layer and shells[layer - 1] is None:
-            shells[layer - 1] = replace(shells[layer], region=below)
+            shells[layer - 1] = replace(shells[layer], region=replace(none, sparse=lower))
         if support.which[layer] >= 0:
             areas[layer] = support.areas[support.which[layer]]
             dense[layer] = support.dense[support.which[layer]] if support.closed[layer] else empty
@@ -98,30 +104,44 @@ def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shell
     return Shells(Supports(sections, areas, dense, nothing, nothing, nothing), shells, density)
 
 
-def _region(sections: Sections, model: Model, walled: CutWalls, layer: int) -> Region:
-    process = sections.process
+def _region(sections: Sections, model: Model, walled: CutWalls, layer: int) -> tuple[Region, Polygons]:
+    """The region of a layer, and what is sparse of the one below."""
+    process, inside = sections.process, walled.walls.inside
     top, bottom = shell_layers(process)
-    whole = [mine if other is None else other for mine, other in zip(sections.own, model.sections, strict=True)]
-    above = [*whole[layer + 1 : layer + 1 + top], *model.above][:top]
-    below = [*whole[max(layer - bottom, 0) : layer][::-1], *model.below][:bottom]
-    reach = process.interface_top_layers
-    later = (union(list(model.others[max(layer - reach, 0) : layer + reach + 1])),) if model.is_cut else ()
-    cover = Cover([whole[layer]], [walled.model_inside], below, above, later)
-    [region] = regions([walled.walls.inside], cover, not sections.on_platform and layer < process.interface_bottom_layers, process)
-    return region
+
+    def at(number: int) -> Polygons:
+        """The model in a layer."""
+        if 0 <= number < len(sections.own):
+            return sections.own[number] if model.sections[number] is None else model.sections[number]
+        beyond, k = (model.below, -1 - number) if number < 0 else (model.above, number - len(sections.own))
+        return beyond[k] if k < len(beyond) else Polygons()
+
+    if inside.is_empty():
+        return Region(*(Polygons(),) * 5), Polygons()
+    shared = walled.model_inside
+    for step in _steps(top, bottom):
+        shared = shared ^ at(layer + step)
+    lower = sparse_area(walled.model_inside, shared, at(layer) if top else shared, process)
+    uncut = sparse_area(walled.model_inside, shared ^ at(layer + top) if top else shared, at(layer - 1) if bottom else shared, process)
+    if not sections.on_platform and layer < solid_bottom_layers(process):
+        sparse = Polygons()
+    else:
+        cover = Cover((), [walled.model_inside] * (layer + 1), (), (), model.others if model.is_cut else ())
+        sparse = beside_cuts(inside, uncut, cover, layer, process)
+    return split_inside(inside, sparse, uncut, at(layer + 1) if top else inside, process), lower ^ inside
 
 
-def _taken(shells: Shells, layer: int) -> tuple[float, float, float]:
+def _taken(shells: Shells, layer: int, tip: Floats) -> tuple[tuple[float, float, float], Floats]:
     sections, shell = shells.sections, shells.layers[layer]
     profile, process, heights = sections.profile, shell.process, sections.heights
     height_mm, outline, support = float(heights.height_mm[layer]), sections.outlines[layer], shells.supports.areas[layer]
     own, auxiliary = lay_beads(shells, layer)
-    around = Surroundings(rear_of(sections.mesh.bounds_mm), NO_SEAMS, rear_of(sections.mesh.bounds_mm), NO_LIMITS, layer, NO_SEAMS)
+    around = Surroundings(rear_of(sections.mesh.bounds_mm), NO_SEAMS, tip, NO_LIMITS, layer, NO_SEAMS)
     beads, _ = place_seams([*own, *auxiliary], process, around)
     beads += shell.ending
     if not beads:
-        return 0.0, 0.0, 0.0
-    strokes = order_beads(beads, outline, process, beads[0].points[0], support)
+        return (0.0, 0.0, 0.0), tip
+    strokes = order_beads(beads, outline, process, tip, support)
     strokes = in_pieces(split_overhangs(strokes, outline, sections.below(layer), process), height_mm)
     fixed, flow = None, profile.material.flow
     if layer == 0:
@@ -129,15 +149,5 @@ def _taken(shells: Shells, layer: int) -> tuple[float, float, float]:
         flow *= sections.process.first_layer_flow if sections.on_platform else sections.process.interface_flow
     speeds = speeds_mm_s(strokes, profile, height_mm, fixed, flow)
     mm3 = strokes.lengths_mm * bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
-    time_s = strokes_s(strokes, speeds, profile, layer == 0 and sections.on_platform) + _change_s(strokes, sections, support, outline)
-    return time_s, float(mm3.sum()), float(mm3[strokes.is_of(*SUPPORT)].sum())
-
-
-def _change_s(strokes: Strokes, sections: Sections, support: Polygons, outline: Polygons) -> float:
-    """Seconds of the way from a layer's end to the beginning of the next one, which is taken to be like its own."""
-    profile, process = sections.profile, sections.process
-    since, to = strokes.last_points[-1:], strokes.first_points[:1]
-    retracts, _ = travels(since, to, outline, support, process)
-    way_s = line_s(float(np.hypot(*(to - since)[0])), process.travel_speed_mm_s, axes_mm_s2(profile))
-    rise_s = line_s(process.layer_height_mm, process.lift_speed_mm_s, profile.machine.z.acceleration_mm_s2)
-    return way_s + (retraction_s(profile) if retracts[0] else rise_s)
+    time_s = strokes_s(strokes, speeds, tip, profile, layer == 0 and sections.on_platform)
+    return (time_s, float(mm3.sum()), float(mm3[strokes.is_of(*SUPPORT)].sum())), strokes.points[-1, :2]

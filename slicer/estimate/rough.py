@@ -4,7 +4,6 @@ A rough figure need not be right, only as much too high or low in a layer as in 
 layers corrects it.
 """
 
-from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
@@ -17,41 +16,21 @@ from profiles.process import Process
 from slicer.bead import spacing_mm
 from slicer.fill.region import shell_layers
 from slicer.heights import Heights
-from slicer.paths import bead_area_mm2
 
-LAYER_S = 0.3  # for the ways between strokes of even the smallest layer
+TINY_MM2 = 1e-9
 
-
-@dataclass(frozen=True, eq=False)
-class Rough:
-    """(n,) seconds and mm3 of every layer of a part."""
-
-    time_s: Floats
-    mm3: Floats
-
-    def __add__(self, other: "Rough") -> "Rough":
-        return Rough(self.time_s + other.time_s, self.mm3 + other.mm3)
-
-
-def rough_layers(mesh: Mesh, heights: Heights, process: Process, on_platform: bool) -> Rough:
-    """What the layers of a mesh take without support."""
-    (top, bottom), width, high = shell_layers(process), process.line_width_mm, heights.height_mm
+def rough_lengths_mm(mesh: Mesh, heights: Heights, process: Process, on_platform: bool) -> Floats:
+    """(n, 3) walls, skin and sparse infill of every layer of a mesh."""
+    (top, bottom), width = shell_layers(process), process.line_width_mm
     area, around, over, under = _measure(mesh.vertices, mesh.faces, heights.cut_mm)
     if not on_platform:
         under[0] = 0.0
-    sums = np.concatenate([[0.0], np.cumsum(over)]), np.concatenate([[0.0], np.cumsum(under)])
-    at = np.arange(len(area))
-    bare = sums[0][np.minimum(at + top, len(at))] - sums[0][at] + sums[1][at + 1] - sums[1][np.maximum(at + 1 - bottom, 0)]
-    spacing = spacing_mm(width, high)
+    seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
+    bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]
+    spacing = spacing_mm(width, heights.height_mm)
     inside = np.maximum(area - process.walls * spacing * around, 0.0)
-    skin = np.where(inside < process.solid_below_mm2, inside, inside * np.minimum(bare / np.maximum(area, 1e-9), 1.0))
-    walls_mm = around * np.minimum(process.walls, 0.5 * area / np.maximum(spacing * around, 1e-9))
-    skin_mm, sparse_mm = skin / spacing, (inside - skin) * process.infill_density / spacing
-    wall_s = walls_mm / max(process.walls, 1) * (1.0 / process.outer_wall_speed_mm_s + (process.walls - 1) / process.inner_wall_speed_mm_s)
-    laying_s = LAYER_S + wall_s + skin_mm / process.skin_speed_mm_s + sparse_mm / process.infill_speed_mm_s
-    total_mm = walls_mm + skin_mm + sparse_mm
-    least_s = np.minimum(process.least_layer_time_s, total_mm / process.least_speed_mm_s)
-    return Rough(np.maximum(laying_s, least_s), 1e-6 + total_mm * bead_area_mm2(width, high))
+    skin = np.where(inside < process.solid_below_mm2, inside, inside * np.minimum(bare / np.maximum(area, TINY_MM2), 1.0))
+    return np.column_stack([(area - inside) / spacing, skin / spacing, (inside - skin) * process.infill_density / spacing])
 
 
 @kernel
