@@ -18,8 +18,8 @@ from slicer.paths import bead_area_mm2
 from slicer.sectioning import heights_of
 from slicer.strokes.vase import vase_profile
 
-SAMPLES = 12  # layers of a print
-FEWEST = 4  # layers of a part
+SAMPLES = 8  # layers of a print
+FEWEST = 5  # layers of a part
 LAYER_S, SLOWER = 0.3, 1.4
 TURN_S = 2.0  # of the table before a part
 
