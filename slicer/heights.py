@@ -48,6 +48,12 @@ class Heights:
         pairs = ((self.tip_mm, above.tip_mm), (self.height_mm, above.height_mm), (self.cut_mm, above.cut_mm))
         return Heights(*(np.concatenate(pair) for pair in pairs))
 
+    def up_to(self, top_mm: float, height_mm: float) -> "Heights":
+        """The layers with more of one height on top as far as that."""
+        count = max(int(np.ceil((top_mm - self.tip_mm[-1]) / height_mm - 1e-9)), 0)
+        tips_mm = self.tip_mm[-1] + height_mm * np.arange(1, count + 1)
+        return self + Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
+
 
 NO_LAYERS = Heights(np.zeros(0), np.zeros(0), np.zeros(0))
 

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
 from profiles.process import Process
@@ -84,15 +82,13 @@ class Sections:
 
     def up_to(self, top_mm: float) -> "Sections":
         """The sections with empty layers on top as far as that height."""
-        tip_mm, height_mm = self.heights.tip_mm, self.process.layer_height_mm
-        count = int(np.ceil((top_mm - tip_mm[-1]) / height_mm - 1e-9))
+        heights = self.heights.up_to(top_mm, self.process.layer_height_mm)
+        count = len(heights.tip_mm) - len(self.heights.tip_mm)
         if count <= 0:
             return self
-        tips_mm = tip_mm[-1] + height_mm * np.arange(1, count + 1)
-        more = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
         outlines, own, ungrooved = ([*places, *[Polygons()] * count] for places in (self.outlines, self.own, self.ungrooved))
         around, known = self.neighbours, len(self.neighbours.above)
         higher = [*around.beside, *around.above, *[Polygons()] * count]  # the added layers are at the heights of `above`
         end = len(around.beside) + count
         around = replace(around, beside=higher[:end], above=higher[end : end + known])
-        return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved, neighbours=around)
+        return replace(self, heights=heights, outlines=outlines, own=own, ungrooved=ungrooved, neighbours=around)

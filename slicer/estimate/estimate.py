@@ -11,11 +11,10 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import INTERFACE_WIDTH
-from slicer.estimate.hanging import support_lengths_mm, thick_support
+from slicer.estimate.hanging import ThickSupport, support_lengths_mm, thick_supports
 from slicer.estimate.layer import sections_near, sliced_layers
 from slicer.estimate.rough import choose_layers, rough_lengths_mm
 from slicer.paths import bead_area_mm2
-from slicer.sectioning import heights_of
 from slicer.strokes.vase import vase_profile
 
 SAMPLES = 8  # layers of a print
@@ -43,26 +42,25 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
     """
     several = (parts,) if isinstance(parts, Part) else tuple(parts)
     total = Estimate(0.0, 0.0, 0.0)
-    for k, part in enumerate(several):
-        total += _estimate_part(part, profile, several[k + 1 :], max(FEWEST, SAMPLES // len(several)))
+    for k, support in enumerate(thick_supports(several, profile)):
+        total += _estimate_part(several[k], profile, several[k + 1 :], support, max(FEWEST, SAMPLES // len(several)))
     return total
 
 
-def _estimate_part(part: Part, whole: Profile, later: Sequence[Part], samples: int) -> Estimate:
+def _estimate_part(part: Part, whole: Profile, later: Sequence[Part], support: ThickSupport, samples: int) -> Estimate:
     """A part, the turn of the table before it and the wait for its heat."""
-    heights, profile, on_platform = heights_of(part, whole, later), vase_profile(whole.of_part(part.index)), part.index == 1
+    heights, profile, on_platform = support.heights, vase_profile(whole.of_part(part.index)), part.index == 1
     process, filament_mm2 = profile.process, 0.25 * pi * profile.material.diameter_mm**2
-    support = thick_support(part, heights, profile, later)
     drawn_mm = np.hstack(
         [
             rough_lengths_mm(part.in_part_frame(), heights, process, on_platform),
-            support_lengths_mm(support, heights, process, on_platform),
+            support_lengths_mm(support, process, on_platform),
         ]
     )
     bead_mm2 = bead_area_mm2(process.line_width_mm, heights.height_mm)
     rough_s, rough_mm3 = _rough_s(drawn_mm, process), 1e-6 + drawn_mm.sum(axis=1) * bead_mm2
     layers, begins = choose_layers(rough_s, 1, samples)
-    real = sliced_layers(sections_near(part, whole, heights, layers, later), support, layers)
+    real = sliced_layers(sections_near(part, whole, layers, later).up_to(float(heights.tip_mm[-1])), support, layers)
     scale_s = np.add.reduceat(rough_s, begins) / rough_s[layers]
     scale_mm3 = np.add.reduceat(rough_mm3, begins) / rough_mm3[layers]
     total = Estimate(float(scale_s @ real[:, 0]), float(scale_mm3 @ real[:, 1]) / filament_mm2, float(scale_mm3 @ real[:, 2]))

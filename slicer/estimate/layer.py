@@ -14,12 +14,11 @@ from slicer.estimate.hanging import ThickSupport
 from slicer.fill.infill import pattern_density
 from slicer.fill.region import Cover, Region, beside_cuts, shell_layers, solid_bottom_layers, sparse_area, split_inside
 from slicer.geometry.polygons import Polygons
-from slicer.heights import Heights
 from slicer.interface.cut_walls import CutWalls, cut_walls
 from slicer.interface.model import Model, model_around
 from slicer.layer_beads import lay_beads
 from slicer.paths import Kind, bead_area_mm2
-from slicer.sectioning import section_layers
+from slicer.sectioning import heights_of, section_layers
 from slicer.sections import Neighbours, Sections
 from slicer.shells import Shell, Shells, layer_processes
 from slicer.strokes.order import order_beads
@@ -33,9 +32,10 @@ SUPPORT = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
 DENSITY_LAYERS = 3
 
 
-def sections_near(part: Part, profile: Profile, heights: Heights, layers: Indices, later: Sequence[Part]) -> Sections:
+def sections_near(part: Part, profile: Profile, layers: Indices, later: Sequence[Part]) -> Sections:
     """The sections of a part's layers, empty but for the lowest, the highest, some layers and as many beside them as shells look."""
     top, bottom = shell_layers(profile.of_part(part.index).process)
+    heights = heights_of(part, profile, later)
     count = len(heights.tip_mm)
     near = layers[:, None] + np.array([*_steps(top, bottom), -1, 0, 1, top])
     kept = np.unique(np.clip(np.append(near, [0, count - 1]), 0, count - 1))
@@ -93,9 +93,8 @@ def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shell
         shells[layer] = Shell(own, walled.walls, walled.ending, region, (), empty)
         if layer and shells[layer - 1] is None:
             shells[layer - 1] = replace(shells[layer], region=replace(none, sparse=lower))
-        if support.which[layer] >= 0:
-            areas[layer] = support.areas[support.which[layer]]
-            dense[layer] = support.dense[support.which[layer]] if support.closed[layer] else empty
+        areas[layer] = support.areas[support.which[layer]]
+        dense[layer] = support.dense[support.which[layer]] if support.closed[layer] else empty
     nothing = [empty] * count
     sparse = [shells[layer].region.sparse for layer in layers.tolist()]
     sparse = [area for area in sparse if not area.is_empty()]
