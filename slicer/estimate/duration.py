@@ -17,6 +17,7 @@ from slicer.strokes.speed import axes_mm_s2, stroke_accelerations, travel_mm_s2
 from slicer.strokes.strokes import Strokes
 from slicer.strokes.wiping import STANDING_MM
 
+HALF_TURN = 0.5 / sqrt(2.0)  # of a wipe's length along each axis: in its middle it turns by 45 deg, as over the small rings after which most are
 TINY = 1e-9  # mm, mm/s or a cosine, instead of a division by 0
 
 
@@ -149,7 +150,10 @@ def _way_s(way: Way, tip: Floats, bounds: tuple[Floats, Floats], retract: Mask, 
                 apart = sqrt((x - way.points[begun, 0]) ** 2 + (y - way.points[begun, 1]) ** 2)
                 wipe = pace.wipe_mm if apart <= way.points[begun, 2] else -pace.wipe_mm  # on along a ring, back along a line
                 ux, uy = moves.direction[n - 1, 0], moves.direction[n - 1, 1]
-                _add(moves, (wipe * ux, wipe * uy, 0.0), pace.wipe_mm_s, np.inf, pace.wipe_mm <= 0.0, pace)
+                half = 0.5 * wipe
+                aside = HALF_TURN * wipe
+                _add(moves, (half * ux, half * uy, 0.0), pace.wipe_mm_s, np.inf, False, pace)
+                _add(moves, (aside * (ux - uy), aside * (ux + uy), 0.0), pace.wipe_mm_s, np.inf, False, pace)
             _add(moves, (0.0, 0.0, pace.lift_mm), pace.lift_mm_s, np.inf, pace.wipe_mm <= 0.0, pace)
         for i in range(way.approach_starts[k], way.approach_starts[k + 1] + 1):
             if i < way.approach_starts[k + 1]:

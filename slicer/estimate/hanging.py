@@ -24,9 +24,9 @@ from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, own_supports
 from slicer.walls.brim import plate_outline
 
-LAYERS = 40  # thick layers at most, and one above what hangs
+LAYERS = 60  # thick layers at most, and one above what hangs
 COARSE_MM = 0.05  # sections are simplified by this
-LEAST_MM = 0.5  # of a thick layer
+LEAST_MM = 0.4  # of a thick layer
 
 
 @dataclass(frozen=True, eq=False)
