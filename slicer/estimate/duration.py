@@ -17,7 +17,8 @@ from slicer.strokes.speed import axes_mm_s2, stroke_accelerations, travel_mm_s2
 from slicer.strokes.strokes import Strokes
 from slicer.strokes.wiping import STANDING_MM
 
-HALF_TURN = 0.5 / sqrt(2.0)  # of a wipe's length along each axis: in its middle it turns by 45 deg, as over the small rings after which most are
+# A wipe turns in its middle by 45 deg, as over the small rings after which most are: mm along each axis for a mm of all of it.
+TURNED = 0.5 / sqrt(2.0)
 TINY = 1e-9  # mm, mm/s or a cosine, instead of a division by 0
 
 
@@ -37,15 +38,15 @@ class Pace(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Buffers for moves one after the other, as many as `count` tells: direction (n, 3), length, cruise speed, acceleration, and the
-    greatest speed at which each begins."""
+    """Buffers for moves one after the other, as many as `made` tells: direction (n, 3), length, cruise speed, acceleration, and
+    the greatest speed at which each begins."""
 
     direction: Floats
     length: Floats
     cruise: Floats
     ramp: Floats
     begin: Floats
-    count: Indices
+    made: Indices
 
 
 @borrower
@@ -69,7 +70,8 @@ def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profi
     """
     told = stroke_accelerations(profile, first_layer)
     most = np.full(len(KINDS), np.inf) if told is None else np.array([told[kind] for kind in KINDS])
-    pace, places = _pace(profile), Way(strokes.points, strokes.starts, strokes.approach, strokes.approach_starts)
+    pace = _pace(profile)
+    places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
     moving_s = _way_s(places, tip, (speeds_mm_s, most[strokes.kind]), strokes.retract, pace)
     rise_s = line_s(profile.process.layer_height_mm, pace.lift_mm_s, pace.z_mm_s2)
     return float(moving_s + rise_s + int(strokes.retract.sum()) * _standing_s(profile))
@@ -105,20 +107,11 @@ def _standing_s(profile: Profile) -> float:
     return primed_s if material.wipe_mm > 0.0 else primed_s + line_s(material.retract_mm, _filament_mm_s(profile), ramp)
 
 
-class Way(NamedTuple):
-    """Points (n, 3) of strokes, where each begins, points (m, 2) that the travels to them pass, and where those of each begin."""
-
-    points: Floats
-    starts: Indices
-    approach: Floats
-    approach_starts: Indices
-
-
 @borrower
 def _add(moves: Moves, step: tuple[float, float, float], cruise: float, told: float, stands: bool, pace: Pace) -> None:
     """Append a straight move; stands: the machine stands still before it."""
     length = sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
-    n = moves.count[0]
+    n = moves.made[0]
     if length <= STANDING_MM:
         return
     ux, uy, uz = step[0] / length, step[1] / length, step[2] / length
@@ -131,50 +124,54 @@ def _add(moves: Moves, step: tuple[float, float, float], cruise: float, told: fl
         change = max(abs(ux - x), abs(uy - y), abs(uz - z), TINY)
         moves.begin[n] = min(cruise, moves.cruise[n - 1], pace.junction_mm_s / change)
     moves.direction[n, 0], moves.direction[n, 1], moves.direction[n, 2] = ux, uy, uz
-    moves.count[0] += 1
+    moves.made[0] += 1
 
 
 @kernel
-def _way_s(way: Way, tip: Floats, bounds: tuple[Floats, Floats], retract: Mask, pace: Pace) -> float:
+def _way_s(
+    places: tuple[Floats, Indices, Floats, Indices], tip: Floats, bounds: tuple[Floats, Floats], retract: Mask, pace: Pace
+) -> float:
     """Seconds of strokes one after the other, from a stand to a stand; a travel that retracts wipes and lifts, and ends at a
     stand, where the filament is primed."""
+    points, starts, approach, approach_starts = places
     speeds, most = bounds
-    room = len(way.points) + len(way.approach) + 4 * len(speeds) + 1
+    room = len(points) + len(approach) + 4 * len(speeds) + 1
     moves = Moves(table(room, 3), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(1, 0))
     x, y = tip[0], tip[1]
     for k in range(len(speeds)):
-        first, n = way.starts[k], moves.count[0]
+        first, n = starts[k], moves.made[0]
+        stands = retract[k] and pace.wipe_mm <= 0.0
         if retract[k]:
             if n > 0:
-                begun = way.starts[k - 1]
-                apart = sqrt((x - way.points[begun, 0]) ** 2 + (y - way.points[begun, 1]) ** 2)
-                wipe = pace.wipe_mm if apart <= way.points[begun, 2] else -pace.wipe_mm  # on along a ring, back along a line
+                begun = starts[k - 1]
+                apart = sqrt((x - points[begun, 0]) ** 2 + (y - points[begun, 1]) ** 2)
+                wipe = pace.wipe_mm if apart <= points[begun, 2] else -pace.wipe_mm  # on along a ring, back along a line
                 ux, uy = moves.direction[n - 1, 0], moves.direction[n - 1, 1]
-                half = 0.5 * wipe
-                aside = HALF_TURN * wipe
-                _add(moves, (half * ux, half * uy, 0.0), pace.wipe_mm_s, np.inf, False, pace)
+                aside = TURNED * wipe
+                _add(moves, (0.5 * wipe * ux, 0.5 * wipe * uy, 0.0), pace.wipe_mm_s, np.inf, False, pace)
                 _add(moves, (aside * (ux - uy), aside * (ux + uy), 0.0), pace.wipe_mm_s, np.inf, False, pace)
-            _add(moves, (0.0, 0.0, pace.lift_mm), pace.lift_mm_s, np.inf, pace.wipe_mm <= 0.0, pace)
-        for i in range(way.approach_starts[k], way.approach_starts[k + 1] + 1):
-            if i < way.approach_starts[k + 1]:
-                x1, y1 = way.approach[i, 0], way.approach[i, 1]
+            _add(moves, (0.0, 0.0, pace.lift_mm), pace.lift_mm_s, np.inf, stands, pace)
+        for i in range(approach_starts[k], approach_starts[k + 1] + 1):
+            if i < approach_starts[k + 1]:
+                x1, y1 = approach[i, 0], approach[i, 1]
             else:
-                x1, y1 = way.points[first, 0], way.points[first, 1]
-            _add(moves, (x1 - x, y1 - y, 0.0), pace.travel_mm_s, pace.travel_mm_s2, False, pace)
+                x1, y1 = points[first, 0], points[first, 1]
+            stands = stands and i == approach_starts[k] and pace.lift_mm <= STANDING_MM
+            _add(moves, (x1 - x, y1 - y, 0.0), pace.travel_mm_s, pace.travel_mm_s2, stands, pace)
             x, y = x1, y1
         if retract[k]:
             _add(moves, (0.0, 0.0, -pace.lift_mm), pace.lift_mm_s, np.inf, False, pace)
-        for i in range(first + 1, way.starts[k + 1]):
-            step = (way.points[i, 0] - way.points[i - 1, 0], way.points[i, 1] - way.points[i - 1, 1], 0.0)
+        for i in range(first + 1, starts[k + 1]):
+            step = (points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1], 0.0)
             _add(moves, step, speeds[k], most[k], retract[k] and i == first + 1, pace)
-        x, y = way.points[way.starts[k + 1] - 1, 0], way.points[way.starts[k + 1] - 1, 1]
+        x, y = points[starts[k + 1] - 1, 0], points[starts[k + 1] - 1, 1]
     return _moves_s(moves)
 
 
 @part
 def _moves_s(moves: Moves) -> float:
     """Seconds of moves that end at a stand; changes where they begin."""
-    n, begin = moves.count[0], moves.begin
+    n, begin = moves.made[0], moves.begin
     begin[n] = 0.0
     for i in range(n - 1, -1, -1):
         begin[i] = min(begin[i], sqrt(begin[i + 1] ** 2 + 2.0 * moves.ramp[i] * moves.length[i]))

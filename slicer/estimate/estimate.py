@@ -10,15 +10,15 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import INTERFACE_WIDTH
+from slicer.bead import INTERFACE_WIDTH, spacing_mm
 from slicer.estimate.hanging import ThickSupport, support_lengths_mm, thick_supports
 from slicer.estimate.layer import sections_near, sliced_layers
 from slicer.estimate.rough import choose_layers, rough_lengths_mm
 from slicer.paths import bead_area_mm2
 from slicer.strokes.vase import vase_profile
 
-SAMPLES = 8  # layers of a print
-FEWEST = 5  # layers of a part
+SAMPLES = 7  # layers of a print that are sliced: the error of 23 parts by it is 1 % in the median, with 12 layers 0.7 %
+FEWEST = 4  # layers of a part
 LAYER_S, SLOWER = 0.3, 1.4
 TURN_S = 2.0  # of the table before a part
 
@@ -57,7 +57,7 @@ def _estimate_part(part: Part, whole: Profile, later: Sequence[Part], support: T
             support_lengths_mm(support, process, on_platform),
         ]
     )
-    bead_mm2 = bead_area_mm2(process.line_width_mm, heights.height_mm)
+    bead_mm2 = spacing_mm(process.line_width_mm, process.layer_height_mm) * heights.height_mm
     rough_s, rough_mm3 = _rough_s(drawn_mm, process), 1e-6 + drawn_mm.sum(axis=1) * bead_mm2
     layers, begins = choose_layers(rough_s, 1, samples)
     real = sliced_layers(sections_near(part, whole, layers, later).up_to(float(heights.tip_mm[-1])), support, layers)
@@ -87,4 +87,5 @@ def _rough_s(drawn_mm: Floats, process: Process) -> Floats:
         process.support_interface_speed_mm_s,
     )
     least_s = np.minimum(process.least_layer_time_s, drawn_mm.sum(axis=1) / process.least_speed_mm_s)
-    return LAYER_S + np.maximum(SLOWER * drawn_mm @ (1.0 / np.array(speeds)), least_s)
+    rough_s: Floats = LAYER_S + np.maximum(SLOWER * drawn_mm @ (1.0 / np.array(speeds)), least_s)
+    return rough_s

@@ -24,7 +24,7 @@ from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, own_supports
 from slicer.walls.brim import plate_outline
 
-LAYERS = 60  # thick layers at most, and one above what hangs
+LAYERS = 36  # thick layers at most, and one above what hangs
 COARSE_MM = 0.05  # sections are simplified by this
 LEAST_MM = 0.4  # of a thick layer
 
@@ -46,12 +46,15 @@ def thick_supports(parts: Sequence[Part], profile: Profile) -> list[ThickSupport
     profiles = [vase_profile(profile.of_part(part.index)) for part in parts]
     heights = [heights_of(part, profile, parts[k + 1 :]) for k, part in enumerate(parts)]
     tops = [_hanging_up_to_mm(part, own.process) for part, own in zip(parts, profiles, strict=True)]
-    plain = [ThickSupport(own, np.zeros(len(own.tip_mm), np.int64), np.zeros(len(own.tip_mm), np.bool_), [Polygons()], [Polygons()]) for own in heights]
+    plain = [
+        ThickSupport(own, np.zeros(len(own.tip_mm), np.int64), np.zeros(len(own.tip_mm), np.bool_), [Polygons()], [Polygons()])
+        for own in heights
+    ]
     if not any(tops):
         return plain
     reach = len(parts) if any(tops[1:]) else 1  # of a later part's support some may have to be printed with an earlier one
     sections = []
-    for k, (part, own, top_mm) in enumerate(zip(parts[:reach], profiles, tops, strict=False)):
+    for k, (own, top_mm) in enumerate(zip(profiles[:reach], tops, strict=False)):
         top_mm = float(heights[k].tip_mm[-1]) if any(tops[k + 1 :]) else top_mm
         thick = _thick_layers(float(heights[k].tip_mm[0]), top_mm, 0.5 * float(heights[k].height_mm.min()))
         sections.append(_thick_sections(parts, k, own, thick))
@@ -99,9 +102,11 @@ def _of_layers(heights: Heights, support: Supports, profile: Profile) -> ThickSu
 
 def support_lengths_mm(support: ThickSupport, process: Process, on_platform: bool) -> Floats:
     """(n, 2) sparse and dense lines of the support of every layer of a part."""
-    extents = np.array([(area.area(), _around_mm(area), dense.area()) for area, dense in zip(support.areas, support.dense, strict=True)])
+    extents = np.array(
+        [(area.area(), _around_mm(area), dense.area()) for area, dense in zip(support.areas, support.dense, strict=True)]
+    )
     area, around, close = extents[support.which].T
-    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, support.heights.height_mm)
+    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
     walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
     if on_platform:
         density[0] = process.support_foot_density

@@ -1,6 +1,10 @@
-"""Layer: what single layers of a part take, sliced as for a print, but for what lies far from them."""
+"""Layer: what single layers of a part take, sliced as for a print.
 
-from collections.abc import Sequence
+Left out is what single layers do not tell: bridges, ironing, skin under walls that begin soon, what is poured into grooves and
+pins; and seams are where the layer alone would have them.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,21 +23,24 @@ from slicer.interface.model import Model, model_around
 from slicer.layer_beads import lay_beads
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import heights_of, section_layers
-from slicer.sections import Neighbours, Sections
+from slicer.sections import Sections
 from slicer.shells import Shell, Shells, layer_processes
 from slicer.strokes.order import order_beads
 from slicer.strokes.overhanging import split_overhangs, strengthen_overhangs
 from slicer.strokes.pieces import in_pieces
 from slicer.strokes.seam import NO_LIMITS, NO_SEAMS, Surroundings, place_seams, rear_of
 from slicer.strokes.speed import first_layer_speeds, speeds_mm_s
+from slicer.support.pedestal import pedestal_layers
 from slicer.support.support import Supports
+from slicer.walls.walls import Walls
 
 SUPPORT = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
-DENSITY_LAYERS = 3
+NOTHING = Polygons()
 
 
 def sections_near(part: Part, profile: Profile, layers: Indices, later: Sequence[Part]) -> Sections:
-    """The sections of a part's layers, empty but for the lowest, the highest, some layers and as many beside them as shells look."""
+    """The sections of a part's layers, empty but for the lowest, the highest, some layers and those that decide where these are
+    solid. later: the parts printed after it."""
     top, bottom = shell_layers(profile.of_part(part.index).process)
     heights = heights_of(part, profile, later)
     count = len(heights.tip_mm)
@@ -42,21 +49,21 @@ def sections_near(part: Part, profile: Profile, layers: Indices, later: Sequence
     some = section_layers(part, profile, heights[kept], (), later)
 
     def spread(places: Sequence[Polygons]) -> list[Polygons]:
-        spread = [Polygons()] * count
+        everywhere = [Polygons()] * count
         for layer, place in zip(kept.tolist(), places, strict=True):
-            spread[layer] = place
-        return spread
+            everywhere[layer] = place
+        return everywhere
 
-    around = some.neighbours
     own = spread(some.own)
+    pedestal_mm = float(some.heights.tip_mm[some.pedestal_layers - 1]) if some.pedestal_layers else 0.0
     return replace(
         some,
         heights=heights,
         outlines=own if some.outlines is some.own else spread(some.outlines),
         own=own,
         ungrooved=own if some.ungrooved is some.own else spread(some.ungrooved),
-        neighbours=replace(around, beside=spread(around.beside)),
-        pedestal_layers=int(np.searchsorted(heights.tip_mm, float(some.heights.tip_mm[max(some.pedestal_layers - 1, 0)]) + 1e-6)) if some.pedestal_layers else 0,
+        neighbours=replace(some.neighbours, beside=spread(some.neighbours.beside)),
+        pedestal_layers=pedestal_layers(heights.tip_mm, pedestal_mm),
         too_thin=frozenset(),
     )
 
@@ -78,28 +85,25 @@ def sliced_layers(sections: Sections, support: ThickSupport, layers: Indices) ->
 
 
 def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shells:
-    process, nozzle_mm = sections.process, sections.profile.machine.head.nozzle_mm
-    count, empty = len(sections.outlines), Polygons()
-    none = Region(empty, empty, empty, empty, empty)
-    processes = layer_processes(process, sections.on_platform, count)
-    model = model_around(sections)
-    shells: list[Shell | None] = [None] * count
-    areas, dense = [empty] * count, [empty] * count
+    """The shells of some layers; those of the others are not there, but for what is sparse below one of them."""
+    process, nozzle_mm, model = sections.process, sections.profile.machine.head.nozzle_mm, model_around(sections)
+    nothing = [NOTHING] * len(sections.outlines)
+    processes = layer_processes(process, sections.on_platform, len(nothing))
+    no_shell = Shell(process, Walls((), NOTHING, NOTHING), (), Region(*[NOTHING] * 5), (), NOTHING)
+    shells, areas, dense, filled = [no_shell] * len(nothing), list(nothing), list(nothing), list[Polygons]()
     for layer in layers.tolist():
-        own, height_mm = processes[layer], float(sections.heights.height_mm[layer])
-        [own] = strengthen_overhangs([own], [sections.own[layer]], sections.below(layer))
-        walled = cut_walls(sections.own[layer], model.sections[layer], own, height_mm=height_mm, nozzle_mm=nozzle_mm, usual=process.walls)
+        [own] = strengthen_overhangs([processes[layer]], [sections.own[layer]], sections.below(layer))
+        sides = {"height_mm": float(sections.heights.height_mm[layer]), "nozzle_mm": nozzle_mm}
+        walled = cut_walls(sections.own[layer], model.sections[layer], own, **sides, usual=process.walls)
         region, lower = _region(sections, model, walled, layer)
-        shells[layer] = Shell(own, walled.walls, walled.ending, region, (), empty)
-        if layer and shells[layer - 1] is None:
-            shells[layer - 1] = replace(shells[layer], region=replace(none, sparse=lower))
+        shells[layer] = Shell(own, walled.walls, walled.ending, region, (), NOTHING)
+        if layer and shells[layer - 1] is no_shell:
+            shells[layer - 1] = replace(no_shell, region=replace(no_shell.region, sparse=lower))
         areas[layer] = support.areas[support.which[layer]]
-        dense[layer] = support.dense[support.which[layer]] if support.closed[layer] else empty
-    nothing = [empty] * count
-    sparse = [shells[layer].region.sparse for layer in layers.tolist()]
-    sparse = [area for area in sparse if not area.is_empty()]
+        dense[layer] = support.dense[support.which[layer]] if support.closed[layer] else NOTHING
+        filled += [region.sparse] if not region.sparse.is_empty() else []
     infill = with_line_width(process, process.infill_line_width_mm)
-    density = pattern_density(sparse[:: max(len(sparse) // DENSITY_LAYERS, 1)], infill, process.layer_height_mm)
+    density = pattern_density(filled[len(filled) // 2 :][:1], infill, process.layer_height_mm)
     return Shells(Supports(sections, areas, dense, nothing, nothing, nothing), shells, density)
 
 
@@ -113,17 +117,19 @@ def _region(sections: Sections, model: Model, walled: CutWalls, layer: int) -> t
         if 0 <= number < len(sections.own):
             return sections.own[number] if model.sections[number] is None else model.sections[number]
         beyond, k = (model.below, -1 - number) if number < 0 else (model.above, number - len(sections.own))
-        return beyond[k] if k < len(beyond) else Polygons()
+        return beyond[k] if k < len(beyond) else NOTHING
 
     if inside.is_empty():
-        return Region(*(Polygons(),) * 5), Polygons()
+        return Region(*[NOTHING] * 5), NOTHING
     shared = walled.model_inside
     for step in _steps(top, bottom):
         shared = shared ^ at(layer + step)
     lower = sparse_area(walled.model_inside, shared, at(layer) if top else shared, process)
-    uncut = sparse_area(walled.model_inside, shared ^ at(layer + top) if top else shared, at(layer - 1) if bottom else shared, process)
+    uncut = sparse_area(
+        walled.model_inside, shared ^ at(layer + top) if top else shared, at(layer - 1) if bottom else shared, process
+    )
     if not sections.on_platform and layer < solid_bottom_layers(process):
-        sparse = Polygons()
+        sparse = NOTHING
     else:
         cover = Cover((), [walled.model_inside] * (layer + 1), (), (), model.others if model.is_cut else ())
         sparse = beside_cuts(inside, uncut, cover, layer, process)
@@ -131,6 +137,7 @@ def _region(sections: Sections, model: Model, walled: CutWalls, layer: int) -> t
 
 
 def _taken(shells: Shells, layer: int, tip: Floats) -> tuple[tuple[float, float, float], Floats]:
+    """Seconds, mm3 and mm3 of support of a layer, and where it ends. tip: (2,) where the one before ended."""
     sections, shell = shells.sections, shells.layers[layer]
     profile, process, heights = sections.profile, shell.process, sections.heights
     height_mm, outline, support = float(heights.height_mm[layer]), sections.outlines[layer], shells.supports.areas[layer]
@@ -142,7 +149,8 @@ def _taken(shells: Shells, layer: int, tip: Floats) -> tuple[tuple[float, float,
         return (0.0, 0.0, 0.0), tip
     strokes = order_beads(beads, outline, process, tip, support)
     strokes = in_pieces(split_overhangs(strokes, outline, sections.below(layer), process), height_mm)
-    fixed, flow = None, profile.material.flow
+    fixed: Mapping[Kind, float] | None = None
+    flow = profile.material.flow
     if layer == 0:
         fixed = first_layer_speeds(sections.process, sections.on_platform)
         flow *= sections.process.first_layer_flow if sections.on_platform else sections.process.interface_flow

@@ -19,6 +19,7 @@ from slicer.heights import Heights
 
 TINY_MM2 = 1e-9
 
+
 def rough_lengths_mm(mesh: Mesh, heights: Heights, process: Process, on_platform: bool) -> Floats:
     """(n, 3) walls, skin and sparse infill of every layer of a mesh."""
     (top, bottom), width = shell_layers(process), process.line_width_mm
@@ -27,7 +28,7 @@ def rough_lengths_mm(mesh: Mesh, heights: Heights, process: Process, on_platform
         under[0] = 0.0
     seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
     bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]
-    spacing = spacing_mm(width, heights.height_mm)
+    spacing = spacing_mm(width, process.layer_height_mm)
     inside = np.maximum(area - process.walls * spacing * around, 0.0)
     skin = np.where(inside < process.solid_below_mm2, inside, inside * np.minimum(bare / np.maximum(area, TINY_MM2), 1.0))
     return np.column_stack([(area - inside) / spacing, skin / spacing, (inside - skin) * process.infill_density / spacing])

@@ -18,7 +18,13 @@ from mdp.kernels.cache import keep, mark, trouble
 from mdp.kernels.threads import THREADS
 from profiles.profile import Profile
 
-JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = ("judge",), ("sweep", "search"), ("slice", "dry-run"), ("dry-run",), ("draw",)
+JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = (
+    ("judge",),
+    ("sweep", "search", "slice"),
+    ("slice", "dry-run"),
+    ("dry-run",),
+    ("draw",),
+)
 LOOK_S = 0.2
 COMPILE = "import sys; sys.path[:] = {path!r}; from machine.app.pipeline.precompile import main; main()"
 
