@@ -1,4 +1,10 @@
-"""Estimate: print time and filament of parts from a few of their layers, sliced as for a print."""
+"""Estimate: print time and filament of parts from a few of their layers, sliced as for a print, in tenths of a second.
+
+All layers are measured roughly, by lengths that follow from the mesh and from the support of thick layers. Layers that share
+these evenly between them are then sliced by the slicer's own code and timed with the machine's acceleration, and each run of
+layers takes as much more than its rough figures as the layer that stands for it. It is there to choose between decompositions:
+half of all prints are off by less than 3 %, most by less than 8; the dry run has the exact figures.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +13,7 @@ from math import pi
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import INTERFACE_WIDTH, spacing_mm
@@ -19,7 +25,9 @@ from slicer.strokes.vase import vase_profile
 
 SAMPLES = 7  # layers of a print that are sliced: the error of 23 parts by it is 1 % in the median, with 12 layers 0.7 %
 FEWEST = 4  # layers of a part
-LAYER_S, SLOWER = 0.3, 1.4
+LAYER_S = 0.3  # for the ways between strokes of even the smallest layer
+SLOWER = 1.4  # strokes with their accelerations and travels than their lengths at their speeds
+TINY_MM3 = 1e-6
 TURN_S = 2.0  # of the table before a part
 
 
@@ -51,23 +59,32 @@ def _estimate_part(part: Part, whole: Profile, later: Sequence[Part], support: T
     """A part, the turn of the table before it and the wait for its heat."""
     heights, profile, on_platform = support.heights, vase_profile(whole.of_part(part.index)), part.index == 1
     process, filament_mm2 = profile.process, 0.25 * pi * profile.material.diameter_mm**2
-    drawn_mm = np.hstack(
-        [
-            rough_lengths_mm(part.in_part_frame(), heights, process, on_platform),
-            support_lengths_mm(support, process, on_platform),
-        ]
-    )
+    drawn_mm = rough_lengths_mm(part.in_part_frame(), heights, process, on_platform)
+    held_mm = support_lengths_mm(support, process, on_platform)
     bead_mm2 = spacing_mm(process.line_width_mm, process.layer_height_mm) * heights.height_mm
-    rough_s, rough_mm3 = _rough_s(drawn_mm, process), 1e-6 + drawn_mm.sum(axis=1) * bead_mm2
+    rough_s = _rough_s(np.hstack([drawn_mm, held_mm]), process)
     layers, begins = choose_layers(rough_s, 1, samples)
     real = sliced_layers(sections_near(part, whole, layers, later).up_to(float(heights.tip_mm[-1])), support, layers)
-    scale_s = np.add.reduceat(rough_s, begins) / rough_s[layers]
-    scale_mm3 = np.add.reduceat(rough_mm3, begins) / rough_mm3[layers]
-    total = Estimate(float(scale_s @ real[:, 0]), float(scale_mm3 @ real[:, 1]) / filament_mm2, float(scale_mm3 @ real[:, 2]))
+    time_s = _over_all(rough_s, real[:, 0], layers, begins)
+    own_mm3 = _over_all(drawn_mm.sum(axis=1) * bead_mm2 + TINY_MM3, real[:, 1] - real[:, 2], layers, begins)
+    support_mm3 = _support_mm3(held_mm.sum(axis=1) * bead_mm2, real[:, 2], layers, np.diff(begins, append=len(bead_mm2)))
+    total = Estimate(time_s, (own_mm3 + support_mm3) / filament_mm2, support_mm3)
     if on_platform:
         return total + _purged(profile)
     heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
     return total + Estimate(TURN_S + heating_s, profile.material.prime_extra_mm, 0.0)
+
+
+def _over_all(rough: Floats, real: Floats, layers: Indices, begins: Indices) -> float:
+    """What all layers take: each run of them as much more than its rough figures as the layer that stands for it."""
+    return float((np.add.reduceat(rough, begins) / rough[layers]) @ real)
+
+
+def _support_mm3(rough: Floats, real: Floats, layers: Indices, counts: Indices) -> float:
+    """The same of support, of which single layers may have none: over the first layer by the same factor everywhere."""
+    known = float(counts[1:] @ rough[layers[1:]])
+    factor = float(counts[1:] @ real[1:]) / known if known > 0.0 else 1.0
+    return float(real[0] + factor * rough[1:].sum())
 
 
 def _purged(profile: Profile) -> Estimate:

@@ -35,7 +35,6 @@ from slicer.support.support import Supports
 from slicer.walls.walls import Walls
 
 SUPPORT = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
-NOTHING = Polygons()
 
 
 def sections_near(part: Part, profile: Profile, layers: Indices, later: Sequence[Part]) -> Sections:
@@ -87,20 +86,21 @@ def sliced_layers(sections: Sections, support: ThickSupport, layers: Indices) ->
 def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shells:
     """The shells of some layers; those of the others are not there, but for what is sparse below one of them."""
     process, nozzle_mm, model = sections.process, sections.profile.machine.head.nozzle_mm, model_around(sections)
-    nothing = [NOTHING] * len(sections.outlines)
+    empty = Polygons()
+    nothing = [empty] * len(sections.outlines)
     processes = layer_processes(process, sections.on_platform, len(nothing))
-    no_shell = Shell(process, Walls((), NOTHING, NOTHING), (), Region(*[NOTHING] * 5), (), NOTHING)
+    no_shell = Shell(process, Walls((), empty, empty), (), Region(*[empty] * 5), (), empty)
     shells, areas, dense, filled = [no_shell] * len(nothing), list(nothing), list(nothing), list[Polygons]()
     for layer in layers.tolist():
         [own] = strengthen_overhangs([processes[layer]], [sections.own[layer]], sections.below(layer))
         sides = {"height_mm": float(sections.heights.height_mm[layer]), "nozzle_mm": nozzle_mm}
         walled = cut_walls(sections.own[layer], model.sections[layer], own, **sides, usual=process.walls)
         region, lower = _region(sections, model, walled, layer)
-        shells[layer] = Shell(own, walled.walls, walled.ending, region, (), NOTHING)
+        shells[layer] = Shell(own, walled.walls, walled.ending, region, (), empty)
         if layer and shells[layer - 1] is no_shell:
             shells[layer - 1] = replace(no_shell, region=replace(no_shell.region, sparse=lower))
         areas[layer] = support.areas[support.which[layer]]
-        dense[layer] = support.dense[support.which[layer]] if support.closed[layer] else NOTHING
+        dense[layer] = support.dense[support.which[layer]] if support.closed[layer] else empty
         filled += [region.sparse] if not region.sparse.is_empty() else []
     infill = with_line_width(process, process.infill_line_width_mm)
     density = pattern_density(filled[len(filled) // 2 :][:1], infill, process.layer_height_mm)
@@ -117,10 +117,10 @@ def _region(sections: Sections, model: Model, walled: CutWalls, layer: int) -> t
         if 0 <= number < len(sections.own):
             return sections.own[number] if model.sections[number] is None else model.sections[number]
         beyond, k = (model.below, -1 - number) if number < 0 else (model.above, number - len(sections.own))
-        return beyond[k] if k < len(beyond) else NOTHING
+        return beyond[k] if k < len(beyond) else Polygons()
 
     if inside.is_empty():
-        return Region(*[NOTHING] * 5), NOTHING
+        return Region(*[Polygons()] * 5), Polygons()
     shared = walled.model_inside
     for step in _steps(top, bottom):
         shared = shared ^ at(layer + step)
@@ -129,7 +129,7 @@ def _region(sections: Sections, model: Model, walled: CutWalls, layer: int) -> t
         walled.model_inside, shared ^ at(layer + top) if top else shared, at(layer - 1) if bottom else shared, process
     )
     if not sections.on_platform and layer < solid_bottom_layers(process):
-        sparse = NOTHING
+        sparse = Polygons()
     else:
         cover = Cover((), [walled.model_inside] * (layer + 1), (), (), model.others if model.is_cut else ())
         sparse = beside_cuts(inside, uncut, cover, layer, process)
