@@ -73,9 +73,9 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
             layers.append(Region(empty, empty, empty, empty, empty))
             continue
         uncut = hollow[i]
-        sparse = empty if on_plastic and i < solid_bottom_layers(process) else _beside_cuts(inside, uncut, cover, i, process)
+        sparse = empty if on_plastic and i < solid_bottom_layers(process) else beside_cuts(inside, uncut, cover, i, process)
         next_section = stacked[first + i + 1] if first + i + 1 < len(stacked) else empty
-        layers.append(_region(inside, sparse, uncut, next_section if top else inside, process))
+        layers.append(split_inside(inside, sparse, uncut, next_section if top else inside, process))
     return layers
 
 
@@ -102,7 +102,7 @@ def solid_bottom_layers(process: Process) -> int:
     return max(process.interface_bottom_layers, 0 if process.interlock == "none" else 1)
 
 
-def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:
+def beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:
     """What is sparse of a part where the uncut model is, without the skin under later parts."""
     width_mm, reach = process.line_width_mm, process.interface_top_layers
     near = [area for area in cover.later[max(layer - reach, 0) : layer + reach + 1] if not area.is_empty()]
@@ -141,7 +141,7 @@ def _large(sparse: Polygons, process: Process) -> Polygons:
     return larger(sparse, process.solid_below_mm2) if process.infill_density > 0.0 else sparse
 
 
-def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, process: Process) -> Region:
+def split_inside(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, process: Process) -> Region:
     """Splits what is not sparse into top skin and the rest.
 
     The lines of a top go on under the walls around it and as far as its anchor: a frame of its own there would be all line ends.
