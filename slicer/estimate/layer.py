@@ -16,7 +16,7 @@ from slicer.bead import Bead, with_line_width
 from slicer.estimate.duration import strokes_s
 from slicer.estimate.hanging import ThickSupport
 from slicer.fill.infill import pattern_density
-from slicer.fill.region import Cover, Region, beside_cuts, shell_layers, solid_bottom_layers, sparse_area, split_inside
+from slicer.fill.region import Cover, Region, region_of, shell_layers, sparse_area
 from slicer.geometry.polygons import Polygons
 from slicer.heights import Heights, pedestal_layers
 from slicer.interface.cut_faces import cover, cut_walls, model_sections
@@ -111,23 +111,16 @@ def _region(sections: Sections, covers: Cover, inside: Polygons, layer: int) -> 
     """The region of a layer, and what is sparse of the one below."""
     process, whole = sections.process, covers.insides[layer]
     top, bottom = shell_layers(process)
-    stacked = [*reversed(covers.below), *covers.sections, *covers.above]
-
-    def at(number: int) -> Polygons:
-        """The model in a layer."""
-        k = number + len(covers.below)
-        return stacked[k] if 0 <= k < len(stacked) else Polygons()
-
     if inside.is_empty():
         return Region(*[Polygons()] * 5), Polygons()
     shared = whole
     for step in _steps(top, bottom):
-        shared = shared ^ at(layer + step)
-    lower = sparse_area(whole, shared, at(layer) if top else shared, process)
-    uncut = sparse_area(whole, shared ^ at(layer + top) if top else shared, at(layer - 1) if bottom else shared, process)
-    solid = not sections.on_platform and layer < solid_bottom_layers(process)
-    sparse = Polygons() if solid else beside_cuts(inside, uncut, covers, layer, process)
-    return split_inside(inside, sparse, uncut, at(layer + 1) if top else inside, process), lower ^ inside
+        shared = shared ^ covers.section(layer + step)
+    lower = sparse_area(whole, shared, covers.section(layer) if top else shared, process)
+    uncut = sparse_area(
+        whole, shared ^ covers.section(layer + top) if top else shared, covers.section(layer - 1) if bottom else shared, process
+    )
+    return region_of(inside, uncut, covers, layer, not sections.on_platform, process), lower ^ inside
 
 
 def _taken(shells: Shells, layer: int, tip: Floats) -> tuple[tuple[float, float, float], Floats]:
