@@ -14,7 +14,7 @@ import numpy as np
 from mdp.decomposition import Part
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
-from mdp.mesh import Floats, Ints, Mesh
+from mdp.mesh import Floats, Indices, Ints, Mesh
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
@@ -41,12 +41,18 @@ class Heights:
         """(n,) lower sides of the layers."""
         return self.tip_mm - self.height_mm
 
-    def __getitem__(self, layers: slice) -> "Heights":
+    def __getitem__(self, layers: slice | Indices) -> "Heights":
         return Heights(self.tip_mm[layers], self.height_mm[layers], self.cut_mm[layers])
 
     def __add__(self, above: "Heights") -> "Heights":
         pairs = ((self.tip_mm, above.tip_mm), (self.height_mm, above.height_mm), (self.cut_mm, above.cut_mm))
         return Heights(*(np.concatenate(pair) for pair in pairs))
+
+    def up_to(self, top_mm: float, height_mm: float) -> "Heights":
+        """The layers with more of one height on top as far as that."""
+        count = max(int(np.ceil((top_mm - self.tip_mm[-1]) / height_mm - 1e-9)), 0)
+        tips_mm = self.tip_mm[-1] + height_mm * np.arange(1, count + 1)
+        return self + Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
 
 
 NO_LAYERS = Heights(np.zeros(0), np.zeros(0), np.zeros(0))

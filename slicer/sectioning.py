@@ -48,16 +48,23 @@ BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base 
 
 
 def section_part(
-    part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = (), pins: Pins | None = None
+    part: Part,
+    profile: Profile,
+    earlier: Sequence[Part] = (),
+    later: Sequence[Part] = (),
+    pins: Pins | None = None,
+    heights: Heights | None = None,
 ) -> Sections:
     """The sections of a part that is printed after `earlier` and before `later` parts.
 
-    profile: of the whole print; pins: of all its parts, planned here if they are not given. Raises SliceError when the part's
-    mesh is not closed, or too high to be meant.
+    profile: of the whole print; pins: of all its parts, planned here if they are not given; heights: of some of the part's
+    layers, with the lowest and the highest, all if they are not given. Raises SliceError when the part's mesh is not closed, or
+    too high to be meant.
     """
     of_print, profile = profile, vase_profile(profile.of_part(part.index))
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
-    heights, pedestal_mm = part_heights(part, later, profile), profile.search.pedestal_mm if on_platform else 0.0
+    heights = part_heights(part, later, profile) if heights is None else heights
+    pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
     whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
     nozzle_mm = profile.machine.head.nozzle_mm

@@ -33,6 +33,7 @@ from slicer.strokes.pieces import in_pieces
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams, rear_of, seam_limits
 from slicer.strokes.seam_plan import plan_seams
 from slicer.strokes.speed import fan_share, first_layer_speeds, layer_time_s, own_fans, rising_fan, speeds_mm_s
+from slicer.strokes.strokes import Strokes
 from slicer.strokes.vase import bottom_layers, vase_layers
 from slicer.strokes.wiping import may_wipe_over
 from slicer.support.missed import explain
@@ -119,11 +120,15 @@ def _unsupported(supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupport
     )
 
 
-def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
-    """The beads of a layer in order, with speeds, flow, fan and heat. skin: its outer walls beside the edges of interfaces."""
-    sections, own = shells.sections, shells.layers[index].process
-    profile, process, material, on_platform = sections.profile, sections.process, sections.profile.material, sections.on_platform
-    outline, height_mm = sections.outlines[index], float(sections.heights.height_mm[index])
+def order_layer(
+    beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons
+) -> tuple[Strokes, Floats, float]:
+    """The beads of a layer in order, with their (k,) speeds and the flow of all of them.
+
+    tip: where the layer below ends; skin: its outer walls beside the edges of interfaces.
+    """
+    sections, own, height_mm = shells.sections, shells.layers[index].process, float(shells.sections.heights.height_mm[index])
+    profile, process, on_platform, outline = sections.profile, sections.process, sections.on_platform, sections.outlines[index]
     if index == 0 and not on_platform:
         beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
     strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
@@ -131,22 +136,30 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     if index == 0 and not on_platform and process.interlock == "grooves":
         strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
     fixed: Mapping[Kind, float] | None = None
-    flow, fan, add_c = material.flow, 1.0, 0.0
-    if not on_platform and index < process.interface_layers:
-        fan = process.interface_fan if index else process.interface_first_layer_fan
-        add_c = process.interface_temperature_add_c
+    flow = profile.material.flow
     if index == 0:
         fixed = first_layer_speeds(process, on_platform)
         flow *= process.first_layer_flow if on_platform else process.interface_flow
     strokes = in_pieces(strokes, height_mm)
-    speeds = speeds_mm_s(strokes, profile, height_mm, fixed, flow)
+    return strokes, speeds_mm_s(strokes, profile, height_mm, fixed, flow), flow
+
+
+def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
+    """The beads of a layer in order, with speeds, flow, fan and heat, as order_layer."""
+    sections = shells.sections
+    profile, process, material, on_platform = sections.profile, sections.process, sections.profile.material, sections.on_platform
+    strokes, speeds, flow = order_layer(beads, shells, index, tip, skin)
+    fan, add_c = 1.0, 0.0
     if on_platform:
         fan = rising_fan(material, index)
+    elif index < process.interface_layers:
+        fan = process.interface_fan if index else process.interface_first_layer_fan
+        add_c = process.interface_temperature_add_c
     layer_fan = fan * fan_share(material, process, layer_time_s(strokes, speeds, profile))
     strokes = strokes.simplified()
     return Layer(
         z_mm=float(sections.heights.tip_mm[index]),
-        height_mm=height_mm,
+        height_mm=float(sections.heights.height_mm[index]),
         fan=layer_fan,
         nozzle_add_c=add_c,
         points=np.ascontiguousarray(strokes.points[:, :2]),

@@ -1,14 +1,52 @@
-"""Duration: how long strokes and travels take with acceleration, on a machine like classic Marlin: no axis changes its speed at
-once by more than the junction speed, and none accelerates faster than it may.
+"""Duration: how long the strokes of a layer and the travels to them take, on a machine like classic Marlin: no axis changes its
+speed at once by more than the junction speed, and none accelerates faster than it may.
 """
 
 from math import sqrt
+from typing import NamedTuple
 
-from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel, no_nrt
-from mdp.mesh import Floats
+import numpy as np
 
+from mdp.kernels.arrays import floats, longs, table
+from mdp.kernels.kernel import helper, kernel, no_nrt
+from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
+from profiles.profile import Profile
+from slicer.paths import KINDS
+from slicer.strokes.speed import axes_mm_s2, stroke_accelerations, travel_mm_s2
+from slicer.strokes.strokes import Strokes
+from slicer.strokes.wiping import STANDING_MM
+
+# A wipe turns in its middle by 45 deg, as over the small rings after which most are: mm along each axis for a mm of all of it.
+TURNED = 0.5 / sqrt(2.0)
 TINY = 1e-9  # mm, mm/s or a cosine, instead of a division by 0
+
+
+class Pace(NamedTuple):
+    """What bounds the moves of a layer: accelerations of X and Y and of Z, speed change at corners; speed and acceleration of
+    travels, speed of lifts, how far one lifts, speed and length of a wipe."""
+
+    axes_mm_s2: float
+    z_mm_s2: float
+    junction_mm_s: float
+    travel_mm_s: float
+    travel_mm_s2: float
+    lift_mm_s: float
+    lift_mm: float
+    wipe_mm_s: float
+    wipe_mm: float
+
+
+class Moves(NamedTuple):
+    """Buffers for moves one after the other, as many as `made` tells: direction (n, 3), length, cruise speed, acceleration, and
+    the greatest speed at which each begins."""
+
+    direction: Floats
+    length: Floats
+    cruise: Floats
+    ramp: Floats
+    begin: Floats
+    made: Indices
 
 
 @no_nrt
@@ -20,34 +58,125 @@ def trapezoid_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, 
 
 
 @kernel
-def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, ends_mm_s: float) -> float:
-    """Seconds of a straight line that is begun and ended at one speed."""
-    ends = min(ends_mm_s, speed_mm_s)
-    return trapezoid_s(length_mm, speed_mm_s, acceleration_mm_s2, ends, ends)
+def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> float:
+    """Seconds of a straight line from a stand to a stand."""
+    return trapezoid_s(length_mm, speed_mm_s, acceleration_mm_s2, 0.0, 0.0)
+
+
+def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
+    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions.
+
+    tip: (2,) where the layer below ends.
+    """
+    told = stroke_accelerations(profile, first_layer)
+    most = np.full(len(KINDS), np.inf) if told is None else np.array([told[kind] for kind in KINDS])
+    pace = _pace(profile)
+    places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
+    moving_s = _way_s(places, tip, (speeds_mm_s, most[strokes.kind]), strokes.retract, pace)
+    rise_s = line_s(profile.process.layer_height_mm, pace.lift_mm_s, pace.z_mm_s2)
+    return float(moving_s + rise_s + int(strokes.retract.sum()) * _standing_s(profile))
+
+
+def _pace(profile: Profile) -> Pace:
+    process, material, machine = profile.process, profile.material, profile.machine
+    travel_mm_s = min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s)
+    wipe_mm = material.wipe_mm if material.retract_mm > 0.0 else 0.0
+    return Pace(
+        axes_mm_s2=axes_mm_s2(profile),
+        z_mm_s2=machine.z.acceleration_mm_s2,
+        junction_mm_s=machine.junction_speed_mm_s,
+        travel_mm_s=travel_mm_s,
+        travel_mm_s2=travel_mm_s2(profile) or np.inf,
+        lift_mm_s=min(process.lift_speed_mm_s, machine.z.speed_mm_s),
+        lift_mm=process.lift_mm,
+        wipe_mm_s=min(travel_mm_s, wipe_mm * _filament_mm_s(profile) / max(material.retract_mm, TINY)),
+        wipe_mm=wipe_mm,
+    )
+
+
+def _filament_mm_s(profile: Profile) -> float:
+    return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+
+
+def _standing_s(profile: Profile) -> float:
+    """Seconds that the filament moves alone for one retraction."""
+    material, ramp = profile.material, profile.machine.extruder_acceleration_mm_s2
+    if material.retract_mm <= 0.0:
+        return 0.0
+    primed_s = line_s(material.retract_mm + material.retract_prime_extra_mm, _filament_mm_s(profile), ramp)
+    return primed_s if material.wipe_mm > 0.0 else primed_s + line_s(material.retract_mm, _filament_mm_s(profile), ramp)
+
+
+@no_nrt
+def _add(moves: Moves, step: tuple[float, float, float], cruise: float, told: float, stands: bool, pace: Pace) -> None:
+    """Append a straight move; stands: the machine stands still before it."""
+    length = sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+    n = moves.made[0]
+    if length <= STANDING_MM:
+        return
+    ux, uy, uz = step[0] / length, step[1] / length, step[2] / length
+    moves.length[n], moves.cruise[n] = length, cruise
+    moves.ramp[n] = min(told, pace.axes_mm_s2 / max(abs(ux), abs(uy), TINY), pace.z_mm_s2 / max(abs(uz), TINY))
+    if stands or n == 0:
+        moves.begin[n] = 0.0
+    else:
+        x, y, z = moves.direction[n - 1]
+        change = max(abs(ux - x), abs(uy - y), abs(uz - z), TINY)
+        moves.begin[n] = min(cruise, moves.cruise[n - 1], pace.junction_mm_s / change)
+    moves.direction[n, 0], moves.direction[n, 1], moves.direction[n, 2] = ux, uy, uz
+    moves.made[0] += 1
 
 
 @kernel
-def loop_s(loop: Floats, speed_mm_s: float, acceleration_mm_s2: float, junction_mm_s: float) -> float:
-    """Seconds of a closed stroke round a loop (n, 2), from a stand at its first point to a stand there.
+def _way_s(
+    places: tuple[Floats, Indices, Floats, Indices], tip: Floats, bounds: tuple[Floats, Floats], retract: Mask, pace: Pace
+) -> float:
+    """Seconds of strokes one after the other, from a stand to a stand; a travel that retracts wipes and lifts, and ends at a
+    stand, where the filament is primed."""
+    points, starts, approach, approach_starts = places
+    speeds, most = bounds
+    room = len(points) + len(approach) + 4 * len(speeds) + 1
+    moves = Moves(table(room, 3), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(1, 0))
+    x, y = tip[0], tip[1]
+    for k in range(len(speeds)):
+        first, n = starts[k], moves.made[0]
+        stands = retract[k] and pace.wipe_mm <= 0.0
+        if retract[k]:
+            if n > 0:
+                begun = starts[k - 1]
+                apart = sqrt((x - points[begun, 0]) ** 2 + (y - points[begun, 1]) ** 2)
+                wipe = pace.wipe_mm if apart <= points[begun, 2] else -pace.wipe_mm  # on along a ring, back along a line
+                ux, uy = moves.direction[n - 1, 0], moves.direction[n - 1, 1]
+                aside = TURNED * wipe
+                _add(moves, (0.5 * wipe * ux, 0.5 * wipe * uy, 0.0), pace.wipe_mm_s, np.inf, False, pace)
+                _add(moves, (aside * (ux - uy), aside * (ux + uy), 0.0), pace.wipe_mm_s, np.inf, False, pace)
+            _add(moves, (0.0, 0.0, pace.lift_mm), pace.lift_mm_s, np.inf, stands, pace)
+        for i in range(approach_starts[k], approach_starts[k + 1] + 1):
+            if i < approach_starts[k + 1]:
+                x1, y1 = approach[i, 0], approach[i, 1]
+            else:
+                x1, y1 = points[first, 0], points[first, 1]
+            stands = stands and i == approach_starts[k] and pace.lift_mm <= STANDING_MM
+            _add(moves, (x1 - x, y1 - y, 0.0), pace.travel_mm_s, pace.travel_mm_s2, stands, pace)
+            x, y = x1, y1
+        if retract[k]:
+            _add(moves, (0.0, 0.0, -pace.lift_mm), pace.lift_mm_s, np.inf, False, pace)
+        for i in range(first + 1, starts[k + 1]):
+            step = (points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1], 0.0)
+            _add(moves, step, speeds[k], most[k], retract[k] and i == first + 1, pace)
+        x, y = points[starts[k + 1] - 1, 0], points[starts[k + 1] - 1, 1]
+    return _moves_s(moves)
 
-    acceleration_mm_s2: of each axis, so a slanting side may have up to the square root of two times as much.
-    """
-    n = len(loop)
-    corner, ramp, length = floats(n + 1, 0.0), floats(n, 0.0), floats(n, 0.0)
-    x, y = 0.0, 0.0
-    for i in range(n):
-        after = (i + 1) % n
-        dx, dy = loop[after, 0] - loop[i, 0], loop[after, 1] - loop[i, 1]
-        length[i] = max(sqrt(dx * dx + dy * dy), TINY)
-        dx, dy = dx / length[i], dy / length[i]
-        ramp[i] = acceleration_mm_s2 / max(abs(dx), abs(dy), TINY)
-        if i > 0:
-            corner[i] = min(speed_mm_s, junction_mm_s / max(abs(dx - x), abs(dy - y), TINY))
-        x, y = dx, dy
+
+@helper
+def _moves_s(moves: Moves) -> float:
+    """Seconds of moves that end at a stand; changes where they begin."""
+    n, begin = moves.made[0], moves.begin
+    begin[n] = 0.0
     for i in range(n - 1, -1, -1):
-        corner[i] = min(corner[i], sqrt(corner[i + 1] ** 2 + 2.0 * ramp[i] * length[i]))
+        begin[i] = min(begin[i], sqrt(begin[i + 1] ** 2 + 2.0 * moves.ramp[i] * moves.length[i]))
     seconds = 0.0
     for i in range(n):
-        corner[i + 1] = min(corner[i + 1], sqrt(corner[i] ** 2 + 2.0 * ramp[i] * length[i]))
-        seconds += trapezoid_s(length[i], speed_mm_s, ramp[i], corner[i], corner[i + 1])
+        begin[i + 1] = min(begin[i + 1], sqrt(begin[i] ** 2 + 2.0 * moves.ramp[i] * moves.length[i]))
+        seconds += trapezoid_s(moves.length[i], moves.cruise[i], moves.ramp[i], begin[i], begin[i + 1])
     return float(seconds)

@@ -1,37 +1,34 @@
-"""Estimate: print time and filament of parts without laying a bead, within some 12 % and in tenths of a second.
+"""Estimate: print time and filament of parts from a few of their layers, sliced as for a print, in tenths of a second.
 
-Some layers of a part stand for all of them (slicer/estimate): their walls, skins and infill are known as shapes, their lines by
-counting how often a pattern crosses a boundary, their time by the speeds of the process and the machine's acceleration. It is
-there to choose between decompositions; the dry run has the exact figures. Not looked at: slow overhanging walls and bridges,
-ironing, grooves, what later parts take from the support of earlier ones.
+All layers are measured roughly, by lengths that follow from the mesh and from the support of thick layers. Layers that share
+these evenly between them are then sliced by the slicer's own code and timed with the machine's acceleration, and each run of
+layers takes as much more than its rough figures as the layer that stands for it. It is there to choose between decompositions:
+half of all prints are off by less than 3 %, most by less than 8; the dry run has the exact figures.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
+import numpy as np
+
 from mdp.decomposition import Part
+from mdp.mesh import Floats, Indices
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.estimate.duration import line_s
-from slicer.estimate.sampled_part import SampledPart, sample_part
-from slicer.estimate.shell import extent_of
-from slicer.estimate.strokes import LayerSpeeds, Strokes, line_strokes, loop_strokes, shell_strokes, support_strokes
-from slicer.geometry.polygons import contours, offset
-from slicer.paths import Kind, bead_area_mm2
-from slicer.strokes.speed import axes_mm_s2, first_layer_speeds, travel_mm_s2
+from slicer.bead import INTERFACE_WIDTH, spacing_mm
+from slicer.estimate.hanging import ThickSupport, support_lengths_mm, thick_supports
+from slicer.estimate.layer import sections_near, sliced_layers
+from slicer.estimate.rough import choose_layers, rough_lengths_mm
+from slicer.paths import bead_area_mm2
 from slicer.strokes.vase import vase_profile
-from slicer.support.beads import PEDESTAL_DENSITY, ROOF_LAYERS
-from slicer.walls.brim import brim
 
-# Fitted to dry runs with the standard profiles: 12 models in one piece and in four parts; the hops, 28 prints of 20 models.
-HOP_MM = 3.7  # mean travel to a stroke, retractions included
-BROKEN = 0.07  # share of a pattern's lines that are not joined to the one before
-SPARSE_STARTS = 2.0  # more hops to each piece of sparse infill, whose crossing lines are printed in two goes
-SUPPORT_HOPS = 1.3  # hops to a stroke of support, brim or pedestal: branches stand apart, so most of these travels retract
-STEADY = 0.6  # of the travels' time counts when a layer is slowed down, which leaves out their acceleration
+SAMPLES = 7  # layers of a print that are sliced: the error of 23 parts by it is 1 % in the median, with 12 layers 0.7 %
+FEWEST = 4  # layers of a part
+LAYER_S = 0.3  # for the ways between strokes of even the smallest layer
+SLOWER = 1.4  # strokes with their accelerations and travels than their lengths at their speeds
+TINY_MM3 = 1e-6
 TURN_S = 2.0  # of the table before a part
-PATTERNS = (Kind.SKIN, Kind.INFILL, Kind.SUPPORT_INTERFACE)
 
 
 @dataclass(frozen=True)
@@ -52,99 +49,60 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
     The same on every machine. Raises SliceError where a part's mesh is not closed or it is too high to be meant.
     """
     several = (parts,) if isinstance(parts, Part) else tuple(parts)
-    top_mm = max((float(part.mesh.bounds_mm[1, 2]) for part in several), default=0.0)
     total = Estimate(0.0, 0.0, 0.0)
-    for k, part in enumerate(several):
-        own = vase_profile(profile.of_part(part.index))
-        total += _estimate_part(sample_part(part, own, several[k + 1 :]), own, top_mm)
+    for k, support in enumerate(thick_supports(several, profile)):
+        total += _estimate_part(several[k], profile, several[k + 1 :], support, max(FEWEST, SAMPLES // len(several)))
     return total
 
 
-def _estimate_part(part: SampledPart, profile: Profile, top_mm: float) -> Estimate:
-    """A part, the turn of the table before it and the wait for its heat; top_mm: of the whole print."""
-    filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
-    total = Estimate(0.0, 0.0, 0.0)
-    if not part.on_platform:
-        heating_s = profile.machine.heating_s(profile.process.interface_temperature_add_c, TURN_S)
-        total = Estimate(TURN_S + heating_s, profile.material.prime_extra_mm, 0.0)
-    for layer, stands_for in zip(part.choice.layers.tolist(), part.choice.counts.tolist(), strict=True):
-        speeds = _layer_speeds(part, layer, profile)
-        own = _part_strokes(part, layer, speeds)
-        support = _auxiliary_strokes(part, layer, speeds, top_mm)
-        flow = profile.material.flow * _flow(part, layer, profile.process)
-        time_s = _layer_s([*own, *support], _travel_s(part, layer, own, support, profile), profile.process)
-        mm3 = flow * sum(strokes.mm3 for strokes in (*own, *support))
-        support_mm3 = flow * sum(strokes.mm3 for strokes in support if strokes.kind is not Kind.SKIRT)
-        total += Estimate(stands_for * time_s, stands_for * mm3 / filament_mm2, stands_for * support_mm3)
-    return total
+def _estimate_part(part: Part, whole: Profile, later: Sequence[Part], support: ThickSupport, samples: int) -> Estimate:
+    """A part, the turn of the table before it and the wait for its heat."""
+    heights, profile, on_platform = support.heights, vase_profile(whole.of_part(part.index)), part.index == 1
+    process, filament_mm2 = profile.process, 0.25 * pi * profile.material.diameter_mm**2
+    drawn_mm = rough_lengths_mm(part.in_part_frame(), heights, process, on_platform)
+    held_mm = support_lengths_mm(support, process, on_platform)
+    bead_mm2 = spacing_mm(process.line_width_mm, process.layer_height_mm) * heights.height_mm
+    rough_s = _rough_s(np.hstack([drawn_mm, held_mm]), process)
+    layers, begins = choose_layers(rough_s, 1, samples)
+    real = sliced_layers(sections_near(part, whole, layers, later, heights), support, layers)
+    time_s = _over_all(rough_s, real[:, 0], layers, begins)
+    own_mm3 = _over_all(drawn_mm.sum(axis=1) * bead_mm2 + TINY_MM3, real[:, 1] - real[:, 2], layers, begins)
+    support_mm3 = _support_mm3(held_mm.sum(axis=1) * bead_mm2, real[:, 2], layers, np.diff(begins, append=len(bead_mm2)))
+    total = Estimate(time_s, (own_mm3 + support_mm3) / filament_mm2, support_mm3)
+    if on_platform:
+        return total + _purged(profile)
+    heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
+    return total + Estimate(TURN_S + heating_s, profile.material.prime_extra_mm, 0.0)
 
 
-def _layer_speeds(part: SampledPart, layer: int, profile: Profile) -> LayerSpeeds:
-    fixed_mm_s = None if layer else first_layer_speeds(profile.process, part.on_platform)
-    return LayerSpeeds(profile, float(part.heights.height_mm[layer]), fixed_mm_s, layer == 0 and part.on_platform)
+def _over_all(rough: Floats, real: Floats, layers: Indices, begins: Indices) -> float:
+    """What all layers take: each run of them as much more than its rough figures as the layer that stands for it."""
+    return float((np.add.reduceat(rough, begins) / rough[layers]) @ real)
 
 
-def _flow(part: SampledPart, layer: int, process: Process) -> float:
-    """Factor on the plastic of a first layer."""
-    if layer:
-        return 1.0
-    return process.first_layer_flow if part.on_platform else process.interface_flow
+def _support_mm3(rough: Floats, real: Floats, layers: Indices, counts: Indices) -> float:
+    """The same of support, of which single layers may have none: over the first layer by the same factor everywhere."""
+    known = float(counts[1:] @ rough[layers[1:]])
+    factor = float(counts[1:] @ real[1:]) / known if known > 0.0 else 1.0
+    return float(real[0] + factor * rough[1:].sum())
 
 
-def _part_strokes(part: SampledPart, layer: int, speeds: LayerSpeeds) -> list[Strokes]:
-    """What a layer prints of the part itself."""
-    return [] if layer < part.pedestal else shell_strokes(part.shell(layer), part.processes[layer], speeds)
+def _purged(profile: Profile) -> Estimate:
+    """The line before a print."""
+    process, material, length_mm = profile.process, profile.material, profile.machine.purge_mm
+    mm3 = length_mm * bead_area_mm2(INTERFACE_WIDTH * process.line_width_mm, process.first_layer_height_mm) * material.flow
+    return Estimate(length_mm / process.first_layer_speed_mm_s, mm3 / (0.25 * pi * material.diameter_mm**2), 0.0)
 
 
-def _auxiliary_strokes(part: SampledPart, layer: int, speeds: LayerSpeeds, top_mm: float) -> list[Strokes]:
-    """What a layer prints for the part: support, pedestal, skirt and brim."""
-    process, on_plate = part.processes[layer], layer == 0 and part.on_platform
-    strokes = support_strokes(part.support, float(part.heights.cut_mm[layer]), process, speeds, on_plate)
-    if layer < part.pedestal:
-        strokes += _pedestal_strokes(part, layer, speeds)
-    if on_plate:
-        outline = part.sections[0]
-        beads = brim(outline + part.support.foot, outline, part.plate, process, top_mm=top_mm, height_mm=speeds.height_mm)
-        loops = [bead.points[:-1] for bead in beads]
-        strokes += loop_strokes(Kind.SKIRT, loops, bead_area_mm2(process.line_width_mm, speeds.height_mm), 0.0, speeds)
-    return strokes
-
-
-def _pedestal_strokes(part: SampledPart, layer: int, speeds: LayerSpeeds) -> list[Strokes]:
-    """A layer of the pedestal: its outline, sparse lines, closed at the platform and at the roof."""
-    process, outline = part.processes[layer], part.sections[layer]
-    width = process.line_width_mm
-    bead_mm2 = bead_area_mm2(width, speeds.height_mm)
-    closed = layer == 0 or layer >= part.pedestal - ROOF_LAYERS
-    strokes = loop_strokes(Kind.SUPPORT, contours(offset(outline, -0.5 * width)), bead_mm2, 0.0, speeds)
-    inside = extent_of(offset(outline, -width))
-    density, angle = 1.0 if closed else PEDESTAL_DENSITY, process.infill_angle_deg
-    return strokes + line_strokes(Kind.SUPPORT, inside, speeds, density=density, width_mm=width, angle_deg=angle)
-
-
-def _travel_s(part: SampledPart, layer: int, own: Sequence[Strokes], support: Sequence[Strokes], profile: Profile) -> float:
-    """Seconds of a layer's travels, and of the lift to it."""
-    process, machine = profile.process, profile.machine
-    hops = sum(_starts(strokes) for strokes in own) + SUPPORT_HOPS * sum(_starts(strokes) for strokes in support)
-    acceleration = min(travel_mm_s2(profile) or axes_mm_s2(profile), axes_mm_s2(profile))
-    speed = min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s)
-    return hops * line_s(HOP_MM, speed, acceleration, 0.0)
-
-
-def _starts(strokes: Strokes) -> float:
-    """How often the tip has to travel to strokes."""
-    if strokes.kind in PATTERNS:
-        return BROKEN * strokes.count + (SPARSE_STARTS * strokes.pieces if strokes.kind is Kind.INFILL else 0.0)
-    return strokes.count
-
-
-def _layer_s(strokes: Sequence[Strokes], travel_s: float, process: Process) -> float:
-    """Seconds of a layer, slowed down to least_layer_time_s as the slicer does it, which knows no acceleration."""
-    length_mm = sum(kind.length_mm for kind in strokes)
-    if length_mm <= 0.0:
-        return 0.0
-    steady_s = sum(kind.length_mm / kind.speed_mm_s for kind in strokes)
-    lost_s = sum(kind.time_s for kind in strokes) - steady_s
-    asked_s = min(process.least_layer_time_s - STEADY * travel_s, length_mm / process.least_speed_mm_s)
-    slowed_s = max(steady_s, asked_s)
-    return slowed_s + lost_s * steady_s / slowed_s + travel_s
+def _rough_s(drawn_mm: Floats, process: Process) -> Floats:
+    """(n,) seconds of layers with (n, 5) mm of walls, skin, infill, support and dense support."""
+    speeds = (
+        process.inner_wall_speed_mm_s,
+        process.skin_speed_mm_s,
+        process.infill_speed_mm_s,
+        process.support_speed_mm_s,
+        process.support_interface_speed_mm_s,
+    )
+    least_s = np.minimum(process.least_layer_time_s, drawn_mm.sum(axis=1) / process.least_speed_mm_s)
+    rough_s: Floats = LAYER_S + np.maximum(SLOWER * drawn_mm @ (1.0 / np.array(speeds)), least_s)
+    return rough_s

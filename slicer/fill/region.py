@@ -51,6 +51,12 @@ class Cover:
     above: Sequence[Polygons]
     later: Sequence[Polygons] = ()
 
+    def section(self, layer: int) -> Polygons:
+        """The model in a layer, one under the first (-1, ...) or over the last one too; nothing farther than shells look."""
+        count = len(self.sections)
+        beyond, k = (self.below, -1 - layer) if layer < 0 else (self.above, layer - count)
+        return self.sections[layer] if 0 <= layer < count else beyond[k] if k < len(beyond) else Polygons()
+
 
 def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process: Process) -> list[Region]:
     """Regions of every layer of a part from what its walls enclose.
@@ -59,7 +65,6 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
     vertical line meets that many layers of wall or skin below a surface, on slopes too. It is also solid where a later part
     will lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
     """
-    empty = Polygons()
     top, bottom = shell_layers(process)
     stacked = [*reversed(cover.below), *cover.sections, *cover.above]
     first = len(cover.below)
@@ -67,16 +72,18 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
     below = _common(stacked[::-1], bottom)[::-1][first - 1 :] if bottom else insides
     sparse_areas = [sparse_area(*row, process) for row in zip(cover.insides, above, below, strict=False)]
     hollow = _without_footings(sparse_areas, cover, process)
-    layers = []
-    for i, inside in enumerate(insides):
-        if inside.is_empty():
-            layers.append(Region(empty, empty, empty, empty, empty))
-            continue
-        uncut = hollow[i]
-        sparse = empty if on_plastic and i < solid_bottom_layers(process) else _beside_cuts(inside, uncut, cover, i, process)
-        next_section = stacked[first + i + 1] if first + i + 1 < len(stacked) else empty
-        layers.append(_region(inside, sparse, uncut, next_section if top else inside, process))
-    return layers
+    return [region_of(inside, hollow[i], cover, i, on_plastic, process) for i, inside in enumerate(insides)]
+
+
+def region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process) -> Region:
+    """The region of one layer; uncut: what would be sparse there if the model were in one piece."""
+    empty = Polygons()
+    if inside.is_empty():
+        return Region(empty, empty, empty, empty, empty)
+    solid = on_plastic and layer < solid_bottom_layers(process)
+    sparse = empty if solid else _beside_cuts(inside, uncut, cover, layer, process)
+    next_section = cover.section(layer + 1) if shell_layers(process)[0] else inside
+    return _region(inside, sparse, uncut, next_section, process)
 
 
 def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process) -> list[Polygons]:

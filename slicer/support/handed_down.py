@@ -16,7 +16,6 @@ import numpy as np
 from mdp.mesh import Floats
 from mdp.pose import shift
 from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union, unite_layers
-from slicer.heights import Heights
 from slicer.interface.base_plane import BasePlane
 from slicer.interface.interface import frame_change, sections_of
 from slicer.overhangs import LEAST_MM2
@@ -149,15 +148,15 @@ def _extents(own: Sequence[Supports]) -> dict[int, tuple[Polygons, float]]:
 
 def up_to(sections: Sections, top_mm: float) -> Sections:
     """The sections with empty layers on top as far as that height."""
-    tip_mm, height_mm = sections.heights.tip_mm, sections.process.layer_height_mm
-    count = int(np.ceil((top_mm - tip_mm[-1]) / height_mm - 1e-9))
+    below = len(sections.heights.tip_mm)
+    heights = sections.heights.up_to(top_mm, sections.process.layer_height_mm)
+    count = len(heights.tip_mm) - below
     if count <= 0:
         return sections
-    tips_mm = tip_mm[-1] + height_mm * np.arange(1, count + 1)
-    more, empty = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm), [Polygons()] * count
+    empty = [Polygons()] * count
     higher = [*sections.beside, *sections.above, *empty]  # the added layers are at the heights of `above`
     known, end = len(sections.above), len(sections.beside) + count
-    part, heights = sections.part, sections.heights + more
+    part = sections.part
     return replace(
         sections,
         heights=heights,
@@ -166,7 +165,7 @@ def up_to(sections: Sections, top_mm: float) -> Sections:
         ungrooved=[*sections.ungrooved, *empty],
         beside=higher[:end],
         above=higher[end : end + known],
-        standing=[*sections.standing, *sections_of(sections.earlier, part, more.cut_mm)] if sections.standing else (),
+        standing=[*sections.standing, *sections_of(sections.earlier, part, heights.cut_mm[below:])] if sections.standing else (),
         no_seam=no_seam_segments(part, sections.mesh, heights.cut_mm),
         no_support=no_support_areas(part, sections.mesh, heights.cut_mm),
     )

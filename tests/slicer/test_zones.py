@@ -9,8 +9,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.zone import AnyZone, Grown, Marked, Zone
 from profiles.frozen import Vector
-from slicer.estimate.sampled_part import sample_part
-from slicer.estimate.shell import NOTHING
+from slicer.estimate.hanging import thick_supports
 from slicer.heights import Heights
 from slicer.parts import slice_parts
 from slicer.paths import Kind, SlicedPart
@@ -92,7 +91,8 @@ def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zon
     ((mm2, why),) = [(missed.mm2, missed.reason) for missed in without.unsupported]
     assert (why, mm2) == ("no support is wanted there", pytest.approx(150.0, rel=0.05))
     counted = [
-        sum(area is not NOTHING for area in sample_part(variant, SUPPORTED).support.areas) for variant in (part, bare(part))
+        sum(area.area() for support in thick_supports([variant], SUPPORTED) for area in support.areas)
+        for variant in (part, bare(part))
     ]
     assert (counted[0] > 0, counted[1]) == (True, 0)
     assert volume_mm3(without, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)

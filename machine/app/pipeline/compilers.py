@@ -17,7 +17,13 @@ from mdp.kernels.cache import is_cached, keep, trouble
 from mdp.kernels.threads import THREADS
 from profiles.profile import Profile
 
-JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = ("judge",), ("sweep", "search"), ("slice", "dry-run"), ("dry-run",), ("draw",)
+JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = (
+    ("judge",),
+    ("sweep", "search", "slice"),
+    ("slice", "dry-run"),
+    ("dry-run",),
+    ("draw",),
+)
 LOOK_S = 0.2
 KERNEL, DONE = "kernel", "done"  # what such a process answers
 COMPILE = "import sys; sys.path[:] = {path!r}; from machine.app.pipeline.precompile import main; main()"

@@ -1,0 +1,81 @@
+"""Rough: what every layer of a part takes, roughly, from the sums over its mesh, and the layers that are looked at more closely.
+
+A rough figure need not be right, only as much too high or low in a layer as in those next to it: what is really sliced of a few
+layers corrects it.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from mdp.kernels.arrays import floats
+from mdp.kernels.kernel import kernel
+from mdp.kernels.sorting import rank
+from mdp.mesh import Floats, Indices, Ints, Mesh
+from profiles.process import Process
+from slicer.bead import spacing_mm
+from slicer.fill.region import shell_layers
+from slicer.heights import Heights
+
+TINY_MM2 = 1e-9
+
+
+def rough_lengths_mm(mesh: Mesh, heights: Heights, process: Process, on_platform: bool) -> Floats:
+    """(n, 3) walls, skin and sparse infill of every layer of a mesh."""
+    (top, bottom), width = shell_layers(process), process.line_width_mm
+    area, around, over, under = _measure(mesh.vertices, mesh.faces, heights.cut_mm)
+    if not on_platform:
+        under[0] = 0.0
+    seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
+    bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]
+    spacing = spacing_mm(width, process.layer_height_mm)
+    inside = np.maximum(area - process.walls * spacing * around, 0.0)
+    skin = np.where(inside < process.solid_below_mm2, inside, inside * np.minimum(bare / np.maximum(area, TINY_MM2), 1.0))
+    return np.column_stack([(area - inside) / spacing, skin / spacing, (inside - skin) * process.infill_density / spacing])
+
+
+@kernel
+def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """(n,) area and outline of the sections, and the surface seen from above and from below that belongs to each layer."""
+    n = len(cuts)
+    area, around, over, under = floats(n, 0.0), floats(n, 0.0), floats(n, 0.0), floats(n, 0.0)
+    ends = floats(4, 0.0)
+    for f in range(len(faces)):
+        z0, z1, z2 = vertices[faces[f, 0], 2], vertices[faces[f, 1], 2], vertices[faces[f, 2], 2]
+        first, last = rank(cuts, min(z0, z1, z2), True), rank(cuts, max(z0, z1, z2), True) - 1
+        ax, ay = vertices[faces[f, 1], 0] - vertices[faces[f, 0], 0], vertices[faces[f, 1], 1] - vertices[faces[f, 0], 1]
+        bx, by = vertices[faces[f, 2], 0] - vertices[faces[f, 0], 0], vertices[faces[f, 2], 1] - vertices[faces[f, 0], 1]
+        shadow = 0.5 * (ax * by - ay * bx)
+        low, high = min(first, n - 1), max(min(last, n - 1), min(first, n - 1))
+        for layer in range(low, high + 1):
+            if shadow > 0.0:
+                over[max(first - 1, 0) if last < first else layer] += shadow / (high - low + 1)
+            else:
+                under[layer] -= shadow / (high - low + 1)
+        for layer in range(first, last + 1):
+            z = cuts[layer]
+            for k in range(3):
+                tail, head = faces[f, k], faces[f, (k + 1) % 3]
+                tz, hz = vertices[tail, 2], vertices[head, 2]
+                if (tz < z) != (hz < z):
+                    share = (z - hz) / (tz - hz)
+                    at = 0 if hz < z else 2  # the outline comes over the edge that goes down and leaves over the one that goes up
+                    ends[at] = vertices[head, 0] + share * (vertices[tail, 0] - vertices[head, 0])
+                    ends[at + 1] = vertices[head, 1] + share * (vertices[tail, 1] - vertices[head, 1])
+            area[layer] += 0.5 * (ends[0] * ends[3] - ends[1] * ends[2])
+            around[layer] += sqrt((ends[2] - ends[0]) ** 2 + (ends[3] - ends[1]) ** 2)
+    return area, around, over, under
+
+
+def choose_layers(weight: Floats, first: int, samples: int) -> tuple[Indices, Indices]:
+    """Layers that stand for runs of layers, and where each run begins: the first ones each for itself, the others for as much of
+    the weight as each other."""
+    count = len(weight)
+    first = min(first, count)
+    done = np.cumsum(weight[first:])
+    cuts = np.searchsorted(done, done[-1] * np.arange(1, samples) / samples) + 1 if len(done) else np.zeros(0, np.int64)
+    begins = np.unique(np.concatenate([np.arange(first), first + np.concatenate([[0], cuts])]))
+    begins = begins[begins < count]
+    whole = np.concatenate([[0.0], np.cumsum(weight)])
+    middle = 0.5 * (whole[begins] + whole[np.append(begins[1:], count)])
+    return np.minimum(np.searchsorted(whole, middle, side="right") - 1, np.append(begins[1:], count) - 1), begins
