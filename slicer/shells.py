@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from mdp.kernels.processes import in_order
+from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import WALLS, Bead, first_layer_process, interface_process, simplify_bead, with_line_width
 from slicer.fill.bridge import Bridge, bridge_area, bridge_beads, find_bridges, infill_bridge_area
@@ -14,7 +16,7 @@ from slicer.fill.ironing import ironed_areas, ironing_beads
 from slicer.fill.region import Region, regions
 from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_beads
 from slicer.geometry.cross_section import RIM_MM
-from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, settled, union
+from slicer.geometry.polygons import Polygons, edges, islands, of_contours, offset, opening, union
 from slicer.interface.cut_faces import cover, cut_walls, model_sections
 from slicer.overhangs import Overhang
 from slicer.paths import Kind
@@ -24,10 +26,15 @@ from slicer.support.beads import pedestal_beads, support_beads
 from slicer.support.support import Supports
 from slicer.walls.brim import brim
 from slicer.walls.gap import gaps
+from slicer.walls.variable.variable import Wall
 from slicer.walls.walls import Walls, wall_beads
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
+
+# Loops and walls of varying width, inner walls that end on a cut, and the contours of what walls enclose, of its narrow places
+# and, where it differs, of what the walls of the uncut model enclose: Polygons cannot go from one process to another.
+Contours: TypeAlias = tuple[tuple[tuple[Floats, ...], ...], tuple[Wall, ...], tuple[Bead, ...], list[list[Floats]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +81,15 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     model = model_sections(sections)
     heights_mm = sections.heights.height_mm.tolist()
 
-    def walls_of(layer: int) -> tuple[Walls, tuple[Bead, ...], Polygons]:
+    def contours_of(layer: int) -> Contours:
         own, usual = processes[layer], process.walls
-        return _settled(
-            *cut_walls(sections.own[layer], model[layer], own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=usual)
+        walls, ending, inside = cut_walls(
+            sections.own[layer], model[layer], own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=usual
         )
+        areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
+        return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
 
-    walled = list(in_order(walls_of, len(processes), FEWEST_LAYERS))
+    walled = [_walls_from(*found) for found in in_order(contours_of, len(processes), FEWEST_LAYERS)]
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
     filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process)
     bridges = bridges_of_layers(sections, overhangs, supports.areas)
@@ -96,10 +105,12 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     )
 
 
-def _settled(walls: Walls, ending: tuple[Bead, ...], model_inside: Polygons) -> tuple[Walls, tuple[Bead, ...], Polygons]:
-    """The same whether another process has worked it out or this one."""
-    rest = replace(walls, inside=settled(walls.inside), narrow=settled(walls.narrow))
-    return rest, ending, rest.inside if model_inside is walls.inside else settled(model_inside)
+def _walls_from(
+    loops: tuple[tuple[Floats, ...], ...], varying: tuple[Wall, ...], ending: tuple[Bead, ...], areas: list[list[Floats]]
+) -> tuple[Walls, tuple[Bead, ...], Polygons]:
+    """The walls of a layer from what a process has found: polygons are built anew, which can round, whichever process it was."""
+    inside, narrow, *model_inside = map(of_contours, areas)
+    return Walls(loops, inside, narrow, varying), ending, model_inside[0] if model_inside else inside
 
 
 def bridges_of_layers(

@@ -3,7 +3,6 @@
 Outer contours run counter-clockwise, holes clockwise. Only the Positive fill rule is used, so every input must be oriented.
 """
 
-import copyreg
 from collections.abc import Sequence
 from math import pi
 from typing import TypeAlias
@@ -31,20 +30,8 @@ def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
     """
     if not loops:
         return Polygons()
-    whole = Polygons(list(loops), FillRule.Positive).simplify(RESOLUTION_MM)
+    whole = of_contours(loops).simplify(RESOLUTION_MM)
     return closing(whole, closing_mm) if closing_mm > 0.0 else whole
-
-
-def _of_contours(loops: Sequence[Floats]) -> Polygons:
-    return Polygons(list(loops), FillRule.Positive)
-
-
-copyreg.pickle(Polygons, lambda polygons: (_of_contours, (polygons.to_polygons(),)))  # on their way between processes
-
-
-def settled(polygons: Polygons) -> Polygons:
-    """The polygons as another process would receive them; those that have been there and back do not change again."""
-    return _of_contours(polygons.to_polygons())
 
 
 def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polygons:
@@ -168,7 +155,7 @@ def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
 def strips(lines: Sequence[Floats], reach_mm: float | Floats) -> Polygons:
     """Everything nearer than the reach to lines (n, 2), with square ends; an array holds the reach of every segment."""
     quads = _quads(np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines]), reach_mm)
-    return Polygons(list(quads), FillRule.Positive)
+    return of_contours(list(quads))
 
 
 def _quads(starts: Floats, ends: Floats, reach_mm: float | Floats) -> Floats:
@@ -178,6 +165,11 @@ def _quads(starts: Floats, ends: Floats, reach_mm: float | Floats) -> Floats:
     left = np.stack([-along[:, 1], along[:, 0]], axis=1)
     a, b = starts - along, ends + along
     return np.stack([a - left, b - left, b + left, a + left], axis=1)
+
+
+def of_contours(loops: Sequence[Floats]) -> Polygons:
+    """The polygons of oriented contours; those of other polygons may come out rounded."""
+    return Polygons(list(loops), FillRule.Positive)
 
 
 def contours(polygons: Polygons) -> list[Floats]:
