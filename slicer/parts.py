@@ -13,7 +13,7 @@ from mmap import mmap
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.kernels.processes import in_order
+from mdp.kernels.processes import parallel_map
 from profiles.errors import SliceError
 from profiles.profile import Profile
 from slicer.interface.interlock import plan_pins
@@ -56,6 +56,8 @@ def slice_parts(
 
     Raises SliceError as slice_part does, for the first part in print order that has a reason.
     """
+    if not parts:
+        return ()
     check_vase(parts, profile)
     pins = plan_pins(parts, profile)
     sections = [section_part(part, profile, parts[:k], parts[k + 1 :], pins) for k, part in enumerate(parts)]
@@ -86,7 +88,7 @@ def slice_parts(
     results = (
         map(sliced, largest_first)
         if by_layers
-        else in_order(lambda place: sliced(largest_first[place]), len(parts), on_wait=show)
+        else parallel_map(lambda place: sliced(largest_first[place]), len(parts), works=False, on_wait=show)
     )
     for k, result in zip(largest_first, results, strict=True):
         if isinstance(result, SliceError):

@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from mdp.kernels.processes import in_order
+from mdp.kernels.processes import parallel_map
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import WALLS, Bead, first_layer_process, interface_process, simplify_bead, with_line_width
@@ -89,7 +89,7 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
         areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
         return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
 
-    walled = [_walls_from(*found) for found in in_order(contours_of, len(processes), FEWEST_LAYERS)]
+    walled = [_walls_from(*found) for found in parallel_map(contours_of, len(processes), FEWEST_LAYERS)]
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
     filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process)
     bridges = bridges_of_layers(sections, overhangs, supports.areas)

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.kernels.processes import in_order
+from mdp.kernels.processes import parallel_map
 from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
@@ -80,7 +80,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = rear, np.zeros((0, 2)), 0, len(sections.outlines)
     usual = min(bottom_layers(process), count) if process.spiral_vase else count
-    for i, (own, auxiliary) in enumerate(in_order(partial(lay_beads, shells), usual, FEWEST_LAYERS)):
+    for i, (own, auxiliary) in enumerate(parallel_map(partial(lay_beads, shells), usual, FEWEST_LAYERS)):
         if own:
             last = i
         elif process.walls and (i in sections.too_thin or not sections.own[i].is_empty()):

@@ -51,7 +51,7 @@ def empty_field(low: Floats, high: Floats) -> Field:
     return Field(np.asarray(low, np.float64), cell, shape, *heights, coarse, order, np.full(2, NOTHING))
 
 
-def in_order(field: Field) -> Field:
+def highest_first(field: Field) -> Field:
     """The same field, of which a move meets the highest blocks first: most moves are above all of them."""
     field.highest[1] = NOTHING
     return field._replace(order=np.argsort(-field.coarse, kind="stable"))
@@ -142,10 +142,10 @@ def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> 
     """How deep the head goes into the field at most during a level move; 0 up to `slack`."""
     deepest, size, cell = 0.0, BLOCK * field.cell, field.cell
     wide = _blocks(field.shape[1])
-    in_order = field.highest[1] - a[2] <= slack
+    sorted_blocks = field.highest[1] - a[2] <= slack
     for c in field.order:
         if field.coarse[c] - a[2] <= slack:
-            if in_order:  # neither are those after it
+            if sorted_blocks:  # neither are those after it
                 break
             continue
         i, j = c // wide, c % wide

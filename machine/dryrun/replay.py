@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, in_order, lay_bead
+from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, highest_first, lay_bead
 from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
 from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
@@ -99,7 +99,7 @@ def _field(
     least, most = _extent(deposited.segments_mm[:after], turn, moved)
     field = empty_field(least - 3.0, most + 3.0)
     _lay_turned(deposited, directions[1][:before], directions[0], turn, moved, field)
-    return in_order(field)
+    return highest_first(field)
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Cache: where compiled kernels are kept, in a folder a source file: those shipped with the program and those compiled here.
 
-A folder's name tells all that its kernels depend on, so what lies in it fits: the text of the file and of those that its parts
+A folder's name tells all that its kernels depend on, so what lies in it fits: the text of the file and of those that its helpers
 and constants come from (numba looks at the file alone), and the target. It does not tell where the program is installed.
 """
 
@@ -128,10 +128,11 @@ class KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         prepare_loading(target_context)
-        shipped = self._shipped.load(self._index_key(sig, target_context.codegen()))
-        if shipped is not None:
-            return self._impl.rebuild(target_context, shipped)
         with suppress(OSError):  # a folder that cannot be read
+            shipped = self._shipped.load(self._index_key(sig, target_context.codegen()))
+            if shipped is not None:
+                return self._impl.rebuild(target_context, shipped)
+        with suppress(OSError):
             return self._load_overload(sig, target_context)
         return None
 

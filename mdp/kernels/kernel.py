@@ -40,12 +40,12 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def on_compiled(call: Callable[[], None]) -> None:
-    """Have a function called whenever a kernel has been compiled, with its parts; those that are cached do not count."""
+    """Have a function called whenever a kernel has been compiled, with its helpers; those that are cached do not count."""
     event.register("numba:compile", _Compilations(call))
 
 
 class _Compilations(event.Listener):
-    """Compilations as numba tells them, those of parts inside that of their kernel."""
+    """Compilations as numba tells them, those of helpers inside that of their kernel."""
 
     def __init__(self, call: Callable[[], None]) -> None:
         self._call, self._depth = call, 0

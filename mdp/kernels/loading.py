@@ -35,7 +35,7 @@ class LoadedLibrary(JITCodeLibrary):
         return super()._get_module_for_linking()
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Address of a function, 0 where the library has none of that name."""
+        """Address of a function of the library."""
         if self._bitcode:
             address: int = self._codegen._engine.get_function_address(name)
             return address

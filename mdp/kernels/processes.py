@@ -18,9 +18,9 @@ from typing import TypeVar
 from mdp.kernels import threads
 
 LOOK_S = 0.2  # between two looks at the parent
-MOST_RUNS = 4096  # of pieces, whose numbers every system's pipe holds
+MOST_RUNS = 2048  # of pieces, whose numbers a pipe of one page holds: no system has smaller ones
 NUMBER, LENGTH = 2, 8  # bytes of a run's number, and of the length of an answer
-AHEAD = 64  # runs of results that wait for the caller: copies that are farther ahead wait, too
+AHEAD = 64  # runs of results that are received before they are needed
 ROOM = 1 << 20  # bytes that a copy can answer before anybody reads, where the system allows it
 
 Result = TypeVar("Result")
@@ -28,16 +28,22 @@ Result = TypeVar("Result")
 _forked = False  # whether copies are at work or this is one
 
 
-def in_order(
-    work: Callable[[int], Result], count: int, fewest: int = 2, on_wait: Callable[[], None] | None = None
+def parallel_map(
+    work: Callable[[int], Result],
+    count: int,
+    fewest: int = 2,
+    *,
+    works: bool = True,
+    on_wait: Callable[[], None] | None = None,
 ) -> Iterator[Result]:
     """work(0), work(1) .. work(count - 1), in this order; copies of this process work ahead while the caller uses the results.
 
     Results are pickled. The error of the first piece that raises one is raised. Within `work` there are no further copies.
-    fewest: so many pieces are worth a copy. on_wait: called now and then while the results of copies are waited for.
+    fewest: so many pieces are worth a copy. works: whether this process does pieces, too; while it does one that takes long,
+    copies wait for it to receive results that no pipe holds. on_wait: called now and then while results are waited for.
     """
-    copies = min(threads.THREADS, count) - 1
-    if copies < 1 or count < fewest or _forked or not hasattr(os, "fork"):
+    cores = min(threads.THREADS, count)
+    if cores < 2 or count < fewest or _forked or not hasattr(os, "fork"):
         yield from map(work, range(count))
         return
     size = -(-count // MOST_RUNS)
@@ -46,15 +52,15 @@ def in_order(
     def results(run: int) -> Iterator[Result]:
         return map(work, range(run * size, min((run + 1) * size, count)))
 
-    with _numbers(runs) as numbers, _copies(copies, results, numbers) as answers:
+    with _numbers(runs) as numbers, _copies(cores - works, results, numbers) as answers:
         known: dict[int, list[Result] | None] = {}  # None: a piece raises an error, its run is done again when its turn comes
         for run in range(runs):
             while run not in known:
                 _receive(answers, known, 0.0)
-                if run not in known and (number := _next(numbers)) is not None:
-                    known[number] = _tried(results, number)
-                elif run not in known and not answers:  # killed from outside
+                if run not in known and not answers:  # killed from outside, or never there
                     known[run] = None
+                elif run not in known and works and (number := _next(numbers)) is not None:
+                    known[number] = _tried(results, number)
                 elif run not in known:
                     _receive(answers, known, LOOK_S)
                     if on_wait is not None:

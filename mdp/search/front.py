@@ -7,7 +7,7 @@ import numpy as np
 
 from mdp.cost.model_need import excess_mm2
 from mdp.decomposition import FrontRow, Part
-from mdp.kernels.processes import in_order
+from mdp.kernels.processes import parallel_map
 from mdp.search.node import Node
 from mdp.sweep.limbs import limb_faces
 from profiles.profile import Profile
@@ -104,7 +104,7 @@ def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:
 def price_rows(rows: Sequence[FrontRow], parts: Mapping[int, Sequence[Part]], price: Pricing) -> list[FrontRow]:
     """Rows with what their parts take to print. parts: of the places of rows that get a price."""
     places = list(parts)
-    prices = in_order(lambda k: price(parts[places[k]]), len(places))
+    prices = parallel_map(lambda k: price(parts[places[k]]), len(places))
     known = dict(zip(places, prices, strict=True))
     return [_with_price(row, known.get(place)) for place, row in enumerate(rows)]
 

@@ -21,7 +21,7 @@ from mdp.directions.orientation import (
     straight_orientations,
 )
 from mdp.directions.revolution import find_revolution
-from mdp.kernels.processes import in_order
+from mdp.kernels.processes import parallel_map
 from mdp.mesh import Mesh
 from mdp.overhang import UP
 from mdp.search.coarse import as_it_is, coarse_copy
@@ -130,7 +130,7 @@ def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> l
     footed = _with_footing(mesh, profile)[: 1 + FORECAST]
     upright = footed[0][0]
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
-    prices = in_order(lambda k: _price_bare(meshes[k], profile, pricing), len(meshes))
+    prices = parallel_map(lambda k: _price_bare(meshes[k], profile, pricing), len(meshes))
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
     for (orientation, footing), turned, bare in zip(footed, meshes, prices, strict=True):
         footing_mm2 = surface_mm2 * (footing_share(footing) + (0.0 if orientation is upright else TURNED))

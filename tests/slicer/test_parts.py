@@ -23,7 +23,7 @@ def test_parts_side_by_side_are_the_same_bytes_as_one_after_the_other(cores: int
     parts = cut(box(10, 10, 60), *PLANES)
     monkeypatch.setattr(threads, "THREADS", cores)
     together = slice_parts(parts, profile())
-    monkeypatch.setattr(slicer.parts, "in_order", lambda work, count, on_wait: map(work, range(count)))
+    monkeypatch.setattr(slicer.parts, "parallel_map", lambda work, count, **_: map(work, range(count)))
     assert [piece.index for piece in together] == [1, 2, 3]
     assert [content(piece) for piece in together] == [content(piece) for piece in slice_parts(parts, profile())]
 
@@ -71,6 +71,10 @@ def test_the_first_part_in_order_that_gives_no_path_is_named(cores: int, monkeyp
     nothing = profile("process.walls=0", "process.infill_density=0", *(f"process.{key}=0" for key in layers))
     with pytest.raises(SliceError, match="part 3 gives no path at all"):
         slice_parts(cut(box(10, 10, 60), *PLANES), nothing)
+
+
+def test_no_parts_are_sliced_to_none() -> None:
+    assert slice_parts((), profile()) == ()
 
 
 SLICING = """

@@ -10,7 +10,7 @@ from shapely.affinity import translate
 
 from machine.dryrun import DryRun, dry_run
 from machine.dryrun.conformity.filling import filled_share, in_beads, lattice
-from machine.dryrun.height_field import CELL_MM, Field, depth_of, empty_field, in_order, lay_bead
+from machine.dryrun.height_field import CELL_MM, Field, depth_of, empty_field, highest_first, lay_bead
 from mdp.head import head_of
 from profiles.profile import load
 from tests import shapes
@@ -67,7 +67,7 @@ def test_the_depth_of_a_level_move_is_the_exact_one_within_half_a_bead_and_a_cel
 @given(st.lists(st.tuples(PLACE, PLACE), min_size=1, max_size=3), PLACE, PLACE, st.floats(0, 60), st.floats(60, 90))
 def test_blocks_in_order_of_their_height_hide_nothing_whatever_is_laid_later(lines, start, end, down: float, z: float) -> None:
     depths, a, b = [], np.array([*start, 80.0 - down]), np.array([*end, 80.0 - down])
-    for order in (lambda field: field, in_order):
+    for order in (lambda field: field, highest_first):
         field = order(_field(lines[1:], 80.0))
         _lay(np.array([*lines[0][0], z]), np.array([*lines[0][1], z]), HALF_MM, field)
         depths.append(_depth(a, b, 0.0, field, head_of(MACHINE)))

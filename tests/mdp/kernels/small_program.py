@@ -1,4 +1,4 @@
-"""A program of two files, a kernel and its part, with a kernel page of its own, run by fresh interpreters."""
+"""A program of two files, a kernel and its helper, with a copy of mdp.kernels, run by fresh interpreters."""
 
 import os
 import shutil

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from mdp.kernels import threads
-from mdp.kernels.processes import in_order
+from mdp.kernels.processes import parallel_map
 
 HERE = os.getpid()
 
@@ -39,7 +39,7 @@ def killed_elsewhere(number: int) -> int:
 
 @pytest.mark.parametrize("count", [0, 1, 2, 700, 9000])
 def test_results_come_in_the_order_of_the_pieces(count: int) -> None:
-    assert list(in_order(square, count)) == [k * k for k in range(count)]
+    assert list(parallel_map(square, count)) == [k * k for k in range(count)]
 
 
 def test_two_pieces_are_done_in_two_processes_at_once() -> None:
@@ -51,16 +51,16 @@ def test_two_pieces_are_done_in_two_processes_at_once() -> None:
         return os.getpid()
 
     ends = (to_there, there), (to_here, here)
-    assert len(set(in_order(lambda k: meet(*ends[k]), 2))) == 2
+    assert len(set(parallel_map(lambda k: meet(*ends[k]), 2))) == 2
 
 
 def test_the_first_error_in_order_is_raised_whoever_meets_it() -> None:
     with pytest.raises(ValueError, match=r"^piece 1$"):
-        list(in_order(lambda k: fail(k) if k else square(k), 30))
+        list(parallel_map(lambda k: fail(k) if k else square(k), 30))
 
 
 def test_what_a_killed_process_leaves_undone_is_done_here() -> None:
-    assert list(in_order(killed_elsewhere, 20)) == [k * k for k in range(20)]
+    assert list(parallel_map(killed_elsewhere, 20)) == [k * k for k in range(20)]
 
 
 def test_results_are_there_while_later_pieces_are_still_worked_on() -> None:
@@ -71,27 +71,31 @@ def test_results_are_there_while_later_pieces_are_still_worked_on() -> None:
             os.read(first_used, 1)  # never written before the first result is used
         return number
 
-    results = in_order(wait_from_the_third_on, 5)
+    results = parallel_map(wait_from_the_third_on, 5)
     first = next(results)
     os.write(told, b"xxxxx")
     assert [first, *results] == [0, 1, 2, 3, 4]
 
 
 def test_results_larger_than_any_pipe_arrive_whole() -> None:
-    sizes = [len(result) for result in in_order(lambda k: bytes(3_000_000 + k), 9)]
+    sizes = [len(result) for result in parallel_map(lambda k: bytes(3_000_000 + k), 9)]
     assert sizes == [3_000_000 + k for k in range(9)]
+
+
+def test_a_process_that_only_receives_has_all_pieces_done_elsewhere() -> None:
+    assert HERE not in set(parallel_map(pid, 9, works=False))
 
 
 def test_within_a_piece_there_are_no_further_copies() -> None:
     def inner(number: int) -> bool:
         own = os.getpid()
-        return all(there == own for there in in_order(pid, 8))
+        return all(there == own for there in parallel_map(pid, 8))
 
-    assert all(in_order(inner, 12))
+    assert all(parallel_map(inner, 12))
 
 
 def test_few_pieces_are_not_worth_a_copy() -> None:
-    assert set(in_order(pid, 9, fewest=10)) == {HERE}
+    assert set(parallel_map(pid, 9, fewest=10)) == {HERE}
 
 
 def test_where_no_process_can_be_had_this_one_does_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,12 +103,12 @@ def test_where_no_process_can_be_had_this_one_does_the_work(monkeypatch: pytest.
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr(os, "fork", refuse)
-    assert list(in_order(pid, 2)) == [HERE, HERE]
+    assert list(parallel_map(pid, 2)) == [HERE, HERE]
 
 
 def test_one_core_forks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "THREADS", 1)
-    assert list(in_order(pid, 2)) == [HERE, HERE]
+    assert list(parallel_map(pid, 2)) == [HERE, HERE]
 
 
 def test_neither_processes_nor_pipes_are_left() -> None:
@@ -116,12 +120,12 @@ def test_neither_processes_nor_pipes_are_left() -> None:
         return os.listdir(folder / "fd"), [task.joinpath("children").read_text() for task in folder.joinpath("task").iterdir()]
 
     before = held()
-    list(in_order(square, 5))
+    list(parallel_map(square, 5))
     assert held() == before
     with pytest.raises(ValueError, match=r"^piece 3$"):
-        list(in_order(lambda k: fail(k) if k == 3 else square(k), 30))
+        list(parallel_map(lambda k: fail(k) if k == 3 else square(k), 30))
     assert held() == before
-    unfinished = in_order(square, 5)
+    unfinished = parallel_map(square, 5)
     next(unfinished)
     unfinished.close()
     assert held() == before
@@ -130,7 +134,7 @@ def test_neither_processes_nor_pipes_are_left() -> None:
 WORKING = """
 import os
 from mdp.kernels import threads
-from mdp.kernels.processes import in_order
+from mdp.kernels.processes import parallel_map
 
 def work(number):
     os.write(1, f"{os.getpid()}\\n".encode())
@@ -138,7 +142,7 @@ def work(number):
         pass
 
 threads.use_threads(2)
-list(in_order(work, 2))
+list(parallel_map(work, 2))
 """
 
 
