@@ -83,7 +83,9 @@ def test_the_folder_of_a_run_is_gone_at_its_end_and_what_is_lost_is_said_once(te
     code = "import sys; from machine.app.cli import main; raise SystemExit(main(['profiles', 'list']))"
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert done.stderr == ""
-    code = code.replace("import sys", "import sys; from slicer.estimate.duration import line_s; line_s(1.0, 2.0, 3.0, 0.0)")
+    code = code.replace(
+        "import sys", "import sys; import numpy; from slicer.geometry.polygons import area_mm2; area_mm2(numpy.eye(3))"
+    )
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     sentence = "tiltprint: the next run compiles the kernels again: no folder of this user can be written: set XDG_CACHE_HOME"
     assert (done.stderr.count("\n"), done.stderr.startswith(sentence)) == (1, True)

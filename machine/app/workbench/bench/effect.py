@@ -21,7 +21,7 @@ class Effect(IntEnum):
     FRONT = 3
 
 
-# Read by neither: heat, air, retraction, what only moves between strokes, and what only the G-code's text has.
+# Read by neither: heat, air and what only the G-code's text has.
 UNREAD = frozenset(
     {
         *(f"material.{key}" for key in ("name", "density_g_cm3", "price_per_kg", "currency")),
@@ -30,13 +30,11 @@ UNREAD = frozenset(
             f"material.fan{key}"
             for key in ("", "_least", "_layer_time_s", "_bridge", "_infill_bridge", "_off_layers", "_full_layer")
         ),
-        *(f"material.{key}" for key in ("retract_mm", "retract_speed_mm_s", "retract_prime_extra_mm", "wipe_mm", "coast_mm")),
-        "material.pressure_advance",
-        *(f"process.{key}" for key in ("name", "seam", "combing", "combing_detour_mm", "retract_travel_mm")),
-        *(f"process.{key}" for key in ("lift_mm", "lift_speed_mm_s", "interface_fan", "interface_first_layer_fan")),
+        *("material.coast_mm", "material.pressure_advance"),
+        *(f"process.{key}" for key in ("name", "interface_fan", "interface_first_layer_fan")),
         *(f"machine.gcode.{key}" for key in ("start", "end", "before_part", "after_part", "resume")),
         *(f"machine.{key}" for key in ("name", "sources", "uncalibrated", "thumbnails_px", "receive_bytes")),
-        *(f"machine.{key}" for key in ("arcs", "arc_tolerance_mm", "nozzle_limit_c", "bed_limit_c", "lift_mm", "purge_mm")),
+        *(f"machine.{key}" for key in ("arcs", "arc_tolerance_mm", "nozzle_limit_c", "bed_limit_c", "lift_mm")),
     }
 )
 SEARCHED = frozenset(
@@ -47,8 +45,8 @@ SEARCHED = frozenset(
     }
 )
 PLACE = "process.place_mm"  # a search reads it, but the same planes are the best wherever they are reached
-# Of a machine's keys those that only make it quicker or slower.
-PACES = ("heating_c_s", "speed_mm_s", "acceleration_mm_s2", "speed_deg_s", "acceleration_deg_s2")
+# Of a machine's keys those that only make it quicker or slower, or take more filament.
+PACES = ("purge_mm", "heating_c_s", "speed_mm_s", "acceleration_mm_s2", "speed_deg_s", "acceleration_deg_s2")
 
 
 def effect_of(key: str) -> Effect:
