@@ -52,11 +52,11 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
             all_need = len(needing.get(i, ())) == len(triangles)
             need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
             anchors = below + (outlines[i] - hanging)  # also slopes beside it that carry themselves
-            found = _sort_islands(hanging, need, anchors, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
+            overhang = _sort_islands(hanging, need, anchors, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
             if sections.no_support:
-                wanted = found.hanging - sections.no_support[i]
-                found = replace(found, hanging=wanted, unwanted=found.hanging - wanted)
-            overhangs[i] = found
+                wanted = overhang.hanging - sections.no_support[i]
+                overhang = replace(overhang, hanging=wanted, unwanted=overhang.hanging - wanted)
+            overhangs[i] = overhang
     return overhangs
 
 

@@ -59,7 +59,7 @@ def highest_first(field: Field) -> Field:
 
 @no_nrt
 def _blocks(cells: int) -> int:
-    """How many blocks so many cells are in."""
+    """Number of blocks that cover a row of cells."""
     return (cells + BLOCK - 1) >> SHIFT
 
 

@@ -55,8 +55,9 @@ def times_s(program: ParsedProgram, machine: Machine) -> Floats:
     stop, seconds, begin = standstills(program), np.empty(len(program.line)), 0
     while begin < len(seconds):
         some = _until_standstill(program, begin)
-        told = (program.feed[some] / 60.0, stop[some], machine, program.remarks.acceleration[program.remark[some]])
-        seconds[some], begin = move_times(program.changes(some), *told), some.stop
+        accelerations = program.remarks.acceleration[program.remark[some]]
+        seconds[some] = move_times(program.changes(some), program.feed[some] / 60.0, stop[some], machine, accelerations)
+        begin = some.stop
     return seconds
 
 
@@ -83,15 +84,15 @@ def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
 def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     names = [*axis_limits(machine), "E"]
     most = axis_speeds(machine)
-    told = most * SLACK + ROUNDING_MM_S
-    fast = np.flatnonzero(_are_fast(program.start, program.end, program.e_mm, program.feed, told, WRITTEN))
+    allowed = most * SLACK + ROUNDING_MM_S
+    fast = np.flatnonzero(_are_fast(program.start, program.end, program.e_mm, program.feed, allowed, WRITTEN))
     change = program.changes(fast)
     way = np.maximum(lengths(change)[0], 1e-9)
     speeds = np.maximum(np.abs(change) - WRITTEN, 0.0) / way[:, None] * (program.feed[fast] / 60.0)[:, None]
     for axis, letter in enumerate(names):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
         message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most[axis]:g} {unit} (moves: {{count}})"
-        too_fast = speeds[:, axis] > told[axis]
+        too_fast = speeds[:, axis] > allowed[axis]
         yield from per_part(program, fast[too_fast], speeds[too_fast, axis], message, code="axis-speed", severity="warning")
 
 

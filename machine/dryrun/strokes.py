@@ -68,10 +68,10 @@ def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], 
     first_mm, layer_mm = _layers_mm(segments, bool((program.height_mm[rows] > 0).any()), profile)
     width_mm, height_mm, length_mm = np.empty((3, len(rows)))
     for some in pieces(len(rows)):
-        ends, told = segments[some], program.remark[rows[some]]
-        told_mm, of_width_mm = program.remarks.height_mm[told], program.remarks.width_mm[told]
+        ends, remark = segments[some], program.remark[rows[some]]
+        height_mm, of_width_mm = program.remarks.height_mm[remark], program.remarks.width_mm[remark]
         usual = np.where(np.maximum(ends[:, 0, 2], ends[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
-        height = np.where(told_mm > 0, told_mm, usual)
+        height = np.where(height_mm > 0, height_mm, usual)
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         area = program.e_mm[rows[some]] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
         by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)

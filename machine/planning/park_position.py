@@ -82,8 +82,10 @@ def _corners(machine: Machine) -> list[tuple[float, float]]:
 def is_way_clear(
     machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None, parts: int = 1
 ) -> bool:
-    """True when each body keeps what it must from table, cradle and print while the tip goes from start to end, tried as a whole
-    or in so many parts, for which there are more directions that may prove it."""
+    """True when each body keeps what it must from table, cradle and print while the tip goes from start to end.
+
+    The way is checked in `parts` pieces: a direction that separates body and solid is easier to find for a short piece.
+    """
     tried = directions(rotation(machine, pose) @ UP)
     shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
     places = start + shares * (end - start)

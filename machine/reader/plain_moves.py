@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from machine.gcode.lines import Lines
 from machine.gcode.modes import E_AXIS
 from machine.reader.state import Reader
-from machine.reader.table import TOLD, Columns
+from machine.reader.table import REMARK_COLUMNS, Columns
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 
@@ -83,8 +83,8 @@ def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
         letters, WORDS, _text_of(*kinds), np.array(modes.units), np.array(modes.steps), np.array(modes.offset),
         reader.feed_share, bool(reader.dialect.rapid), np.array([reader.printing, reader.travelling]),
     )  # fmt: skip
-    told = (reader.part, reader.layer, reader.type, reader.width, reader.height)
-    state, at = np.array([*reader.at, modes.feed, *told, reader.layers]), first
+    remark = (reader.part, reader.layer, reader.type, reader.width, reader.height)
+    state, at = np.array([*reader.at, modes.feed, *remark, reader.layers]), first
     while True:
         table.begin(state.tolist(), len(lines) - at)
         counts = np.array([at, table.rows, table.remarks, -1])
@@ -92,7 +92,7 @@ def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
         begun, at, table.rows, table.remarks, move = at, *(int(count) for count in counts)
         if move >= 0:
             reader.motion = lines[move][:2]
-        if at == begun or table.remarks < len(table.columns.told):
+        if at == begun or table.remarks < len(table.columns.remark_rows):
             break
     if at > first:
         reader.number, reader.at[:], modes.feed = at, state[:F].tolist(), float(state[F])
@@ -106,7 +106,7 @@ def _read_run(text: Text, meaning: Meaning, columns: Columns, state: Floats, cou
     """counts: the line after the run, rows, remarks, and the line of the last move; they are updated, as is the state."""
     words = np.empty((32, 2))
     line, row, remarks = counts[0], counts[1], counts[2]
-    while line < len(text.start) - 1 and remarks < len(columns.told):
+    while line < len(text.start) - 1 and remarks < len(columns.remark_rows):
         begin, end = text.start[line], text.start[line + 1]
         while end > begin and _is_blank(text.text[end - 1]):
             end -= 1
@@ -139,24 +139,24 @@ def _read_run(text: Text, meaning: Meaning, columns: Columns, state: Floats, cou
             columns.places[row + 1, k] = state[k]
         columns.e_mm[row] = state[E_AXIS] - filament_mm
         columns.feed[row] = inf if meaning.rapid and text.text[begin + 1] == 48 else state[F] * meaning.feed_share
-        remarks = _remark(state, meaning.accelerations[0 if state[E_AXIS] != filament_mm else 1], columns.told, remarks)
+        remarks = _remark(state, meaning.accelerations[0 if state[E_AXIS] != filament_mm else 1], columns.remark_rows, remarks)
         columns.remark[row] = remarks - 1
         row += 1
     counts[0], counts[1], counts[2] = line, row, remarks
 
 
 @no_nrt
-def _remark(state: Floats, acceleration: float, told: Floats, remarks: int) -> int:
+def _remark(state: Floats, acceleration: float, remark_rows: Floats, remarks: int) -> int:
     """How many remarks there are with that of a row, which may be that of the row before."""
-    last = TOLD - 1
-    same = remarks > 0 and told[remarks - 1, last] == acceleration
+    last = REMARK_COLUMNS - 1
+    same = remarks > 0 and remark_rows[remarks - 1, last] == acceleration
     for k in range(last):
-        same = same and told[remarks - 1, k] == state[PART + k]
+        same = same and remark_rows[remarks - 1, k] == state[PART + k]
     if same:
         return remarks
     for k in range(last):
-        told[remarks, k] = state[PART + k]
-    told[remarks, last] = acceleration
+        remark_rows[remarks, k] = state[PART + k]
+    remark_rows[remarks, last] = acceleration
     return remarks + 1
 
 

@@ -20,11 +20,11 @@ TRAVEL, EXTRUDE, RETRACT, ROTATE = (int(kind) for kind in MoveKind)
 def program_of(reader: Reader) -> ParsedProgram:
     """All that a reader has read."""
     columns, count = reader.table.columns, reader.table.rows
-    begins, told = columns.starts if len(columns.starts) else columns.places, columns.told[: reader.table.remarks].T
+    begins, remark = columns.starts if len(columns.starts) else columns.places, columns.remark_rows[: reader.table.remarks].T
     program = ParsedProgram(
         line=columns.line[:count], start=begins[:count], end=columns.places[1 : count + 1], e_mm=columns.e_mm[:count],
         feed=columns.feed[:count], kind=np.empty(count, np.int8), remark=columns.remark[:count],
-        remarks=Remarks(*told[:3].astype(np.int32), *told[3:]), types=tuple(reader.types), events=tuple(reader.events),
+        remarks=Remarks(*remark[:3].astype(np.int32), *remark[3:]), types=tuple(reader.types), events=tuple(reader.events),
         ignored=reader.ignored, replaced=tuple(reader.replaced), layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)),
         unsupported=tuple(reader.unsupported), announced=reader.announced, part_totals=tuple(reader.part_totals),
     )  # fmt: skip

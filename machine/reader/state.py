@@ -66,8 +66,8 @@ class Reader:
     def row(self, before: list[float], feed: float) -> None:
         """A move from a place to where the machine is now."""
         acceleration = self.printing if self.at[E_AXIS] != before[E_AXIS] else self.travelling
-        told = (self.part, self.layer, self.type, self.width, self.height, acceleration)
-        self.table.add(self.number, before, self.at, feed, told)
+        remark = (self.part, self.layer, self.type, self.width, self.height, acceleration)
+        self.table.add(self.number, before, self.at, feed, remark)
 
     def note(self, code: str, value: float, letters: str) -> None:
         """Put an event on record, before the next row."""

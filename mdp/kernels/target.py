@@ -21,14 +21,14 @@ INSTRUCTIONS = {
 
 
 def _choose() -> None:
-    """Have numba compile for the common target where this processor can run it and nobody has asked for another."""
+    """Have numba compile for the common target where this processor can run it, unless the environment names another."""
     try:
         known = binding.get_host_cpu_features()
     except RuntimeError:  # a kind of processor that LLVM cannot tell anything of
         return
-    asked = {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"} & os.environ.keys()
-    made = "_toplevel_target_context" in vars(cpu_target)  # somebody else has kernels in this process
-    if not asked and not made and all(known.get(name) for name in INSTRUCTIONS):
+    named = {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"} & os.environ.keys()
+    in_use = "_toplevel_target_context" in vars(cpu_target)  # somebody else has kernels in this process
+    if not named and not in_use and all(known.get(name) for name in INSTRUCTIONS):
         os.environ.update(NUMBA_CPU_NAME=COMMON, NUMBA_CPU_FEATURES="")  # numba reads them again whenever one has changed
         config.reload_config()
 

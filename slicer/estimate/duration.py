@@ -38,15 +38,15 @@ class Pace(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Buffers for moves one after the other, as many as `made` tells: direction (n, 3), length, cruise speed, acceleration, and
-    the greatest speed at which each begins."""
+    """Buffers for moves in order, the first size[0] of them set: direction (n, 3), length, cruise speed, acceleration, and the
+    greatest speed at which each begins."""
 
     direction: Floats
     length: Floats
     cruise: Floats
     ramp: Floats
     begin: Floats
-    made: Indices
+    size: Indices
 
 
 @no_nrt
@@ -68,8 +68,8 @@ def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profi
 
     tip: (2,) where the layer below ends.
     """
-    told = stroke_accelerations(profile, first_layer)
-    most = np.full(len(KINDS), np.inf) if told is None else np.array([told[kind] for kind in KINDS])
+    by_kind = stroke_accelerations(profile, first_layer)
+    most = np.full(len(KINDS), np.inf) if by_kind is None else np.array([by_kind[kind] for kind in KINDS])
     pace = _pace(profile)
     places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
     moving_s = _way_s(places, tip, (speeds_mm_s, most[strokes.kind]), strokes.retract, pace)
@@ -108,15 +108,15 @@ def _standing_s(profile: Profile) -> float:
 
 
 @no_nrt
-def _add(moves: Moves, step: tuple[float, float, float], cruise: float, told: float, stands: bool, pace: Pace) -> None:
+def _add(moves: Moves, step: tuple[float, float, float], cruise: float, acceleration: float, stands: bool, pace: Pace) -> None:
     """Append a straight move; stands: the machine stands still before it."""
     length = sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
-    n = moves.made[0]
+    n = moves.size[0]
     if length <= STANDING_MM:
         return
     ux, uy, uz = step[0] / length, step[1] / length, step[2] / length
     moves.length[n], moves.cruise[n] = length, cruise
-    moves.ramp[n] = min(told, pace.axes_mm_s2 / max(abs(ux), abs(uy), TINY), pace.z_mm_s2 / max(abs(uz), TINY))
+    moves.ramp[n] = min(acceleration, pace.axes_mm_s2 / max(abs(ux), abs(uy), TINY), pace.z_mm_s2 / max(abs(uz), TINY))
     if stands or n == 0:
         moves.begin[n] = 0.0
     else:
@@ -124,7 +124,7 @@ def _add(moves: Moves, step: tuple[float, float, float], cruise: float, told: fl
         change = max(abs(ux - x), abs(uy - y), abs(uz - z), TINY)
         moves.begin[n] = min(cruise, moves.cruise[n - 1], pace.junction_mm_s / change)
     moves.direction[n, 0], moves.direction[n, 1], moves.direction[n, 2] = ux, uy, uz
-    moves.made[0] += 1
+    moves.size[0] += 1
 
 
 @kernel
@@ -139,7 +139,7 @@ def _way_s(
     moves = Moves(table(room, 3), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(1, 0))
     x, y = tip[0], tip[1]
     for k in range(len(speeds)):
-        first, n = starts[k], moves.made[0]
+        first, n = starts[k], moves.size[0]
         stands = retract[k] and pace.wipe_mm <= 0.0
         if retract[k]:
             if n > 0:
@@ -171,7 +171,7 @@ def _way_s(
 @helper
 def _moves_s(moves: Moves) -> float:
     """Seconds of moves that end at a stand; changes where they begin."""
-    n, begin = moves.made[0], moves.begin
+    n, begin = moves.size[0], moves.begin
     begin[n] = 0.0
     for i in range(n - 1, -1, -1):
         begin[i] = min(begin[i], sqrt(begin[i + 1] ** 2 + 2.0 * moves.ramp[i] * moves.length[i]))

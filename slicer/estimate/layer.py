@@ -1,7 +1,7 @@
-"""Layer: what single layers of a part take, sliced as for a print.
+"""Layer: seconds and plastic of single layers of a part, sliced as for a print.
 
-Left out is what single layers do not tell: bridges, ironing, skin under walls that begin soon, and what is poured into pins; and
-seams are where the layer alone would have them.
+Bridges, ironing, skin under walls that begin a few layers higher and pins are left out: they depend on other layers. Seams lie
+where the layer alone would have them.
 """
 
 from collections.abc import Sequence
@@ -20,32 +20,34 @@ from slicer.fill.region import Cover, Region, region_of, shell_layers, sparse_ar
 from slicer.geometry.polygons import Polygons
 from slicer.heights import Heights, pedestal_layers
 from slicer.interface.cut_faces import cover, cut_walls, model_sections
-from slicer.paths import Kind, bead_area_mm2
+from slicer.paths import bead_area_mm2
 from slicer.sectioning import section_part
 from slicer.sections import Sections
 from slicer.shells import Shell, Shells, lay_beads, layer_processes
 from slicer.slice import order_layer
+from slicer.strokes.order import SUPPORTS
 from slicer.strokes.overhanging import strengthen_overhangs
 from slicer.strokes.seam import NO_LIMITS, NO_SEAMS, Surroundings, place_seams, rear_of
 from slicer.support.handed_down import up_to
 from slicer.support.support import Supports
 from slicer.walls.walls import Walls
 
-SUPPORT = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
-
 
 def sections_near(part: Part, profile: Profile, layers: Indices, later: Sequence[Part], heights: Heights) -> Sections:
-    """The sections of a part's layers, empty but for the lowest, the highest, some layers and those that decide where these are
-    solid. later: the parts printed after it; heights: of its layers, and of those that only its support has."""
+    """The sections of a part's layers, all but a few of them empty: given are the lowest, the highest, `layers`, and those that
+    decide where these are solid.
+
+    later: the parts printed after it; heights: of its layers, and of those that only its support has.
+    """
     top, bottom = shell_layers(profile.of_part(part.index).process)
     count = max(int(np.searchsorted(heights.cut_mm, part.in_part_frame().bounds_mm[1, 2])), 1)
     near = layers[:, None] + np.array([*_steps(top, bottom), -1, 0, 1, top])
-    kept = np.unique(np.clip(np.append(near, [0, count - 1]), 0, count - 1))
-    some = section_part(part, profile, (), later, {}, heights[kept])
+    needed = np.unique(np.clip(np.append(near, [0, count - 1]), 0, count - 1))
+    some = section_part(part, profile, (), later, {}, heights[needed])
 
     def spread(places: Sequence[Polygons]) -> list[Polygons]:
         everywhere = [Polygons()] * count
-        for layer, place in zip(kept.tolist(), places, strict=True):
+        for layer, place in zip(needed.tolist(), places, strict=True):
             everywhere[layer] = place
         return everywhere
 
@@ -135,4 +137,4 @@ def _taken(shells: Shells, layer: int, tip: Floats) -> tuple[tuple[float, float,
     strokes, speeds, flow = order_layer(beads, shells, layer, tip, Polygons())
     mm3 = strokes.lengths_mm * bead_area_mm2(strokes.width_mm, float(sections.heights.height_mm[layer])) * strokes.flow * flow
     time_s = strokes_s(strokes, speeds, tip, sections.profile, layer == 0 and sections.on_platform)
-    return (time_s, float(mm3.sum()), float(mm3[strokes.is_of(*SUPPORT)].sum())), strokes.points[-1, :2]
+    return (time_s, float(mm3.sum()), float(mm3[strokes.is_of(*SUPPORTS)].sum())), strokes.points[-1, :2]

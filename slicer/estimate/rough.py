@@ -1,7 +1,6 @@
-"""Rough: what every layer of a part takes, roughly, from the sums over its mesh, and the layers that are looked at more closely.
+"""Rough: a rough length of lines for every layer of a part, from sums over its mesh, and the choice of the layers to slice.
 
-A rough figure need not be right, only as much too high or low in a layer as in those next to it: what is really sliced of a few
-layers corrects it.
+A rough length may be wrong if it is wrong by the same factor in neighbouring layers: the layers that are sliced correct it.
 """
 
 from math import sqrt
@@ -68,8 +67,8 @@ def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Float
 
 
 def choose_layers(weight: Floats, first: int, samples: int) -> tuple[Indices, Indices]:
-    """Layers that stand for runs of layers, and where each run begins: the first ones each for itself, the others for as much of
-    the weight as each other."""
+    """Layers that stand for runs of layers, and where each run begins: each of the first ones for itself, the others for runs of
+    equal weight."""
     count = len(weight)
     first = min(first, count)
     done = np.cumsum(weight[first:])

@@ -7,27 +7,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.geometry.polygons import Polygons, islands
+from slicer.support.reachable import ReachableAreas
 from slicer.support.tree import (
     CELL_MM,
     MEETING,
     THICKEST_MM,
-    Branch,
     Tree,
-    _drop_enclosed,
-    _goals,
     branch_of,
     growth,
+    lower_branches,
     trunk,
     trunk_radius_mm,
 )
-from tests.slicer.hand import as_shapely, profile, ragged
+from tests.shapes import box
+from tests.slicer.hand import as_shapely, profile, ragged, sections_at
 
 seeds = st.integers(0, 10**6)
 
 
-def some_trunks(seed: int, count: int) -> list[Branch]:
-    rng = np.random.default_rng(seed)
-    return [trunk(x, y, radius, 20.0) for x, y, radius in rng.uniform((-15, -15, 0.3), (15, 15, 8.0), (count, 3)).tolist()]
+def in_the_open(lean_mm: float, growth_deg: float) -> ReachableAreas:
+    """Two layers of 0.2 mm with nothing in the way of branches."""
+    wide, cuts_mm = Polygons.square((200.0, 200.0), True), np.array([0.1, 0.3])
+    sections = sections_at(box(1, 1, 1), cuts_mm, f"process.support_branch_growth_deg={growth_deg}")
+    return ReachableAreas(sections, np.full(2, lean_mm), (Polygons(), Polygons()), (wide, wide))
 
 
 @settings(max_examples=25)
@@ -55,11 +57,16 @@ def test_a_trunk_has_every_place_within_its_radius_and_reaches_little_further(ra
 @settings(max_examples=40)
 @given(seeds, st.integers(0, 12))
 def test_a_branch_is_dropped_where_a_trunk_has_all_its_places_and_of_equal_ones_one_stays(seed: int, count: int) -> None:
-    trunks = some_trunks(seed, count)
-    trunks += trunks[: count // 3]
-    left = _drop_enclosed(trunks)
-    discs = [shapely.Point(b.x, b.y).buffer(b.radius, quad_segs=64) for b in trunks]
-    assert shapely.union_all(discs).difference(shapely.union_all([discs[trunks.index(b)] for b in left])).area < 1e-6
+    areas = in_the_open(1e-9, 10.0)
+    low_mm, high_mm = areas.heights.tip_mm.tolist()
+    thick = growth(areas.process, areas.radius_mm)
+    rows = np.random.default_rng(seed).uniform((-9, -9, 1.0), (9, 9, 40.0), (count, 3)).tolist()
+    trunks = [trunk(x, y, trunk_radius_mm(top_mm - high_mm, *thick), top_mm) for x, y, top_mm in [*rows, *rows[: count // 3]]]
+    left = lower_branches(trunks, areas, 1)
+    radii = [trunk_radius_mm(top_mm - low_mm, *thick) for _, _, top_mm in rows]
+    discs = [shapely.Point(x, y).buffer(radius, quad_segs=64) for (x, y, _), radius in zip(rows, radii, strict=True)]
+    kept = shapely.union_all([shapely.Point(b.x, b.y).buffer(b.radius, quad_segs=64) for b in left])
+    assert shapely.union_all(discs).difference(kept).area < 1e-6
     pairs = [(a, b) for a in left for b in left if a is not b]
     assert all(np.hypot(a.x - b.x, a.y - b.y) > a.radius - b.radius for a, b in pairs)
     assert len({(b.x, b.y, b.radius) for b in left}) == len(left)
@@ -74,7 +81,11 @@ def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: 
         others = sorted((float(np.hypot(*(own - neighbour))), j) for j, neighbour in enumerate(at) if j != k)
         meets = others and others[0][0] <= 2.0 * MEETING * reach
         expected.append(tuple(0.5 * (own + at[others[0][1]])) if meets else tuple(own))
-    assert np.array(_goals(at, reach)).reshape(-1, 2) == pytest.approx(np.array(expected).reshape(-1, 2))
+    areas = in_the_open(reach, 0.0)
+    least_mm, top_mm = growth(areas.process, areas.radius_mm)[0], float(areas.heights.tip_mm[1])
+    lower = lower_branches([trunk(x, y, least_mm, top_mm) for x, y in at.tolist()], areas, 1)
+    places = {tuple(np.round(place, 6)) for place in expected}  # of two that have met one is left
+    assert {(round(b.x, 6), round(b.y, 6)) for b in lower} == places
 
 
 @pytest.mark.parametrize(
