@@ -69,13 +69,13 @@ def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], 
     width_mm, height_mm, length_mm = np.empty((3, len(rows)))
     for some in pieces(len(rows)):
         ends, remark = segments[some], program.remark[rows[some]]
-        height_mm, of_width_mm = program.remarks.height_mm[remark], program.remarks.width_mm[remark]
+        remark_height_mm, remark_width_mm = program.remarks.height_mm[remark], program.remarks.width_mm[remark]
         usual = np.where(np.maximum(ends[:, 0, 2], ends[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
-        height = np.where(height_mm > 0, height_mm, usual)
+        height = np.where(remark_height_mm > 0, remark_height_mm, usual)
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         area = program.e_mm[rows[some]] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
         by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
-        width_mm[some], height_mm[some], length_mm[some] = np.where(of_width_mm > 0, of_width_mm, by_flow), height, length
+        width_mm[some], height_mm[some], length_mm[some] = np.where(remark_width_mm > 0, remark_width_mm, by_flow), height, length
     return Beads(segments, rows, width_mm, height_mm, length_mm)
 
 
