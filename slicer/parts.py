@@ -88,7 +88,7 @@ def slice_parts(
     results = (
         map(sliced, largest_first)
         if by_layers
-        else parallel_map(lambda place: sliced(largest_first[place]), len(parts), works=False, on_wait=show)
+        else parallel_map(lambda place: sliced(largest_first[place]), len(parts), helps=False, on_wait=show)
     )
     for k, result in zip(largest_first, results, strict=True):
         if isinstance(result, SliceError):

@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 from contextlib import redirect_stdout
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -32,6 +33,8 @@ def main() -> None:
     options.add_argument("-o", "--out", type=Path, metavar="FOLDER", help="make a wheel there")
     given = options.parse_args()
     with TemporaryDirectory() as folder:
+        if given.out and find_spec("build") is None:
+            sys.exit("ship_kernels.py: a wheel needs the package build: pip install -e '.[dev]' brings it")
         if given.out:
             print(_wheel(Path(folder), given.out.resolve()))
         else:

@@ -38,9 +38,9 @@ def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_pla
         if apart[a]:
             approach = laid.approach[laid.approach_starts[a] : laid.approach_starts[a + 1]]
             over = height_to(tip, firsts[a], approach, bool(layer.retract[a]), shift)
-        state = np.array([*tip.at_mm, over, tip.retracted_mm + tip.prime_extra_mm])
+        begin = np.array([*tip.at_mm, over, tip.retracted_mm + tip.prime_extra_mm])
         piece = Moves(strokes.ways[ways[a] : ways[b]], strokes.rows[a:b])
-        tip.add(_lay(piece, apart[a:b], laid.approach, laid.approach_starts[a : b + 1], state, tip.speeds))
+        tip.add(_lay(piece, apart[a:b], laid.approach, laid.approach_starts[a : b + 1], begin, tip.speeds))
         tip.retracted_mm = tip.prime_extra_mm = 0.0
         tip.trail = trail_after(laid, a, b, tip.trail, profile.material.wipe_mm)
 
@@ -87,7 +87,7 @@ def _step_mm(flat_mm: Floats, i: int) -> float:
 
 @kernel
 def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> Moves:
-    """The strokes, some of which push nothing over their last coast_mm; a step is cut where that begins. flat_mm: as above."""
+    """The strokes, some of which push nothing over their last coast_mm; a step is cut where that begins. flat_mm: as in _ways."""
     out, done = Moves(table(len(strokes.ways) + len(coasts), 4), strokes.rows), longs(2, 0)
     first = 0
     for k in range(len(coasts)):
@@ -112,19 +112,19 @@ def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> 
 
 
 @kernel
-def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices, tip: Floats, speeds: Speeds) -> Moves:
+def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices, begin: Floats, speeds: Speeds) -> Moves:
     """Strokes with the travels to those that begin apart from where the one before them ends, along the approach.
 
-    tip: X Y Z where it is, Z over which it crosses to the first stroke, and what is to be pushed before that.
+    begin: (5,) X Y Z of the tip, Z over which it crosses to the first stroke, and what is to be pushed before that.
     """
-    most = len(strokes.ways) + approach_starts[-1] - approach_starts[0] + 7 * len(apart) + 1  # three travels and a push each
+    most = len(strokes.ways) + approach_starts[-1] - approach_starts[0] + 7 * len(apart) + 1  # three travels and a push
     out, done, goal = Moves(table(most, 4), table(5 * len(apart), 6)), longs(2, 0), floats(3, 0.0)
-    add_point(out, done, tip[0], tip[1], tip[2], 0.0)
+    add_point(out, done, begin[0], begin[1], begin[2], 0.0)
     first = 0
     for k in range(len(strokes.rows)):
         start, points = strokes.ways[first], int(strokes.rows[k, POINTS])
         if apart[k]:
-            over = tip[3] if k == 0 else start[2]
+            over = begin[3] if k == 0 else start[2]
             at = out.ways[done[0] - 1]
             if abs(over - at[2]) > STANDING_MM:
                 goal[0], goal[1], goal[2] = at[0], at[1], over
@@ -133,8 +133,8 @@ def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices
             add_travel(out, done, approach[approach_starts[k] : approach_starts[k + 1]], goal, speeds)
             goal[2] = start[2]
             add_travel(out, done, approach[:0], goal, speeds)
-        if k == 0 and tip[4] > 0.0:
-            add_point(out, done, start[0], start[1], start[2], tip[4])
+        if k == 0 and begin[4] > 0.0:
+            add_point(out, done, start[0], start[1], start[2], begin[4])
             add_row(out, done, RETRACT, 1, speeds.filament_mm_s, np.inf)
         for i in range(first, first + points):
             add_point(out, done, strokes.ways[i, 0], strokes.ways[i, 1], strokes.ways[i, 2], strokes.ways[i, 3])

@@ -1,7 +1,7 @@
 """Cache: where compiled kernels are kept, in a folder a source file: those shipped with the program and those compiled here.
 
-A folder's name tells all that its kernels depend on, so what lies in it fits: the text of the file and of those that its helpers
-and constants come from (numba looks at the file alone), and the target. It does not tell where the program is installed.
+A folder's name tells all that its kernels depend on, so a match is always valid: the text of the file and of those that its
+helpers and constants come from (numba looks at the file alone), and the target. Where the program is installed does not matter.
 """
 
 import os
@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from pickle import UnpicklingError
 from shutil import rmtree
 from time import time
 from typing import Any
@@ -25,6 +26,12 @@ PACKAGES = Path(__file__).resolve().parents[2]
 SHIPPED = Path(__file__).resolve().parent / "compiled"  # made by tools/ship_kernels.py; not there in a checkout
 IMPORTED = re.compile(rb"^from ((?:profiles|mdp|slicer|machine)(?:\.\w+)+) import", re.MULTILINE)
 HAS_KERNELS = b"from mdp.kernels.kernel import"
+UNREADABLE = (
+    OSError,
+    EOFError,
+    ValueError,
+    UnpicklingError,
+)  # may not be read, or was not written to its end
 UNUSED_S = 60 * 86400.0  # folders of older versions go after this time: a program that still runs may be using them
 
 _loaded: set[str] = set()  # names of the folders of the files whose kernels are loaded and were not shipped
@@ -128,11 +135,11 @@ class KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         prepare_loading(target_context)
-        with suppress(OSError):  # a folder that cannot be read
+        with suppress(*UNREADABLE):
             shipped = self._shipped.load(self._index_key(sig, target_context.codegen()))
             if shipped is not None:
                 return self._impl.rebuild(target_context, shipped)
-        with suppress(OSError):
+        with suppress(*UNREADABLE):
             return self._load_overload(sig, target_context)
         return None
 

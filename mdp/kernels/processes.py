@@ -1,7 +1,8 @@
 """Processes: pieces of work that hold the interpreter's lock, done side by side by copies of this process.
 
 A copy is forked, which takes milliseconds; systems without fork do one piece after the other. A copy has none of our threads nor
-those of a library: what runs in it starts none, and calls no boolean of solids, which has its own.
+those of a library, but the locks that they held: what runs in it calls no boolean of solids, which has threads of its own,
+and the compiler's lock is ours when a copy is made.
 """
 
 import gc
@@ -14,6 +15,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import Thread
 from typing import TypeVar
+
+from numba.core.compiler_lock import global_compiler_lock
 
 from mdp.kernels import threads
 
@@ -33,13 +36,13 @@ def parallel_map(
     count: int,
     fewest: int = 2,
     *,
-    works: bool = True,
+    helps: bool = True,
     on_wait: Callable[[], None] | None = None,
 ) -> Iterator[Result]:
     """work(0), work(1) .. work(count - 1), in this order; copies of this process work ahead while the caller uses the results.
 
     Results are pickled. The error of the first piece that raises one is raised. Within `work` there are no further copies.
-    fewest: so many pieces are worth a copy. works: whether this process does pieces, too; while it does one that takes long,
+    fewest: so many pieces are worth a copy. helps: whether this process does pieces, too; while it does one that takes long,
     copies wait for it to receive results that no pipe holds. on_wait: called now and then while results are waited for.
     """
     cores = min(threads.THREADS, count)
@@ -52,14 +55,14 @@ def parallel_map(
     def results(run: int) -> Iterator[Result]:
         return map(work, range(run * size, min((run + 1) * size, count)))
 
-    with _numbers(runs) as numbers, _copies(cores - works, results, numbers) as answers:
+    with _numbers(runs) as numbers, _copies(cores - helps, results, numbers) as answers:
         known: dict[int, list[Result] | None] = {}  # None: a piece raises an error, its run is done again when its turn comes
         for run in range(runs):
             while run not in known:
                 _receive(answers, known, 0.0)
                 if run not in known and not answers:  # killed from outside, or never there
                     known[run] = None
-                elif run not in known and works and (number := _next(numbers)) is not None:
+                elif run not in known and helps and (number := _next(numbers)) is not None:
                     known[number] = _tried(results, number)
                 elif run not in known:
                     _receive(answers, known, LOOK_S)
@@ -103,12 +106,16 @@ def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int
     parent, _forked = os.getpid(), True
     try:
         for _ in range(count):
-            answer, end = os.pipe()
+            try:
+                answer, end = os.pipe()
+            except OSError:  # too many open files: the copies that are there do the work
+                break
             answers.append(answer)
             _widen(end)
             try:
-                copy = os.fork()
-            except OSError:  # no memory or no number for another process: those that are there do the work
+                with global_compiler_lock:  # held by another thread it would never be free in the copy
+                    copy = os.fork()
+            except OSError:  # no memory or no number for another process
                 os.close(end)
                 break
             if copy == 0:
@@ -136,8 +143,8 @@ def _widen(pipe: int) -> None:
 def _answer(results: Callable[[int], Iterator[object]], numbers: int, end: int, parent: int) -> None:
     """All that a copy does."""
     try:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_DFL)  # Ctrl-C reaches all: the parent speaks
+        for ending in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(ending, signal.SIG_DFL)  # Ctrl-C reaches all: the parent speaks
         end_with(parent)
         threads.use_threads(1)
         gc.freeze()  # a search for garbage would write on all memory, of which this copy would have its own then

@@ -37,7 +37,7 @@ class Pace(NamedTuple):
     wipe_mm: float
 
 
-class Moves(NamedTuple):
+class StraightMoves(NamedTuple):
     """Buffers for moves in order, the first size[0] of them set: direction (n, 3), length, cruise speed, acceleration, and the
     greatest speed at which each begins."""
 
@@ -108,7 +108,9 @@ def _standing_s(profile: Profile) -> float:
 
 
 @no_nrt
-def _add(moves: Moves, step: tuple[float, float, float], cruise: float, acceleration: float, stands: bool, pace: Pace) -> None:
+def _add(
+    moves: StraightMoves, step: tuple[float, float, float], cruise: float, acceleration: float, stands: bool, pace: Pace
+) -> None:
     """Append a straight move; stands: the machine stands still before it."""
     length = sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
     n = moves.size[0]
@@ -136,7 +138,7 @@ def _way_s(
     points, starts, approach, approach_starts = places
     speeds, most = bounds
     room = len(points) + len(approach) + 4 * len(speeds) + 1
-    moves = Moves(table(room, 3), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(1, 0))
+    moves = StraightMoves(table(room, 3), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(1, 0))
     x, y = tip[0], tip[1]
     for k in range(len(speeds)):
         first, n = starts[k], moves.size[0]
@@ -169,7 +171,7 @@ def _way_s(
 
 
 @helper
-def _moves_s(moves: Moves) -> float:
+def _moves_s(moves: StraightMoves) -> float:
     """Seconds of moves that end at a stand; changes where they begin."""
     n, begin = moves.size[0], moves.begin
     begin[n] = 0.0

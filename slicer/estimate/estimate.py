@@ -1,9 +1,9 @@
 """Estimate: print time and filament of parts from a few of their layers, sliced as for a print, in tenths of a second.
 
-All layers are measured roughly, by lengths that follow from the mesh and from the support of thick layers. Layers that share
-these evenly between them are then sliced by the slicer's own code and timed with the machine's acceleration, and each run of
-layers takes as much more than its rough figures as the layer that stands for it. It is there to choose between decompositions:
-half of all prints are off by less than 3 %, most by less than 8; the dry run has the exact figures.
+A rough length of lines is known for every layer, from the mesh and from the support of thick layers. The layers are divided into
+runs of equal rough time. One layer of each run is sliced by the slicer's own code and timed with the machine's acceleration; the
+whole run differs from its rough figures by the same factor. The estimate is for choosing between decompositions: half of all
+prints are off by less than 3 %, most by less than 8, ironing aside, which is left out; the dry run has the exact figures.
 """
 
 from collections.abc import Sequence
@@ -63,7 +63,7 @@ def _estimate_part(part: Part, whole: Profile, later: Sequence[Part], support: T
     held_mm = support_lengths_mm(support, process, on_platform)
     bead_mm2 = spacing_mm(process.line_width_mm, process.layer_height_mm) * heights.height_mm
     rough_s = _rough_s(np.hstack([drawn_mm, held_mm]), process)
-    layers, begins = choose_layers(rough_s, 1, samples)
+    layers, begins = choose_layers(rough_s, samples)
     real = sliced_layers(sections_near(part, whole, layers, later, heights), support, layers)
     time_s = _over_all(rough_s, real[:, 0], layers, begins)
     own_mm3 = _over_all(drawn_mm.sum(axis=1) * bead_mm2 + TINY_MM3, real[:, 1] - real[:, 2], layers, begins)

@@ -43,7 +43,7 @@ def sections_near(part: Part, profile: Profile, layers: Indices, later: Sequence
     count = max(int(np.searchsorted(heights.cut_mm, part.in_part_frame().bounds_mm[1, 2])), 1)
     near = layers[:, None] + np.array([*_steps(top, bottom), -1, 0, 1, top])
     needed = np.unique(np.clip(np.append(near, [0, count - 1]), 0, count - 1))
-    some = section_part(part, profile, (), later, {}, heights[needed])
+    sampled = section_part(part, profile, (), later, {}, heights[needed])
 
     def spread(places: Sequence[Polygons]) -> list[Polygons]:
         everywhere = [Polygons()] * count
@@ -52,40 +52,40 @@ def sections_near(part: Part, profile: Profile, layers: Indices, later: Sequence
         return everywhere
 
     whole = replace(
-        some,
+        sampled,
         heights=heights[:count],
-        outlines=spread(some.outlines),
-        own=spread(some.own),
-        ungrooved=spread(some.ungrooved),
-        beside=spread(some.beside),
-        pedestal_layers=pedestal_layers(heights, profile.search.pedestal_mm) if some.on_platform else 0,
+        outlines=spread(sampled.outlines),
+        own=spread(sampled.own),
+        ungrooved=spread(sampled.ungrooved),
+        beside=spread(sampled.beside),
+        pedestal_layers=pedestal_layers(heights, profile.search.pedestal_mm) if sampled.on_platform else 0,
         too_thin=frozenset(),
     )
     return up_to(whole, float(heights.tip_mm[-1]))
 
 
 def _steps(top: int, bottom: int) -> tuple[int, ...]:
-    """Which layers above and below one tell how far it is covered: the farthest of its shells but one, which the layer below asks
-    for, too, and what is next to it."""
+    """Offsets of the layers that decide where both a layer and the one below it are covered: the next one, the farthest above
+    that the shells of both reach, and the farthest below. The caller adds what only one of the two needs."""
     return tuple({min(1, top - 1), top - 1, -bottom} - {0, -1} if top else {-bottom} - {0})
 
 
 def sliced_layers(sections: Sections, support: ThickSupport, layers: Indices) -> Floats:
     """(n, 3) seconds, mm3 and mm3 of support of each of some layers."""
     shells = _shells(sections, support, layers)
-    tip, taken = rear_of(sections.mesh.bounds_mm), []
+    tip, figures = rear_of(sections.mesh.bounds_mm), []
     for layer in layers.tolist():
-        figures, tip = _taken(shells, layer, tip)
-        taken.append(figures)
-    return np.array(taken)
+        layer_figures, tip = _layer_figures(shells, layer, tip)
+        figures.append(layer_figures)
+    return np.array(figures)
 
 
 def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shells:
     """The shells of some layers; those of the others are not there, but for what is sparse below one of them."""
     process, nozzle_mm, model = sections.process, sections.profile.machine.head.nozzle_mm, model_sections(sections)
     empty = Polygons()
-    nothing = [empty] * len(sections.outlines)
-    processes = layer_processes(process, sections.on_platform, len(nothing))
+    empty_areas = [empty] * len(sections.outlines)
+    processes = layer_processes(process, sections.on_platform, len(empty_areas))
     no_shell = Shell(process, Walls((), empty, empty), (), Region(*[empty] * 5), (), empty)
     walled: dict[int, tuple[Walls, tuple[Bead, ...], Polygons]] = {}
     for layer in layers.tolist():
@@ -94,8 +94,8 @@ def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shell
         walled[layer] = cut_walls(
             sections.own[layer], model[layer], own, height_mm=height_mm, nozzle_mm=nozzle_mm, usual=process.walls
         )
-    covers = cover(sections, model, [walled[layer][2] if layer in walled else empty for layer in range(len(nothing))])
-    shells, areas, dense, filled = [no_shell] * len(nothing), list(nothing), list(nothing), list[Polygons]()
+    covers = cover(sections, model, [walled[layer][2] if layer in walled else empty for layer in range(len(empty_areas))])
+    shells, areas, dense, filled = [no_shell] * len(empty_areas), list(empty_areas), list(empty_areas), list[Polygons]()
     for layer, (walls, ending, _) in walled.items():
         region, lower = _region(sections, covers, walls.inside, layer)
         shells[layer] = Shell(processes[layer], walls, ending, region, (), empty)
@@ -106,7 +106,7 @@ def _shells(sections: Sections, support: ThickSupport, layers: Indices) -> Shell
         filled += [region.sparse] if not region.sparse.is_empty() else []
     infill = with_line_width(process, process.infill_line_width_mm)
     density = pattern_density(filled[len(filled) // 2 :][:1], infill, process.layer_height_mm)
-    return Shells(Supports(sections, areas, dense, nothing, nothing, nothing), shells, density)
+    return Shells(Supports(sections, areas, dense, empty_areas, empty_areas, empty_areas), shells, density)
 
 
 def _region(sections: Sections, covers: Cover, inside: Polygons, layer: int) -> tuple[Region, Polygons]:
@@ -125,7 +125,7 @@ def _region(sections: Sections, covers: Cover, inside: Polygons, layer: int) -> 
     return region_of(inside, uncut, covers, layer, not sections.on_platform, process), lower ^ inside
 
 
-def _taken(shells: Shells, layer: int, tip: Floats) -> tuple[tuple[float, float, float], Floats]:
+def _layer_figures(shells: Shells, layer: int, tip: Floats) -> tuple[tuple[float, float, float], Floats]:
     """Seconds, mm3 and mm3 of support of a layer, and where it ends. tip: (2,) where the one before ended."""
     sections, shell = shells.sections, shells.layers[layer]
     own, auxiliary = lay_beads(shells, layer)

@@ -66,14 +66,13 @@ def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Float
     return area, around, over, under
 
 
-def choose_layers(weight: Floats, first: int, samples: int) -> tuple[Indices, Indices]:
-    """Layers that stand for runs of layers, and where each run begins: each of the first ones for itself, the others for runs of
-    equal weight."""
+def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
+    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, the others for runs of equal
+    weight."""
     count = len(weight)
-    first = min(first, count)
-    done = np.cumsum(weight[first:])
-    cuts = np.searchsorted(done, done[-1] * np.arange(1, samples) / samples) + 1 if len(done) else np.zeros(0, np.int64)
-    begins = np.unique(np.concatenate([np.arange(first), first + np.concatenate([[0], cuts])]))
+    done = np.cumsum(weight[1:])
+    cuts = np.searchsorted(done, done[-1] * np.arange(1, samples) / samples) + 2 if count > 1 else np.zeros(0, np.int64)
+    begins = np.unique(np.concatenate([[0, 1], cuts]))
     begins = begins[begins < count]
     whole = np.concatenate([[0.0], np.cumsum(weight)])
     middle = 0.5 * (whole[begins] + whole[np.append(begins[1:], count)])

@@ -17,7 +17,7 @@ AGAIN_S = 0.1
 PATIENCE_S = 1.2  # how long work may go on after Ctrl-C: native code hears of it only when it is done
 SHOW_CURSOR = "\r\x1b[K\x1b[?25h"
 END = b"\0"  # no signal has this number
-COMPILER = f"{os.sep}llvmlite{os.sep}"
+COMPILER = f"{os.sep}llvmlite{os.sep}", f"{os.sep}numba{os.sep}"  # folders of its files
 
 
 @contextmanager
@@ -106,7 +106,7 @@ def outside_compiler() -> Iterator[None]:
 
     def handle(number: int, frame: FrameType | None) -> None:
         while frame is not None:
-            if COMPILER in frame.f_code.co_filename:
+            if any(folder in frame.f_code.co_filename for folder in COMPILER):
                 later = threading.Timer(AGAIN_S, signal.pthread_kill, (main.ident, number))
                 later.daemon = True
                 later.start()

@@ -360,3 +360,11 @@ def _wait_for(process: "subprocess.Popen[str]", word: str) -> None:
         if not line:
             time.sleep(0.1)
     pytest.fail(f"{word!r} was never said")
+
+
+def test_a_closed_output_ends_no_command() -> None:
+    start = f"{sys.executable} -c 'from machine.app.start import main; raise SystemExit(main())'"
+    done = subprocess.run(
+        ["sh", "-c", f"{start} profiles list >&-"], stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3]
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -18,6 +18,13 @@ def test_a_kernel_is_compiled_once_and_again_when_a_part_or_a_constant_in_anothe
     assert result_and_compilations(program) == "22.0 1"
 
 
+def test_a_kernel_whose_file_was_not_written_to_its_end_is_compiled_again(program: Path) -> None:
+    result_and_compilations(program)
+    [file] = (program.parent.parent / "cached").rglob("*.nbc")
+    file.write_bytes(b"")
+    assert [result_and_compilations(program), result_and_compilations(program)] == ["21.0 1", "21.0 0"]
+
+
 def test_the_sources_of_a_kernel_are_its_file_and_what_its_parts_and_constants_come_from() -> None:
     strokes = cache.PACKAGES / "slicer" / "strokes"
     sources = cache.sources(strokes / "path_order.py")

@@ -83,7 +83,7 @@ def test_results_larger_than_any_pipe_arrive_whole() -> None:
 
 
 def test_a_process_that_only_receives_has_all_pieces_done_elsewhere() -> None:
-    assert HERE not in set(parallel_map(pid, 9, works=False))
+    assert HERE not in set(parallel_map(pid, 9, helps=False))
 
 
 def test_within_a_piece_there_are_no_further_copies() -> None:
@@ -159,3 +159,30 @@ def test_whatever_ends_the_parent_ends_its_copies(ended_by: signal.Signals) -> N
                 os.kill(process, signal.SIGKILL)
             raise
         assert parent.returncode == -ended_by
+
+
+LOCKED = """
+import threading, time
+import numpy as np
+from numba.core.compiler_lock import global_compiler_lock
+from mdp.kernels import threads
+from mdp.kernels.processes import parallel_map
+from slicer.geometry.polygons import area_mm2
+
+held = threading.Event()
+
+def hold():
+    with global_compiler_lock:
+        held.set()
+        time.sleep(0.5)
+
+threads.use_threads(2)
+threading.Thread(target=hold).start()
+held.wait()
+print(sum(parallel_map(lambda number: area_mm2(np.eye(3)[:, :2]), 8)))
+"""
+
+
+def test_a_copy_loads_kernels_although_another_thread_was_compiling_when_it_was_made() -> None:
+    done = subprocess.run([sys.executable, "-c", LOCKED], capture_output=True, text=True, timeout=120.0, check=True)
+    assert float(done.stdout) == pytest.approx(8 * 0.5)

@@ -33,18 +33,18 @@ def test_a_ledge_half_way_up_has_skin_below_it() -> None:
 
 
 @settings(max_examples=50)
-@given(st.integers(0, 10**6), st.integers(1, 300), st.integers(0, 3), st.integers(1, 40))
-def test_every_layer_is_stood_for_by_one_of_its_own_run(seed: int, count: int, first: int, samples: int) -> None:
+@given(st.integers(0, 10**6), st.integers(1, 300), st.integers(1, 40))
+def test_every_layer_is_stood_for_by_one_of_its_own_run(seed: int, count: int, samples: int) -> None:
     weight = np.random.default_rng(seed).uniform(0.01, 5.0, count)
-    layers, begins = choose_layers(weight, first, samples)
+    layers, begins = choose_layers(weight, samples)
     ends = np.append(begins[1:], count)
     assert begins[0] == 0
     assert ((begins <= layers) & (layers < ends)).all()
-    assert layers[: min(first, count)].tolist() == list(range(min(first, count)))
-    assert len(layers) <= samples + first
+    assert layers[0] == 0
+    assert len(layers) <= samples + 1
 
 
-def test_layers_that_weigh_much_are_looked_at_more_closely() -> None:
+def test_layers_of_more_weight_are_sampled_more_densely() -> None:
     weight = np.where(np.arange(100) < 50, 9.0, 1.0)
-    layers, _ = choose_layers(weight, 0, 10)
-    assert (layers < 50).sum() == 9
+    layers, _ = choose_layers(weight, 10)
+    assert (layers[1:] < 50).sum() == 9

@@ -21,7 +21,7 @@ class Effect(IntEnum):
     FRONT = 3
 
 
-# Read by neither: heat, air and what only the G-code's text has.
+# Read neither by a search nor for prices: heat, air and what only the G-code's text has.
 UNREAD = frozenset(
     {
         *(f"material.{key}" for key in ("name", "density_g_cm3", "price_per_kg", "currency")),

@@ -84,11 +84,12 @@ def test_the_first_interrupt_sets_the_flag_and_the_second_raises() -> None:
             signal.raise_signal(signal.SIGINT)
 
 
-def test_an_interrupt_beneath_the_compiler_waits_until_it_is_back() -> None:
+@pytest.mark.parametrize("folder", COMPILER)
+def test_an_interrupt_beneath_the_compiler_waits_until_it_is_back(folder: str) -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     beneath: dict[str, Callable[[], str]] = {}
     exec(
-        compile("def told(): signal.raise_signal(signal.SIGINT); return 'compiled'", f"{COMPILER}x.py", "exec"),
+        compile("def told(): signal.raise_signal(signal.SIGINT); return 'compiled'", f"{folder}x.py", "exec"),
         globals(),
         beneath,
     )
