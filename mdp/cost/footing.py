@@ -11,9 +11,11 @@ from functools import cached_property
 import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType
 
-from mdp.directions.orientation import LEAN_DEG, centre_of_mass, diameter_mm, tipping_angle_deg
-from mdp.kernels.arrays import longs, table
+from mdp.cut import convex_hull
+from mdp.directions.orientation import LEAN_DEG, SIDES, centre_of_mass, diameter_mm, tipping_angle_deg
+from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import kernel
+from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Indices, Ints, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
@@ -118,17 +120,28 @@ class Plate:
         tensions = [_tension_mpa(section_edges(area), high - low, self.weight_n, centre[:2]) for area in (base, brim)]
         corners = section_edges(base)[:, :2] - centre[:2]
         lean_deg = tipping_angle_deg(corners, float(centre[2]) - low) if len(corners) else -90.0
-        shadow_mm2 = self._shadow_mm2(rotation)
+        shadow_mm2 = self._shadow_mm2(rotation[2])
         return Footing(base.area() / shadow_mm2, touching.area() / shadow_mm2, lean_deg, *tensions)
+
+    def stance_bounds(self, rotations: Floats) -> tuple[Floats, Floats]:
+        """(k,) upper bounds of the touching share and (k,) of the lean, degrees, of the model turned by (k, 3, 3) rotations.
+
+        The base lies within the hull's sections at the same heights, and these take a tenth of the time.
+        """
+        hull, rotations = convex_hull(self.mesh.vertices), np.ascontiguousarray(rotations)
+        corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm])
+        bounds = np.zeros((len(rotations), 2))
+        in_threads(_measure_hull, len(rotations), corners, hull.faces, rotations, above_mm, bounds)
+        return bounds[:, 0] / np.array([self._shadow_mm2(rotation[2]) for rotation in rotations]), bounds[:, 1]
 
     def _section(self, rotation: Floats, heights: Floats, z_mm: float) -> CrossSection:
         """The section of the turned model at a height; heights: (n,) of its vertices."""
         points, starts = _section_loops(self.mesh.vertices, self.mesh.faces, self.across, rotation, heights, z_mm)
         return CrossSection(np.split(points, starts[1:-1]), FillRule.Positive) if len(points) else CrossSection()
 
-    def _shadow_mm2(self, rotation: Floats) -> float:
-        """The area of the model's shadow, overlapping surfaces each counted."""
-        return 0.5 * float((np.abs(dot(self.mesh.normals, rotation[2])) * self.mesh.areas_mm2).sum())
+    def _shadow_mm2(self, direction: Floats) -> float:
+        """The area of the model's shadow along a direction, overlapping surfaces each counted."""
+        return 0.5 * float((np.abs(dot(self.mesh.normals, direction)) * self.mesh.areas_mm2).sum())
 
 
 @kernel
@@ -166,6 +179,47 @@ def _section_loops(
         loops += 1
         starts[loops] = n
     return points, starts[: loops + 1]
+
+
+@kernel
+def _measure_hull(begin: int, end: int, corners: Floats, faces: Ints, rotations: Floats, above_mm: Floats, out: Floats) -> None:
+    """The area of a turned hull's section at the first of two heights above its lowest corner, no higher than its middle, and the
+    angle by which it can be leaned before the origin is over the edge of the section at either."""
+    turned, ends, reach = table(len(corners), 3), table(2, 2), floats(SIDES.shape[1], 0.0)
+    for k in range(begin, end):
+        lowest, highest = np.inf, -np.inf
+        for v in range(len(corners)):
+            for axis in range(3):
+                turned[v, axis] = 0.0
+                for j in range(3):
+                    turned[v, axis] += rotations[k, axis, j] * corners[v, j]
+            lowest, highest = min(lowest, turned[v, 2]), max(highest, turned[v, 2])
+        out[k, 1] = -90.0
+        for i in range(len(above_mm)):
+            level, area_mm2 = lowest + min(above_mm[i], 0.5 * (highest - lowest)), 0.0
+            for side in range(len(reach)):
+                reach[side] = -np.inf
+            for face in range(len(faces)):
+                crossed = False
+                for corner in range(3):
+                    start, stop = faces[face, corner], faces[face, (corner + 1) % 3]
+                    upward = turned[start, 2] < level
+                    if upward == (turned[stop, 2] < level):
+                        continue
+                    crossed, row = True, 1 if upward else 0
+                    share = (level - turned[start, 2]) / (turned[stop, 2] - turned[start, 2])
+                    for axis in range(2):
+                        ends[row, axis] = turned[start, axis] + share * (turned[stop, axis] - turned[start, axis])
+                    for side in range(len(reach)):
+                        reach[side] = max(reach[side], ends[row, 0] * SIDES[0, side] + ends[row, 1] * SIDES[1, side])
+                if crossed:  # the triangle between the section's edge in this face and the origin
+                    area_mm2 += 0.5 * (ends[0, 0] * ends[1, 1] - ends[0, 1] * ends[1, 0])
+            if i == 0:
+                out[k, 0] = area_mm2
+            least_mm = np.inf
+            for side in range(len(reach)):
+                least_mm = min(least_mm, reach[side])
+            out[k, 1] = max(out[k, 1], np.degrees(np.arctan2(least_mm, -lowest)))
 
 
 def tips_over(base: CrossSection, height_mm: float) -> bool:

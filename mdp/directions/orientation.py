@@ -10,16 +10,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import update_wrapper
 from math import atan2, cos, degrees, hypot, pi, radians, sin
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, NamedTuple, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from mdp.cut import convex_hull
 from mdp.directions.spread import spread
-from mdp.mesh import Floats, Mesh, dot
+from mdp.kernels.arrays import floats
+from mdp.kernels.kernel import kernel
+from mdp.kernels.threads import in_threads
+from mdp.mesh import Floats, Ints, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
-from mdp.stairs import step_shares
+from mdp.stairs import step_share
 
 LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips over
 SAME_FACET_DEG = 0.5
@@ -132,25 +135,47 @@ def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
 
 def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
     """(k,) risky areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
-    facing_down, standing = _areas_down(mesh, directions, angle_deg)
-    return np.maximum(facing_down - standing, 0.0)
+    return _face_areas(mesh, directions, angle_deg)[:, RISKY]
 
 
-def _areas_down(mesh: Mesh, directions: Floats, angle_deg: float) -> tuple[Floats, Floats]:
-    """(k,) areas, mm2, that face down too far to carry themselves, and of them (k,) those that stand on the plate."""
-    facing_down, standing = np.zeros(len(directions)), np.zeros(len(directions))
-    limit, areas = threshold(angle_deg), mesh.areas_mm2
-    normals, points = np.ascontiguousarray(mesh.normals.T), np.ascontiguousarray(mesh.vertices.T)
-    order = np.argsort(mesh.faces[:, 0], kind="stable")
-    starts = np.searchsorted(mesh.faces[order, 0], np.arange(len(mesh.vertices) + 1))
-    for k, direction in enumerate(directions):
-        down, heights = np.less(dot(normals.T, direction), limit), dot(points.T, direction)
-        low = np.less_equal(heights, heights.min() + PLATFORM_TOLERANCE_MM)
-        # Few faces stand: they are found from the few vertices that are low.
-        faces = np.concatenate([order[starts[v] : starts[v + 1]] for v in np.flatnonzero(low)])
-        stands = faces[low[mesh.faces[faces]].all(axis=1) & down[faces]]
-        facing_down[k], standing[k] = areas[down].sum(), areas[stands].sum()
-    return facing_down, standing
+class _Faces(NamedTuple):
+    """A mesh for a kernel: (n, 3) vertices, (m, 3) corners, (m, 3) normals, and (m,) areas of its faces."""
+
+    vertices: Floats
+    corners: Ints
+    normals: Floats
+    areas_mm2: Floats
+
+
+RISKY, STAIRS = range(2)
+
+
+def _face_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
+    """(k, 2) areas, mm2, of the model printed along (k, 3) unit directions: the faces that overhang too far and do not stand on
+    the plate, and all faces, each times the height of its steps as a share of a layer's."""
+    areas_mm2 = np.zeros((len(directions), 2))
+    faces = _Faces(mesh.vertices, mesh.faces, mesh.normals, mesh.areas_mm2)
+    in_threads(_sum_faces, len(directions), faces, np.ascontiguousarray(directions), threshold(angle_deg), areas_mm2)
+    return areas_mm2
+
+
+@kernel
+def _sum_faces(begin: int, end: int, faces: _Faces, directions: Floats, limit: float, areas_mm2: Floats) -> None:
+    heights = floats(len(faces.vertices), 0.0)
+    for k in range(begin, end):
+        x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
+        lowest = np.inf
+        for v in range(len(heights)):
+            heights[v] = faces.vertices[v, 0] * x + faces.vertices[v, 1] * y + faces.vertices[v, 2] * z
+            lowest = min(lowest, heights[v])
+        level = lowest + PLATFORM_TOLERANCE_MM
+        for face in range(len(faces.normals)):
+            cosine = faces.normals[face, 0] * x + faces.normals[face, 1] * y + faces.normals[face, 2] * z
+            areas_mm2[k, STAIRS] += step_share(cosine) * faces.areas_mm2[face]
+            if cosine < limit:
+                a, b, c = faces.corners[face, 0], faces.corners[face, 1], faces.corners[face, 2]
+                if heights[a] > level or heights[b] > level or heights[c] > level:
+                    areas_mm2[k, RISKY] += faces.areas_mm2[face]
 
 
 @cached_with_mesh
@@ -182,15 +207,15 @@ def _principal_axes(mesh: Mesh) -> Floats:
 
 
 def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
-    facing_down, standing = _areas_down(mesh, directions, angle_deg)
+    areas_mm2 = _face_areas(mesh, directions, angle_deg)
     lean_deg, corners = _lean_deg(mesh, directions), convex_hull(mesh.vertices).vertices
     return [
         Orientation(
             rotation=_rotation(direction),
-            risky_mm2=max(float(facing_down[k] - standing[k]), 0.0),
+            risky_mm2=float(areas_mm2[k, RISKY]),
             lean_deg=float(lean_deg[k]),
             height_mm=float(np.ptp(dot(corners, direction))),
-            stairs_mm2=float(step_shares(dot(mesh.normals, direction)) @ mesh.areas_mm2),
+            stairs_mm2=float(areas_mm2[k, STAIRS]),
         )
         for k, direction in enumerate(directions)
     ]

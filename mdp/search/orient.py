@@ -7,12 +7,16 @@ would leave of the model as it stands, only that orientation is searched. Otherw
 another orientation if a narrow search promises more.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+from itertools import chain
 from math import ceil, cos, inf, radians
 
+import numpy as np
+
 from mdp.cost.cost import weight_of_stairs
-from mdp.cost.footing import Footing, Plate
+from mdp.cost.footing import SMALL_BASE, Footing, Plate
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import (
     Orientation,
@@ -23,7 +27,7 @@ from mdp.directions.orientation import (
 from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Mesh
-from mdp.overhang import UP
+from mdp.overhang import ROUNDING, UP
 from mdp.search.coarse import as_it_is, coarse_copy
 from mdp.search.front import EQUAL, Price, Pricing, Worth, charge_mm2, front_row, price_row
 from mdp.search.parts import one_piece
@@ -127,7 +131,7 @@ class OrientationForecast:
 def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[OrientationForecast]:
     """A model as it stands, then in the first other orientations; infinite where it cannot be printed so."""
     worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
-    footed = _with_footing(mesh, profile)[: 1 + FORECAST]
+    footed = _with_footing(mesh, profile, most=FORECAST)
     upright = footed[0][0]
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
     prices = parallel_map(lambda k: _price_bare(meshes[k], profile, pricing), len(meshes))
@@ -196,27 +200,69 @@ def distinct_orientations(mesh: Mesh, profile: Profile, *, for_person: bool = Fa
     return [orientation for orientation, _ in _with_footing(mesh, profile, for_person)[1:]]
 
 
-def _with_footing(mesh: Mesh, profile: Profile, for_person: bool = False) -> list[tuple[Orientation, Footing]]:
-    """The model as it stands, then those orientations, each with its footing."""
+def _with_footing(
+    mesh: Mesh, profile: Profile, for_person: bool = False, most: int = RANKED
+) -> list[tuple[Orientation, Footing]]:
+    """The model as it stands, then up to `most` of those orientations, each with its footing."""
     angle_deg, guess_mm2 = profile.process.self_supporting_angle_deg, _guess(profile)
     upright, *others = *facet_orientations(mesh, angle_deg), *straight_orientations(mesh, angle_deg)
     worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
-    plate, surface_mm2 = Plate.under(mesh, profile), float(mesh.areas_mm2.sum())
+    plate = Plate.under(mesh, profile)
     standing = plate.footing(upright.rotation)
     held = standing.held(of_file=True)
     keep = held and not for_person
-    known = [upright] if held else []  # else nothing is too near to it
-    footed = [(other, plate.footing(other.rotation)) for other in _along_axis(mesh, others, keep)]
     on_face = keep and standing.on_face
-    footed = [one for one in footed if one[1].held() and not (on_face and one[1].on_tip)] or ([] if held else footed)
-    footed.sort(key=lambda one: round(guess_mm2(one[0]) + surface_mm2 * footing_share(one[1]), 6))
+    others = _along_axis(mesh, others, keep)
+    able = _that_may_hold(others, plate, on_face)
+    ranked = _cheapest_first(able, plate, guess_mm2)
+    firm = (one for one in ranked if one[1].held() and not (on_face and one[1].on_tip))
+    first = next(firm, None)
+    if first is not None:
+        ranked = chain([first], firm)
+    elif not held:
+        ranked = _cheapest_first(others, plate, guess_mm2)
+    known = [upright] if held else []  # else nothing is too near to it
     distinct: list[tuple[Orientation, Footing]] = []
-    for orientation, footing in footed:
+    for orientation, footing in ranked:
         near = any(float(orientation.rotation[2] @ other.rotation[2]) > NEAR for other in known)
         if not near and not any(_alike(orientation, other, worst_mm2) for other in known):
             known.append(orientation)
             distinct.append((orientation, footing))
-    return [(upright, standing), *distinct[:RANKED]]
+        if len(distinct) == most:
+            break
+    return [(upright, standing), *distinct]
+
+
+def _that_may_hold(orientations: list[Orientation], plate: Plate, on_face: bool) -> list[Orientation]:
+    """Those in which, as far as the model's hull tells, the plate may hold it. on_face: not on a tip."""
+    if not orientations:
+        return []
+    touching_shares, lean_deg = plate.stance_bounds(np.array([orientation.rotation for orientation in orientations]))
+    able = lean_deg > -ROUNDING
+    if on_face:
+        able &= touching_shares > (1.0 - ROUNDING) * SMALL_BASE
+    return [orientations[k] for k in np.flatnonzero(able)]
+
+
+def _cheapest_first(
+    orientations: Sequence[Orientation], plate: Plate, guess_mm2: Callable[[Orientation], float]
+) -> Iterator[tuple[Orientation, Footing]]:
+    """Orientations by the sum of their guessed cost and their footing's, equal sums in the order given.
+
+    A footing takes a hundred times as long as a guess and never lowers the sum, so only those are measured whose guess is not
+    above the sums that are asked for.
+    """
+    surface_mm2, guesses_mm2 = float(plate.mesh.areas_mm2.sum()), [guess_mm2(orientation) for orientation in orientations]
+    measured: list[tuple[float, int, Footing]] = []
+    for k in sorted(range(len(orientations)), key=lambda k: guesses_mm2[k]):
+        while measured and measured[0][0] < round(guesses_mm2[k], 6):
+            _, first, footing = heappop(measured)
+            yield orientations[first], footing
+        footing = plate.footing(orientations[k].rotation)
+        heappush(measured, (round(guesses_mm2[k] + surface_mm2 * footing_share(footing), 6), k, footing))
+    while measured:
+        _, first, footing = heappop(measured)
+        yield orientations[first], footing
 
 
 def _along_axis(mesh: Mesh, others: list[Orientation], keep: bool) -> list[Orientation]:
