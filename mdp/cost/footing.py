@@ -120,11 +120,11 @@ class Plate:
         tensions = [_tension_mpa(section_edges(area), high - low, self.weight_n, centre[:2]) for area in (base, brim)]
         corners = section_edges(base)[:, :2] - centre[:2]
         lean_deg = tipping_angle_deg(corners, float(centre[2]) - low) if len(corners) else -90.0
-        shadow_mm2 = self._shadow_mm2(rotation[2])
+        shadow_mm2 = self._shadow_mm2(rotation)
         return Footing(base.area() / shadow_mm2, touching.area() / shadow_mm2, lean_deg, *tensions)
 
     def stance_bounds(self, rotations: Floats) -> tuple[Floats, Floats]:
-        """(k,) upper bounds of the touching share and (k,) of the lean, degrees, of the model turned by (k, 3, 3) rotations.
+        """(k,) upper bounds of the touching area, mm2, and (k,) of the lean, degrees, of the model turned by (k, 3, 3) rotations.
 
         The base lies within the hull's sections at the same heights, and these take a tenth of the time.
         """
@@ -132,16 +132,16 @@ class Plate:
         corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm])
         bounds = np.zeros((len(rotations), 2))
         in_threads(_measure_hull, len(rotations), corners, hull.faces, rotations, above_mm, bounds)
-        return bounds[:, 0] / np.array([self._shadow_mm2(rotation[2]) for rotation in rotations]), bounds[:, 1]
+        return bounds[:, 0], bounds[:, 1]
 
     def _section(self, rotation: Floats, heights: Floats, z_mm: float) -> CrossSection:
         """The section of the turned model at a height; heights: (n,) of its vertices."""
         points, starts = _section_loops(self.mesh.vertices, self.mesh.faces, self.across, rotation, heights, z_mm)
         return CrossSection(np.split(points, starts[1:-1]), FillRule.Positive) if len(points) else CrossSection()
 
-    def _shadow_mm2(self, direction: Floats) -> float:
-        """The area of the model's shadow along a direction, overlapping surfaces each counted."""
-        return 0.5 * float((np.abs(dot(self.mesh.normals, direction)) * self.mesh.areas_mm2).sum())
+    def _shadow_mm2(self, rotation: Floats) -> float:
+        """The area of the model's shadow, overlapping surfaces each counted."""
+        return 0.5 * float((np.abs(dot(self.mesh.normals, rotation[2])) * self.mesh.areas_mm2).sum())
 
 
 @kernel

@@ -38,13 +38,15 @@ SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 3
 @dataclass(frozen=True, eq=False)
 class Orientation:
     """A model turned as a whole: rotation (3, 3), what is risky then, by what angle it may be tilted before it tips over, below 0
-    where it tips over by itself, how high it stands, and the area of its stairs: each face times the height of its steps."""
+    where it tips over by itself, how high it stands, the area of its stairs: each face times the height of its steps, and of its
+    shadow, overlapping surfaces each counted."""
 
     rotation: Floats
     risky_mm2: float
     lean_deg: float
     height_mm: float
     stairs_mm2: float
+    shadow_mm2: float
 
     @property
     def stable(self) -> bool:
@@ -147,13 +149,13 @@ class _Faces(NamedTuple):
     areas_mm2: Floats
 
 
-RISKY, STAIRS = range(2)
+RISKY, STAIRS, SHADOW = range(3)
 
 
 def _face_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
-    """(k, 2) areas, mm2, of the model printed along (k, 3) unit directions: the faces that overhang too far and do not stand on
-    the plate, and all faces, each times the height of its steps as a share of a layer's."""
-    areas_mm2 = np.zeros((len(directions), 2))
+    """(k, 3) areas, mm2, of the model printed along (k, 3) unit directions: the faces that overhang too far and do not stand on
+    the plate; all faces, each times the height of its steps as a share of a layer's; and their shadow."""
+    areas_mm2 = np.zeros((len(directions), 3))
     faces = _Faces(mesh.vertices, mesh.faces, mesh.normals, mesh.areas_mm2)
     in_threads(_sum_faces, len(directions), faces, np.ascontiguousarray(directions), threshold(angle_deg), areas_mm2)
     return areas_mm2
@@ -172,6 +174,7 @@ def _sum_faces(begin: int, end: int, faces: _Faces, directions: Floats, limit: f
         for face in range(len(faces.normals)):
             cosine = faces.normals[face, 0] * x + faces.normals[face, 1] * y + faces.normals[face, 2] * z
             areas_mm2[k, STAIRS] += step_share(cosine) * faces.areas_mm2[face]
+            areas_mm2[k, SHADOW] += 0.5 * abs(cosine) * faces.areas_mm2[face]
             if cosine < limit:
                 a, b, c = faces.corners[face, 0], faces.corners[face, 1], faces.corners[face, 2]
                 if heights[a] > level or heights[b] > level or heights[c] > level:
@@ -216,6 +219,7 @@ def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientati
             lean_deg=float(lean_deg[k]),
             height_mm=float(np.ptp(dot(corners, direction))),
             stairs_mm2=float(areas_mm2[k, STAIRS]),
+            shadow_mm2=float(areas_mm2[k, SHADOW]),
         )
         for k, direction in enumerate(directions)
     ]

@@ -127,8 +127,8 @@ class ScoredCandidates:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
     not known yet. direction is a row of Bounds.directions; above_mm2: what is risky above the plane printed straight up;
     residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; hopeless_mm2: what of the first two no cut
-    can save, 0 where that was not asked for; end_mm: offset of the last plane along the direction; evaluated counts all planes
-    looked at."""
+    can save, 0 where that was not asked for. first, columns: (k,) the first plane along each direction, in steps of step_mm, and
+    the number of all planes along it."""
 
     remainder: Remainder
     direction: Ints
@@ -140,8 +140,20 @@ class ScoredCandidates:
     stairs_mm2: Floats
     seam_mm2: Floats
     hopeless_mm2: Floats
-    end_mm: Floats
-    evaluated: int
+    first: Ints
+    columns: Ints
+    step_mm: float
+
+    @property
+    def end_mm(self) -> Floats:
+        """Offset of the last plane along the direction of each candidate."""
+        end_mm: Floats = ((self.first + self.columns - 1) * np.float64(self.step_mm))[self.direction]
+        return end_mm
+
+    @property
+    def evaluated(self) -> int:
+        """The number of all planes, scored or not."""
+        return int(self.columns.sum())
 
     def cost(self, row: int) -> CutCost:
         """What the cut of a row costs."""
@@ -178,7 +190,6 @@ def score_candidates(
     for low, high in np.moveaxis(limits.keep_mm, 0, 2):
         scored &= (offset <= low[:, None]) | (offset >= high[:, None])
     direction = np.nonzero(scored)[0].astype(np.int32)
-    end: Floats = ((swept.first + swept.columns - 1) * np.float64(step_mm))[direction]
     return ScoredCandidates(
         remainder=remainder,
         direction=direction,
@@ -190,8 +201,9 @@ def score_candidates(
         stairs_mm2=swept.stairs_mm2[scored],
         seam_mm2=seam_mm2(swept, terms)[scored],
         hopeless_mm2=swept.hopeless_mm2[scored],
-        end_mm=end,
-        evaluated=int(swept.columns.sum()),
+        first=swept.first,
+        columns=swept.columns,
+        step_mm=step_mm,
     )
 
 
@@ -239,22 +251,19 @@ def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints,
 
 
 def refusals(
-    remainder: Remainder,
-    limits: Bounds,
-    search: Search,
-    terms: CostTerms,
-    *,
-    least_gain_mm2: float,
-    is_weak: Callable[[Plane], bool],
+    scored: ScoredCandidates, limits: Bounds, search: Search, *, least_gain_mm2: float, is_weak: Callable[[Plane], bool]
 ) -> dict[Reason, int]:
-    """How many of all candidates of a solid each reason takes, to report why nothing can be cut; is_weak: asked for those that
-    nothing else forbids."""
-    swept = gains(remainder, limits.directions, search.offset_step_mm, threshold(terms.angle_deg))
-    direction, offset = np.nonzero(swept.used)[0], swept.offsets_mm(search.offset_step_mm)[swept.used]
-    reason = check(remainder, limits, search, direction.astype(np.int32), offset).reason
-    gain = gain_mm2(swept, residual_mm2(swept, terms))[swept.used]
-    reason[(reason == Reason.FEASIBLE) & (gain < least_gain_mm2)] = Reason.GAIN
+    """How many of all planes of a solid each reason takes, to report why nothing can be cut. scored: at least those of its
+    candidates that gain least_gain_mm2; is_weak: asked for those that nothing else forbids."""
+    direction = np.repeat(np.arange(len(scored.columns), dtype=np.int32), scored.columns)
+    begins = np.concatenate([[0], np.cumsum(scored.columns)])
+    offset_mm = (np.arange(begins[-1]) + np.repeat(scored.first - begins[:-1], scored.columns)) * np.float64(scored.step_mm)
+    reason = check(scored.remainder, limits, search, direction, offset_mm).reason
+    gains_enough = np.zeros(len(reason), np.bool_)
+    column = np.rint(scored.offset_mm / scored.step_mm).astype(np.int64) - scored.first[scored.direction]
+    gains_enough[begins[scored.direction] + column] = scored.gain_mm2 >= least_gain_mm2
+    reason[(reason == Reason.FEASIBLE) & ~gains_enough] = Reason.GAIN
     for row in np.flatnonzero(reason == Reason.FEASIBLE):
-        if is_weak(Plane(limits.directions[direction[row]], float(offset[row]))):
+        if is_weak(Plane(limits.directions[direction[row]], float(offset_mm[row]))):
             reason[row] = Reason.WEAK
     return {why: int((reason == why).sum()) for why in Reason}

@@ -237,10 +237,11 @@ def _that_may_hold(orientations: list[Orientation], plate: Plate, on_face: bool)
     """Those in which, as far as the model's hull tells, the plate may hold it. on_face: not on a tip."""
     if not orientations:
         return []
-    touching_shares, lean_deg = plate.stance_bounds(np.array([orientation.rotation for orientation in orientations]))
+    touching_mm2, lean_deg = plate.stance_bounds(np.array([orientation.rotation for orientation in orientations]))
     able = lean_deg > -ROUNDING
     if on_face:
-        able &= touching_shares > (1.0 - ROUNDING) * SMALL_BASE
+        shadows_mm2 = np.array([orientation.shadow_mm2 for orientation in orientations])
+        able &= touching_mm2 > (1.0 - ROUNDING) * SMALL_BASE * shadows_mm2
     return [orientations[k] for k in np.flatnonzero(able)]
 
 

@@ -24,6 +24,7 @@ from mdp.ranking.candidates import (
     Bounds,
     Feasibility,
     Reason,
+    ScoredCandidates,
     bounds_of,
     check,
     directions,
@@ -99,6 +100,7 @@ class Problem:
         self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
         self._evaluated: list[int] = []  # appended to by several threads
         self._stopped = False
+        self._root_scored: ScoredCandidates | None = None
         self.begin()
 
     @cached_property
@@ -163,6 +165,8 @@ class Problem:
         remainder, step_mm = node.remainder, self.settings.offset_step_mm
         scored = score_candidates(remainder, limits, self.terms, step_mm=step_mm, least_gain_mm2=least_mm2, hopeless=hopeless)
         self._evaluated.append(scored.evaluated)
+        if node is self.root and limits is self.limits:
+            self._root_scored = scored
 
         def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
             return check(remainder, limits, self.settings, direction, offset_mm)
@@ -198,9 +202,8 @@ class Problem:
 
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
-        root, is_weak = self.root, partial(self.is_weak, self.root)
-        least_mm2 = self.least_gain_mm2
-        return refusals(root.remainder, self.limits, self.settings, self.terms, least_gain_mm2=least_mm2, is_weak=is_weak)
+        scored, is_weak = self._root_scored or self.table(self.root).scored, partial(self.is_weak, self.root)
+        return refusals(scored, self.limits, self.settings, least_gain_mm2=self.least_gain_mm2, is_weak=is_weak)
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""

@@ -70,13 +70,13 @@ def test_every_candidate_is_counted_under_one_reason_and_what_gains_too_little_i
     mesh = tee()
     limits, remainder = limits_for(mesh, 60), Remainder(mesh, risky_upright(mesh, 45.0))
     scored = score_candidates(remainder, limits, TERMS, step_mm=2.0, least_gain_mm2=50.0)
-    counts = refusals(remainder, limits, SEARCH, TERMS, least_gain_mm2=50.0, is_weak=lambda _: False)
+    counts = refusals(scored, limits, SEARCH, least_gain_mm2=50.0, is_weak=lambda _: False)
     assert sum(counts.values()) == scored.evaluated
     assert set(counts) == {Reason.FEASIBLE, *REASONS}
     assert (scored.gain_mm2 >= 50.0).all()
     feasible = check(remainder, limits, SEARCH, scored.direction, scored.offset_mm).reason == Reason.FEASIBLE
     assert counts[Reason.FEASIBLE] == feasible.sum() > 0
-    weak = refusals(remainder, limits, SEARCH, TERMS, least_gain_mm2=50.0, is_weak=lambda _: True)
+    weak = refusals(scored, limits, SEARCH, least_gain_mm2=50.0, is_weak=lambda _: True)
     assert (weak[Reason.FEASIBLE], weak[Reason.WEAK]) == (0, counts[Reason.FEASIBLE])
 
 

@@ -88,8 +88,10 @@ def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
 
     n = len(own.gain)
     costs = {"gain_mm2": own.gain, "residual_mm2": own.residual, "lost_mm2": own.lost}
-    unused = dict.fromkeys(("above_mm2", "stairs_mm2", "seam_mm2", "hopeless_mm2", "end_mm"), np.zeros(n))
-    scored = ScoredCandidates(None, own.direction, own.offset, **costs, **unused, evaluated=n)  # type: ignore[arg-type]
+    unused = dict.fromkeys(("above_mm2", "stairs_mm2", "seam_mm2", "hopeless_mm2"), np.zeros(n))
+    scored = ScoredCandidates(
+        None, own.direction, own.offset, **costs, **unused, first=own.direction, columns=own.direction, step_mm=1.0
+    )  # type: ignore[arg-type]
     limits = Bounds(DIRECTIONS, np.zeros(40), np.zeros(40), 0.0, 0.0, np.zeros((40, 0, 2)), 0.0)
     situation = Situation(Model(RISKY_MM2, 1.0, 1.0), own.saved, own.left, own.lost_before, 0.0, 0.0, 1.0, 0, DIRECTIONS[0])
     return CandidateTable(scored, limits, situation, check=check, least_gain_mm2=least_gain_mm2, is_weak=is_weak)
