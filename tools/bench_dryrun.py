@@ -25,7 +25,6 @@ from machine.dryrun import clearance, dry_run, extrusion, heat, layering, motion
 from machine.dryrun.replay import replay
 from machine.dryrun.strokes import beads_of
 from machine.gcode.writer import write_gcode
-from machine.kinematics.table import workpiece_path
 from machine.planning.plan import plan
 from machine.reader.gcode_file import GcodeFile
 from machine.reader.parse import parse_gcode
@@ -77,20 +76,18 @@ def stages(file: Path, profile: Profile) -> None:
     print(f"{file.name}: {len(lines)} lines on {machine.name}\n")
     print("| stage | processor s | wall s |\n|---|---|---|")
     program = timed("parse", lambda: parse_gcode(lines, machine))
-    rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
-    ends = timed("kinematics", lambda: [workpiece_path(machine, side[rows]) for side in (program.start, program.end)])
-    segments = np.stack(ends, axis=1)
+    deposited = beads_of(program, np.flatnonzero(program.kind == MoveKind.EXTRUDE), profile)
+    timed("kinematics", deposited.segments)
     timed("timeline", lambda: motion.times_s(program, machine))
-    deposited = beads_of(program, segments, rows, profile)
     contacts = timed("plastic under every move", lambda: replay(program, deposited, profile))
-    timed("head against table and cradle", lambda: clearance.findings(program, segments, rows, machine))
+    timed("head against table and cradle", lambda: clearance.findings(program, deposited, machine))
     timed(
         "other findings",
         lambda: [
             *placement.findings(program, deposited, contacts), *sequence.findings(program, profile),
             *layering.findings(program, deposited, contacts), *extrusion.findings(program, deposited, profile),
             *own_comments.findings(lines, program, profile), *motion.findings(program, machine),
-            *placement.off_plate(program, segments, rows, profile), *heat.findings(program, profile, True),
+            *placement.off_plate(program, deposited, profile), *heat.findings(program, profile, True),
         ],
     )  # fmt: skip
 

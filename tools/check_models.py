@@ -20,6 +20,7 @@ from machine.app.requests import ModelRequest
 from machine.dryrun.conformity.agreement import agreement
 from machine.link.stream import print_lines
 from machine.program import Program
+from machine.simulator.planner import EXTRUDES_MM
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.decomposition import Decomposition
 from profiles.errors import UserError
@@ -88,12 +89,15 @@ def figures(decomposition: Decomposition, program: Program, profile: Profile) ->
 
 
 def streamed(program: Program, profile: Profile) -> Program:
-    """The program with the segments that the simulated printer recorded."""
+    """The program with its beads where the simulated printer recorded them."""
     with SimulatedPrinter(profile.machine) as printer:
         print_lines(program.lines, printer.path)
         record = printer.record
-    segments, _ = record.deposited(profile.material.diameter_mm)
-    return replace(program, run=replace(program.run, segments_mm=segments))
+    strokes = (record.end[:, 5] - record.start[:, 5] > EXTRUDES_MM) & (record.start[:, :5] != record.end[:, :5]).any(axis=1)
+    beads, start, end = program.run.deposited, program.run.program.start.copy(), program.run.program.end.copy()
+    start[beads.rows], end[beads.rows] = record.start[strokes, :5], record.end[strokes, :5]
+    laid = replace(beads, program=replace(beads.program, start=start, end=end))
+    return replace(program, run=replace(program.run, deposited=laid))
 
 
 if __name__ == "__main__":

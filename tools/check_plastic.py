@@ -19,7 +19,6 @@ from machine.app.pictures.png import write_png
 from machine.dryrun.balance.interfaces import LEAST, MOST, Interface, interfaces, wall_edges
 from machine.dryrun.balance.layers import layer_balances
 from machine.dryrun.dryrun import dry_run
-from machine.dryrun.strokes import beads_of
 from profiles.profile import load
 
 HEAD = (
@@ -76,9 +75,8 @@ def main() -> None:
         lines = tuple(file.read_text().split("\n"))
         profile, _ = read_embedded_profile(lines, load(), frozenset())
         run = dry_run(lines, profile, known=())
-        deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
         if given.layers:
-            for part in layer_balances(run.program, deposited, profile):
+            for part in layer_balances(run.program, run.deposited, profile):
                 worst = max(part.layers, key=lambda layer: abs(layer.over_room - 1.0))
                 cells = [
                     file.stem, part.part, len(part.layers), f"{100 * part.over_room:.0f}", f"{100 * part.over:.1f}",
@@ -86,7 +84,7 @@ def main() -> None:
                 ]  # fmt: skip
                 print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
             continue
-        for face in interfaces(run.program, deposited, profile):
+        for face in interfaces(run.program, run.deposited, profile):
             print(row(file.stem, face), flush=True)
             if given.maps is not None:
                 given.maps.mkdir(parents=True, exist_ok=True)

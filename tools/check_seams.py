@@ -28,7 +28,6 @@ from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.pricing import pricing
 from machine.dryrun.balance.interfaces import AT_THE_EDGE, NO_PART, interfaces, wall_edges
 from machine.dryrun.dryrun import DryRun, dry_run
-from machine.dryrun.strokes import beads_of
 from machine.kinematics.table import shift, workpiece_points
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats, Indices
@@ -285,8 +284,7 @@ def played(model: str, settings: list[str]) -> tuple[DryRun, Profile]:
 
 def rows(model: str, run: DryRun, profile: Profile) -> Iterator[str]:
     """The lines of a model's joints, and where each mark is."""
-    deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
-    edges = {face.part: wall_edges(face)[1] for face in interfaces(run.program, deposited, profile)}
+    edges = {face.part: wall_edges(face)[1] for face in interfaces(run.program, run.deposited, profile)}
     for joint, outlines in joints(run.program, profile.machine):
         left = [mark for outline in outlines for mark in marks(run.program, outline)]
         cells = [Path(model.removeprefix("demo:")).stem, str(joint.part), f"{joint.rim.length:.0f}"]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.findings import MOST, Finding, at_row, cut_short
+from machine.dryrun.strokes import Beads
 from machine.kinematics.collision import Printed, Reach, gaps_of, hull, refined_gap, solids, sweep_gaps, swept, swing_mm
 from machine.planning.limits import axis_limits
 from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pieces, pose_runs
@@ -26,11 +27,11 @@ MOST_TURNS = 2000
 Solid = tuple[str, Reach]
 
 
-def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
-    """Collisions of straight moves and turns; deposited: (m, 2, 3) workpiece segments laid by the rows deposited_row."""
+def findings(program: ParsedProgram, deposited: Beads, machine: Machine) -> list[Finding]:
+    """Collisions of straight moves and turns."""
     if not len(program.line):
         return []
-    return [*_straight(program, machine), *_turns(program, deposited, deposited_row, machine)]
+    return [*_straight(program, machine), *_turns(program, deposited, machine)]
 
 
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
@@ -102,15 +103,16 @@ def _body(program: ParsedProgram, run: PoseRun, body: Body, solid: Solid, machin
     return [at_row(program, row, "error", "collision", message)]
 
 
-def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
+def _turns(program: ParsedProgram, deposited: Beads, machine: Machine) -> list[Finding]:
     """Every turn of the table; of a program that turns all the time (curved layers) an even choice, which is said.
 
     What is printed is taken as one convex body. A purge line at the plate's edge would make that far too large; lower than the
     distance that is kept from the plate, it is part of that.
     """
     problems = []
-    purge, counted = program.rows_of_types(Kind.PURGE.value)[deposited_row], np.ones(len(deposited_row), dtype=np.bool_)
-    counted[purge] = deposited[purge, :, 2].max(axis=1, initial=0.0) > machine.clearance_mm
+    purge = np.flatnonzero(program.rows_of_types(Kind.PURGE.value)[deposited.rows])
+    counted = np.ones(len(deposited.rows), dtype=np.bool_)
+    counted[purge] = deposited.segments(purge)[:, :, 2].max(axis=1, initial=0.0) > machine.clearance_mm
     printed, done = hull(np.zeros((0, 3)), 0.0), 0
     rows = np.flatnonzero(program.kind == MoveKind.ROTATE)
     if len(rows) > MOST_TURNS:
@@ -120,11 +122,11 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
     for row in rows:
         if len(problems) >= MOST:
             return [*problems, cut_short(program, int(row), "turns")]
-        before = int(np.searchsorted(deposited_row, row))
+        before = int(np.searchsorted(deposited.rows, row))
         for some in pieces(before - done):
             new = np.arange(done, before)[some][counted[done:before][some]]
-            bead = 0.5 * float(program.remarks.width_mm[program.remark[deposited_row[new]]].max(initial=0.0))
-            points = [printed.points_mm, *_ends(deposited[new])]
+            bead = 0.5 * float(program.remarks.width_mm[program.remark[deposited.rows[new]]].max(initial=0.0))
+            points = [printed.points_mm, *_ends(deposited.segments(new))]
             printed = hull(np.vstack(points), max(bead, printed.bead_mm))
         done = before
         problems += _turn(program, int(row), printed, machine)

@@ -15,14 +15,12 @@ from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
 from machine.gcode.lines import Lines
-from machine.kinematics.table import workpiece_path
 from machine.planning.limits import axis_limits
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.kernels.threads import ahead
 from mdp.mesh import Floats
 from profiles.errors import GcodeError
-from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -35,20 +33,18 @@ class DryRun:
 
     times_s: (n,) seconds of each row of program; waits: line and seconds of what G4 tells and of heating in the midst of the
     print (what comes before it, and homing, are not counted).
-    segments_mm: (m, 2, 3) deposited segments, workpiece frame; segment_row: (m,) their rows in program, which hold line,
-    part, layer, type, width and height; segment_mm3: (m,) their volumes. contacts: what lay under each row; None where
-    it was known before what there is to find. interfaces: where parts stand on others; none where contacts are not known.
+    deposited: its plastic. contacts: what lay under each row; None where it was known before what there is to find. interfaces:
+    where parts stand on others; none where contacts are not known.
     """
 
     program: ParsedProgram
     times_s: Floats
     waits: tuple[tuple[int, float], ...]
-    segments_mm: Floats
-    segment_row: NDArray[np.int64]
-    segment_mm3: Floats
+    deposited: Beads
     contacts: Contacts | None
     findings: tuple[Finding, ...]
     letters: tuple[str, ...]
+    filament_mm2: float
     interfaces: tuple[InterfaceBalance, ...] = ()
 
     @property
@@ -60,6 +56,21 @@ class DryRun:
     def time_s(self) -> float:
         """Seconds of all moves and dwells."""
         return float(self.times_s.sum()) + self.dwell_s
+
+    @property
+    def segments_mm(self) -> Floats:
+        """(m, 2, 3) deposited segments, workpiece frame, worked out anew."""
+        return self.deposited.segments()
+
+    @property
+    def segment_row(self) -> NDArray[np.int64]:
+        """(m,) the rows of the segments in program, which hold line, part, layer and type."""
+        return self.deposited.rows
+
+    @property
+    def segment_mm3(self) -> Floats:
+        """(m,) volumes of the segments."""
+        return self.program.e_mm[self.deposited.rows] * self.filament_mm2
 
     @property
     def segment_type(self) -> list[str]:
@@ -80,13 +91,10 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     machine, text = profile.machine, Lines.of(lines)
     program = parse_gcode(text, machine)
     _refuse_far_places(program)
-    rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
-    segments = _segments(program, rows, machine)
-    area = pi * profile.material.diameter_mm**2 / 4.0
+    deposited = beads_of(program, np.flatnonzero(program.kind == MoveKind.EXTRUDE), profile)
     contacts = None
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
-        deposited = beads_of(program, segments, rows, profile)
         touching = ahead(_touching, program, deposited, profile)  # half of all work, on a core of its own
         times_s = motion.times_s(program, machine)
         balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
@@ -101,27 +109,13 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
         program=program,
         times_s=times_s,
         waits=(*dwells, *heat.waits(program, times_s, machine)),
-        segments_mm=segments,
-        segment_row=rows,
-        segment_mm3=program.e_mm[rows] * area,
+        deposited=deposited,
         contacts=contacts,
         findings=tuple(known),
         letters=tuple(axis_limits(machine)),
+        filament_mm2=pi * profile.material.diameter_mm**2 / 4.0,
         interfaces=balances,
     )
-
-
-def _segments(program: ParsedProgram, rows: NDArray[np.int64], machine: Machine) -> Floats:
-    """(m, 2, 3) ends of rows in the workpiece frame; some at a time, for what it takes to turn them is ten times as much."""
-    segments = np.empty((len(rows), 2, 3))
-    for some in pieces(len(rows)):
-        mine = rows[some]
-        segments[some, 1] = workpiece_path(machine, program.end[mine])
-        begins = np.ones(len(mine), dtype=np.bool_)  # the others begin where the row before them has ended
-        begins[1:] = (mine[1:] != mine[:-1] + 1) | (program.start[mine[1:]] != program.end[mine[:-1]]).any(axis=1)
-        segments[some.start + 1 : some.stop, 0] = segments[some.start : some.stop - 1, 1]
-        segments[some, 0][begins] = workpiece_path(machine, program.start[mine[begins]])
-    return segments
 
 
 def _touching(program: ParsedProgram, deposited: Beads, profile: Profile) -> tuple[Contacts, list[Finding]]:
@@ -134,14 +128,13 @@ def _findings(
     text: Sequence[str], program: ParsedProgram, deposited: Beads, balances: Sequence[InterfaceBalance], profile: Profile
 ) -> tuple[list[Finding], list[Finding]]:
     """What is wrong with the moves of a program, and with the rest of it."""
-    segments, rows = deposited.segments_mm, deposited.rows
-    moving = [*motion.findings(program, profile.machine), *clearance.findings(program, segments, rows, profile.machine)]
+    moving = [*motion.findings(program, profile.machine), *clearance.findings(program, deposited, profile.machine)]
     of_program = [
         *extrusion.findings(program, deposited, profile),
         *interfaces.findings(program, balances, profile),
         *sequence.findings(program, profile),
         *own_comments.findings(text, program, profile),
-        *placement.off_plate(program, segments, rows, profile),
+        *placement.off_plate(program, deposited, profile),
         *placement.purged_into(program, deposited),
         *heat.findings(program, profile, own_comments.has_material(text, profile)),
     ]
@@ -164,13 +157,13 @@ def retractions(program: ParsedProgram) -> int:
     return int((pulled & ~np.concatenate([[False], pulled[:-1]])).sum()) if len(pulled) else 0
 
 
-def _box(segments: Floats, counted: NDArray[np.bool_]) -> list[list[float]]:
-    """Least and greatest X Y Z of segments that count; empty where none does."""
+def _box(deposited: Beads, counted: NDArray[np.bool_]) -> list[list[float]]:
+    """Least and greatest X Y Z of the beads that count; empty where none does."""
     if not counted.any():
         return []
     least, most = np.full(3, np.inf), np.full(3, -np.inf)
-    for some in pieces(len(segments)):
-        points = segments[some][counted[some]].reshape(-1, 3)
+    for some in pieces(len(counted)):
+        points = deposited.segments(some)[counted[some]].reshape(-1, 3)
         least, most = np.minimum(least, points.min(axis=0, initial=np.inf)), np.maximum(most, points.max(axis=0, initial=-np.inf))
     return [least.tolist(), most.tolist()]
 
@@ -179,7 +172,7 @@ def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
     travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0)  # a wipe, which pulls back, is none
-    box = _box(run.segments_mm, ~program.rows_of_types(Kind.PURGE.value)[run.segment_row])
+    box = _box(run.deposited, ~program.rows_of_types(Kind.PURGE.value)[run.segment_row])
     return {
         "time_s": run.time_s,
         "filament_mm": float(np.max(program.filament_mm, initial=0.0)),

@@ -5,6 +5,7 @@ whose beads have nothing under them, by the plastic that lies there.
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import Beads
-from machine.reader.parsed import ParsedProgram
-from mdp.mesh import Floats
+from machine.reader.parsed import Indices32, ParsedProgram, pieces
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats, Indices
 from slicer.paths import ON_PLATE_MM, Kind
 
 SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
@@ -41,25 +43,26 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
 
     What stands off by most of a layer may stand on support that ends as high as the part does there: the replay knows.
     """
-    sized = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
-    rows = deposited.rows[sized]
-    length_mm = deposited.length_mm[sized]
-    in_air = ((contacts.air_mm + contacts.beside_mm > 0.0) & ~program.rows_of_types(*LOOSE))[rows]
-    groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | program.turned_between(rows)) + 1)
+    sized = (program.remarks.height_mm > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
+    which = np.flatnonzero(sized[deposited.rows])
+    rows, length_mm = deposited.rows[which], deposited.length_mm[which]
+    ends = np.flatnonzero((np.diff(program.part[rows]) != 0) | program.turned_between(rows)) + 1
+    support, loose = program.rows_of_types(*SUPPORT), program.rows_of_types(*LOOSE)
     problems, seen = [], set()
-    for group in groups:
-        part = int(program.part[rows[group[0]]]) if len(group) else 0
-        if not len(group) or part in seen:
+    for begin, end in pairwise([0, *ends.tolist(), len(rows)]):
+        mine = rows[begin:end]
+        part = int(program.part[mine[0]]) if len(mine) else 0
+        if not len(mine) or part in seen:
             continue
-        mine = rows[group]
-        gap = _gaps(program, mine)
-        laid_mm = np.bincount(program.layer[mine], weights=length_mm[group])[program.layer[mine]]
-        height_mm = program.height_mm[mine]
-        hangs = (gap < SEEN_SHARE * height_mm) | in_air[group]
-        high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * height_mm)) & (laid_mm > CRUMB_MM) & hangs)
+        layer, height_mm = program.layer[mine], program.height_mm[mine]
+        gap = _gaps(program.start, program.end, mine, layer, height_mm, support[mine])
+        in_air = ((contacts.air_mm[mine] + contacts.beside_mm[mine]) > 0.0) & ~loose[mine]
+        laid_mm = np.bincount(layer, weights=length_mm[begin:end])
+        hangs = (gap < SEEN_SHARE * height_mm) | in_air
+        high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * height_mm)) & (laid_mm > CRUMB_MM)[layer] & hangs)
         if len(high):
             seen.add(part)
-            row, layers = int(mine[high[0]]), len(np.unique(program.layer[mine[high]]))
+            row, layers = int(mine[high[0]]), len(np.unique(layer[high]))
             message = (
                 f"layer {program.layer[row]} begins {gap[high[0]]:.2f} mm above all that lies below it: it should lie on it "
                 f"(layers: {layers})"
@@ -68,26 +71,27 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     return problems
 
 
-def _gaps(program: ParsedProgram, rows: NDArray[np.int64]) -> Floats:
+@kernel
+def _gaps(start: Floats, end: Floats, rows: Indices, layers: Indices32, height_mm: Floats, support: NDArray[np.bool_]) -> Floats:
     """(m,) by how much the underside of each bead of a part lies above all of the layers before; support keeps its distance.
 
     What its own layer has laid does not count: support laid first would hide a layer that is raised with it.
     """
-    ends = np.stack([program.start[rows, 2], program.end[rows, 2]])
-    underside, top = ends.min(axis=0) - program.height_mm[rows], ends.max(axis=0)
-    objects = np.cumsum(np.diff(top, prepend=top[0]) < -NEW_OBJECT_MM)
-    support = program.rows_of_types(*SUPPORT)[rows]
-    gaps = np.zeros(len(rows))
-    for number in np.unique(objects):
-        own = np.flatnonzero(objects == number)
-        highest = np.maximum.accumulate(top[own])
-        of_part = np.maximum.accumulate(np.where(support[own], -np.inf, top[own]))
-        begins = np.diff(program.layer[rows[own]], prepend=-1) != 0
-        first = np.maximum.accumulate(np.where(begins, np.arange(len(own)), 0))
-        before, part_before = (np.concatenate([[np.inf], values])[first] for values in (highest, of_part))
-        gap = underside[own] - before
-        stands_off = (support[own] | (part_before < before - SLACK_MM)) & (gap < STAND_OFF_MM)
-        gaps[own] = np.where(stands_off, 0.0, gap)
+    gaps, last_mm, layer = np.empty(len(rows)), np.inf, -1
+    highest = of_part = before = part_before = -np.inf
+    for k in range(len(rows)):
+        a, b = start[rows[k], 2], end[rows[k], 2]
+        top = max(a, b)
+        if k == 0 or top - last_mm < -NEW_OBJECT_MM:
+            highest, of_part, before, part_before = -np.inf, -np.inf, np.inf, np.inf
+        elif layers[k] != layer:
+            before, part_before = highest, of_part
+        gap = min(a, b) - height_mm[k] - before
+        stands_off = (support[k] or part_before < before - SLACK_MM) and gap < STAND_OFF_MM
+        gaps[k], last_mm, layer = (0.0 if stands_off else gap), top, layers[k]
+        highest = max(highest, top)
+        if not support[k]:
+            of_part = max(of_part, top)
     return gaps
 
 
@@ -106,7 +110,9 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
     What spans the cells of sparse infill is a bridge, however much of a layer that is (machine.dryrun.replay).
     """
     rows = deposited.rows
-    low = np.minimum(deposited.segments_mm[:, 0, 2], deposited.segments_mm[:, 1, 2]) - deposited.height_mm < ON_PLATE_MM
+    low, height_mm = np.empty(len(rows), np.bool_), deposited.sizes[:, 1]
+    for some in pieces(len(rows)):
+        low[some] = deposited.segments(some)[:, :, 2].min(axis=1) - height_mm[deposited.size[some]] < ON_PLATE_MM
     counted = ~program.rows_of_types(*LOOSE)[rows] & ~low & ~_begins(program, rows)
     rows, length = rows[counted], deposited.length_mm[counted]
     group = program.layer_keys(rows)

@@ -9,7 +9,7 @@ from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import CROSSING_MM, Beads
 from machine.planning.fit import over_edge_mm
-from machine.reader.parsed import ParsedProgram
+from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind
@@ -111,31 +111,37 @@ def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts)
     return float(length.sum()), float(contacts.air_mm[own & ~reported].sum()), float(contacts.air_mm[own & reported].sum())
 
 
-def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Iterator[Finding]:
-    """Strokes of the layer on the plate that lie beyond its edge: an error a part, with the farthest.
-
-    segments: (m, 2, 3) deposited, workpiece frame; rows: (m,) their rows in the program.
-    """
-    heights = np.where(program.height_mm[rows] > 0, program.height_mm[rows], profile.process.first_layer_height_mm)
-    lowest = np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= heights + ROUNDING_MM
-    ends, edge = over_edge_mm(segments[:, :, :2], profile.machine.table)
-    over = ends.max(axis=1, initial=-np.inf)
-    beyond = lowest & ~program.rows_of_types(PURGE)[rows] & (over > ROUNDING_MM)
+def off_plate(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
+    """Strokes of the layer on the plate that lie beyond its edge: an error a part, with the farthest."""
+    told_mm = program.remarks.height_mm
+    heights = np.where(told_mm > 0, told_mm, profile.process.first_layer_height_mm)
+    purge, beyond, over_mm, edge = program.rows_of_types(PURGE), [np.zeros(0, np.int64)], [np.zeros(0)], ""
+    for some in pieces(len(deposited.rows)):
+        segments, rows = deposited.segments(some), deposited.rows[some]
+        low = np.flatnonzero((segments[:, :, 2].max(axis=1) <= heights[program.remark[rows]] + ROUNDING_MM) & ~purge[rows])
+        ends, edge = over_edge_mm(segments[low, :, :2], profile.machine.table)
+        over = ends.max(axis=1, initial=-np.inf)
+        beyond.append(rows[low[over > ROUNDING_MM]])
+        over_mm.append(over[over > ROUNDING_MM])
     message = f"the first layer reaches {{value}} mm over the plate's edge, {edge} (moves: {{count}})"
-    return per_part(program, rows[beyond], over[beyond], message, code="off-plate")
+    return per_part(program, np.concatenate(beyond), np.concatenate(over_mm), message, code="off-plate")
 
 
 def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
     """A purge on the plate where beads of the first layer come to lie: they would stand on it, the tip would run through it."""
-    ends_mm, half_mm = deposited.segments_mm, 0.5 * deposited.width_mm
-    low = ends_mm[:, :, 2].max(axis=1) <= ON_PLATE * np.maximum(deposited.height_mm, ROUNDING_MM)
     purge = program.rows_of_types(PURGE)[deposited.rows]
+    if not purge.any():
+        return []
+    low, low_mm = np.zeros(len(purge), np.bool_), ON_PLATE * np.maximum(deposited.sizes[:, 1], ROUNDING_MM)
+    for some in pieces(len(purge)):
+        low[some] = deposited.segments(some)[:, :, 2].max(axis=1) <= low_mm[deposited.size[some]]
     purged, laid = np.flatnonzero(low & purge), np.flatnonzero(low & ~purge)
     if not len(purged) or not len(laid):
         return []
+    half_mm = 0.5 * deposited.width_mm
     import shapely  # 30 ms, for programs that purge on the plate
 
-    lines, beads = (shapely.linestrings(ends_mm[rows, :, :2]) for rows in (purged, laid))
+    lines, beads = (shapely.linestrings(deposited.segments(which)[:, :, :2]) for which in (purged, laid))
     reach_mm = float(half_mm[purged].max() + half_mm[laid].max()) - ROUNDING_MM
     line, bead = shapely.STRtree(beads).query(lines, "dwithin", reach_mm)
     between_mm = shapely.distance(lines[line], beads[bead]) - half_mm[purged[line]] - half_mm[laid[bead]]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, highest_first, lay_bead
 from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
-from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
+from machine.reader.parsed import Indices32, ParsedProgram, pieces, pose_runs
 from mdp.head import Head, head_of
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, no_nrt
@@ -69,45 +69,44 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     contacts = Contacts(*np.zeros((5, count)))
     if not len(deposited.rows):
         return contacts
-    extruded = program.kind == MoveKind.EXTRUDE
-    strokes, moves, head = strokes_of(program, extruded), moves_of(program, deposited, profile), head_of(machine)
-    laid_in, ups, turned = np.zeros(len(deposited.rows), dtype=np.int32), np.zeros((0, 3)), 0
+    strokes, moves, head = strokes_of(program), moves_of(program, deposited, profile), head_of(machine)
+    begins: list[int] = []
+    ups, turned = np.zeros((0, 3)), 0
     process = profile.process
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
-    for number, run in enumerate(pose_runs(program)):
+    for run in pose_runs(program):
         before, after = (int(at) for at in np.searchsorted(deposited.rows, (run.rows[0], run.rows[-1] + 1)))
-        laid_in[before:after], ups = number, np.vstack([ups, rotation(machine, run.pose)[2]])
+        begins, ups = [*begins, before], np.vstack([ups, rotation(machine, run.pose)[2]])
         turned += before
         if turned > MOST_TURNED:
             return contacts._replace(untested_row=int(run.rows[0]))
         if after:
-            field = _field(deposited, (before, after), run, (ups, laid_in), machine)
+            field = _field(deposited, (before, after), run.pose, (ups, begins), machine)
             about = Surroundings(field, head, int(run.rows[0]), before, gap, _plate(machine, run.pose))
             _replay_run(run.rows, moves, strokes, about, contacts, np.zeros((len(run.rows), 2)))
             del field, about  # before there is another one
     return contacts
 
 
-def _field(
-    deposited: Beads, laid: tuple[int, int], run: PoseRun, directions: tuple[Floats, NDArray[np.int32]], machine: Machine
-) -> Field:
+def _field(deposited: Beads, laid: tuple[int, int], pose: Pose, directions: tuple[Floats, list[int]], machine: Machine) -> Field:
     """The field of a run at one pose with all earlier plastic in it. laid: how many beads are before the run and after it.
-    directions: those in which runs print, and the run of each bead.
+    directions: those in which runs print, and the bead with which each begins.
     """
     before, after = laid
-    turn, moved = rotation(machine, run.pose), shift(machine, run.pose)
-    least, most = _extent(deposited.segments_mm[:after], turn, moved)
-    field = empty_field(least - 3.0, most + 3.0)
-    _lay_turned(deposited, directions[1][:before], directions[0], turn, moved, field)
+    turn, moved, extent = rotation(machine, pose), shift(machine, pose), np.array([[np.inf] * 2, [-np.inf] * 2])
+    for some in pieces(after):
+        _widen(extent, deposited.segments(some), turn, moved)
+    field = empty_field(extent[0] - 3.0, extent[1] + 3.0)
+    for some in pieces(before):
+        run_of = np.searchsorted(directions[1], np.arange(some.start, some.stop), side="right") - 1
+        mine = (deposited.segments(some), deposited.rows[some], deposited.sizes, deposited.size[some])
+        _lay_turned(*mine, directions[0][run_of], turn, moved, field)
     return highest_first(field)
 
 
 @kernel
-def _extent(segments: Floats, turn: Floats, moved: Floats) -> Floats:
-    """(2, 2) least and greatest X Y of the ends of segments, turned and moved."""
-    extent = table(2, 2)
-    extent[0, 0] = extent[0, 1] = np.inf
-    extent[1, 0] = extent[1, 1] = -np.inf
+def _widen(extent: Floats, segments: Floats, turn: Floats, moved: Floats) -> None:
+    """Widens (2, 2) least and greatest X Y to the ends of segments, turned and moved."""
     for i in range(len(segments)):
         for side in range(2):
             x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
@@ -115,7 +114,6 @@ def _extent(segments: Floats, turn: Floats, moved: Floats) -> Floats:
                 place = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + moved[k]
                 extent[0, k] = min(extent[0, k], place)
                 extent[1, k] = max(extent[1, k], place)
-    return extent
 
 
 def _plate(machine: Machine, pose: Pose) -> Floats:
@@ -128,22 +126,31 @@ def _plate(machine: Machine, pose: Pose) -> Floats:
 
 
 @kernel
-def _lay_turned(deposited: Beads, laid_in: NDArray[np.int32], ups: Floats, turn: Floats, moved: Floats, field: Field) -> None:
-    """Lay the first beads into a field, turned and moved. laid_in: (m,) the run of each; ups: directions in which runs print."""
+def _lay_turned(
+    segments: Floats,
+    rows: NDArray[np.int64],
+    sizes: Floats,
+    size: Indices32,
+    ups: Floats,
+    turn: Floats,
+    moved: Floats,
+    field: Field,
+) -> None:
+    """Lay (m,) beads into a field, turned and moved; ups: (m, 3) directions in which they were printed."""
     ends, middle = table(2, 3), floats(3, 0.0)
-    for i in range(len(laid_in)):
-        up, width, height = ups[laid_in[i]], deposited.width_mm[i], deposited.height_mm[i]
+    for i in range(len(rows)):
+        up, width, height = ups[i], sizes[size[i], 0], sizes[size[i], 1]
         for k in range(3):
             middle[k] = 0.5 * height * (up[0] * turn[k, 0] + up[1] * turn[k, 1] + up[2] * turn[k, 2])
         along = up[0] * turn[2, 0] + up[1] * turn[2, 1] + up[2] * turn[2, 2]
         across = np.sqrt(max(0.0, 1.0 - along * along))
         for side in range(2):
-            x, y, z = deposited.segments_mm[i, side, 0], deposited.segments_mm[i, side, 1], deposited.segments_mm[i, side, 2]
+            x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
             for k in range(3):
                 ends[side, k] = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + moved[k] - middle[k]
             ends[side, 2] += 0.5 * abs(along) * height + 0.5 * across * width
         half = min(0.5 * width, 0.5 * width * along * along + 0.5 * height * across)
-        lay_bead(ends[0], ends[1], half, deposited.rows[i], field)
+        lay_bead(ends[0], ends[1], half, rows[i], field)
 
 
 @no_nrt
@@ -253,7 +260,7 @@ def _replay_run(
         row = rows[at]
         a, b = moves.start[row], moves.end[row]
         extruded = bead < len(moves.rows) and moves.rows[bead] == row
-        slack = moves.width[bead] if extruded else LEVEL_SLACK_MM if moves.low[row] else SLACK_MM
+        slack = moves.sizes[moves.size[bead], 0] if extruded else LEVEL_SLACK_MM if moves.low[row] else SLACK_MM
         depth = depth_of(a, b, slack, about.field, about.head)
         if depth > 0.0:
             contacts.depth_mm[row] = depth
@@ -262,7 +269,7 @@ def _replay_run(
             contacts.close_mm[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, about.head)
         if not extruded:
             continue
-        size = (0.5 * moves.width[bead], moves.height[bead])
+        size = (0.5 * moves.sizes[moves.size[bead], 0], moves.sizes[moves.size[bead], 1])
         bead += 1
         if at and strokes.path[row] != strokes.path[rows[at - 1]]:
             _settle((first, at, open_mm - _free_mm(most, held)), rows, pending, contacts)

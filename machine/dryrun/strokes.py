@@ -1,13 +1,17 @@
 """Strokes: a program's rows as the replay takes them: beads with their places and sizes, what each move may touch and span."""
 
+from dataclasses import dataclass, replace
 from math import pi
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.kinematics.table import workpiece_segments
 from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces
-from mdp.mesh import Floats
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats, Indices
+from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.fill.infill import infill_cell_mm
 from slicer.paths import Kind
@@ -24,14 +28,42 @@ FILLING = (Kind.SKIN.value, Kind.TOP_SKIN.value, Kind.GAP.value)
 ZIGZAG = 3.0  # spans: infill that turns at a wall may have a line's end, the joint and the next line's end beyond what it crosses
 
 
-class Beads(NamedTuple):
-    """What was deposited: (m, 2, 3) segments in the workpiece frame, (m,) their rows, widths, heights and lengths."""
+@dataclass(frozen=True, eq=False)
+class Beads:
+    """What some rows of a program deposit on a machine; rows: (m,). What they come to is worked out where it is asked for.
 
-    segments_mm: Floats
+    sizes: (k, 2) widths and heights, mm; size: (m,) which of them each bead has.
+    """
+
+    program: ParsedProgram
+    machine: Machine
     rows: NDArray[np.int64]
-    width_mm: Floats
-    height_mm: Floats
-    length_mm: Floats
+    sizes: Floats
+    size: Indices32
+
+    def segments(self, some: Indices | slice = slice(None)) -> Floats:
+        """(k, 2, 3) ends of some beads in the workpiece frame, mm."""
+        return workpiece_segments(self.machine, self.program.start, self.program.end, self.rows[some])
+
+    @property
+    def width_mm(self) -> Floats:
+        """(m,)."""
+        width_mm: Floats = self.sizes[self.size, 0]
+        return width_mm
+
+    @property
+    def height_mm(self) -> Floats:
+        """(m,)."""
+        height_mm: Floats = self.sizes[self.size, 1]
+        return height_mm
+
+    @property
+    def length_mm(self) -> Floats:
+        """(m,)."""
+        length_mm = np.empty(len(self.rows))
+        for some in pieces(len(length_mm)):
+            length_mm[some] = lengths_of(self.segments(some))
+        return length_mm
 
 
 class Strokes(NamedTuple):
@@ -48,7 +80,7 @@ class Moves(NamedTuple):
     """(n, 5) start and end of each row; (n,) whether it lies below the bead that was just laid, and whether it leads to or from a
     turn of the table, its remarks. spans: of each of those, how far beads may span over what is sparse below them.
 
-    rows, width, height: (m,) of the beads. Apart from Strokes, which the innermost functions take: each array more there slows
+    rows, sizes, size: of the beads. Apart from Strokes, which the innermost functions take: each array more there slows
     all of it down.
     """
 
@@ -59,27 +91,39 @@ class Moves(NamedTuple):
     remark: Indices32
     spans: Floats
     rows: NDArray[np.int64]
-    width: Floats
-    height: Floats
+    sizes: Floats
+    size: Indices32
 
 
-def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
+def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Beads:
     """Widths and heights as the program's comments tell, else by its layers or the profile's, and the filament pushed."""
-    first_mm, layer_mm = _layers_mm(segments, bool((program.height_mm[rows] > 0).any()), profile)
-    width_mm, height_mm, length_mm = np.empty((3, len(rows)))
-    for some in pieces(len(rows)):
-        ends, remark = segments[some], program.remark[rows[some]]
-        remark_height_mm, remark_width_mm = program.remarks.height_mm[remark], program.remarks.width_mm[remark]
+    told, size = program.remarks, program.remark[rows]
+    sizes = np.column_stack([told.width_mm, told.height_mm])
+    untold = np.flatnonzero((np.minimum(told.width_mm, told.height_mm) <= 0.0)[size])
+    beads = Beads(program, profile.machine, rows, sizes, size)
+    if not len(untold):
+        return beads
+    first_mm, layer_mm = _layers_mm(beads, bool((told.height_mm > 0)[size].any()), profile)
+    own = np.empty((len(untold), 2))
+    for some in pieces(len(untold)):
+        mine, ends = untold[some], beads.segments(untold[some])
+        told_width_mm, told_height_mm = sizes[size[mine]].T
         usual = np.where(np.maximum(ends[:, 0, 2], ends[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
-        height = np.where(remark_height_mm > 0, remark_height_mm, usual)
-        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        area = program.e_mm[rows[some]] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
+        height = np.where(told_height_mm > 0, told_height_mm, usual)
+        area = program.e_mm[rows[mine]] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(lengths_of(ends), 1e-9)
         by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
-        width_mm[some], height_mm[some], length_mm[some] = np.where(remark_width_mm > 0, remark_width_mm, by_flow), height, length
-    return Beads(segments, rows, width_mm, height_mm, length_mm)
+        own[some, 0], own[some, 1] = np.where(told_width_mm > 0, told_width_mm, by_flow), height
+    size[untold] = len(sizes) + np.arange(len(untold), dtype=np.int32)
+    return replace(beads, sizes=np.concatenate([sizes, own]))
 
 
-def _layers_mm(segments: Floats, has_heights: bool, profile: Profile) -> tuple[float, float]:
+def lengths_of(segments: Floats) -> Floats:
+    """(k,) of (k, 2, 3) segments."""
+    lengths: Floats = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    return lengths
+
+
+def _layers_mm(beads: Beads, has_heights: bool, profile: Profile) -> tuple[float, float]:
     """Heights of the first layer and of others for beads that tell none: the profile's, and in a file that tells none at all
     those of its own level beads.
     """
@@ -87,20 +131,35 @@ def _layers_mm(segments: Floats, has_heights: bool, profile: Profile) -> tuple[f
     first, usual = process.first_layer_height_mm, process.layer_height_mm
     if has_heights:
         return first, usual
-    levels = np.unique(np.round(segments[segments[:, 0, 2] == segments[:, 1, 2], 1, 2], 3))
+    levels = np.zeros(0)
+    for some in pieces(len(beads.rows)):
+        z_mm = beads.segments(some)[:, :, 2]
+        levels = np.unique([*levels, *np.round(z_mm[z_mm[:, 0] == z_mm[:, 1], 1], 3)])
     if len(levels) < FEWEST_LEVELS:
         return first, usual
     step = float(np.median(np.diff(levels)))
     return (float(levels[0]) if 0.0 < levels[0] <= most else first), (step if step <= most else usual)
 
 
-def strokes_of(program: ParsedProgram, extruded: NDArray[np.bool_]) -> Strokes:
+def strokes_of(program: ParsedProgram) -> Strokes:
     """The strokes of a program."""
-    begins = np.ones(len(extruded), dtype=np.bool_)
-    begins[1:] = ~(np.all(program.start[1:] == program.end[:-1], axis=1) & extruded[1:] & extruded[:-1])
-    path, way = np.cumsum(begins, dtype=np.int32), program.way_mm
-    stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.remarks.type][program.remark]
-    return Strokes(path, np.cumsum(way, out=way), stands_off)
+    path, way = _along(program.start, program.end, program.kind == MoveKind.EXTRUDE)
+    return Strokes(path, way, program.rows_of_types(*STANDS_OFF))
+
+
+@kernel
+def _along(start: Floats, end: Floats, extruded: NDArray[np.bool_]) -> tuple[Indices32, Floats]:
+    """path and way of Strokes."""
+    path, way, paths, way_mm = np.empty(len(start), np.int32), np.empty(len(start)), 0, 0.0
+    for row in range(len(start)):
+        goes_on = row > 0 and extruded[row] and extruded[row - 1]
+        for axis in range(5):
+            goes_on = goes_on and start[row, axis] == end[row - 1, axis]
+        x, y, z = end[row, 0] - start[row, 0], end[row, 1] - start[row, 1], end[row, 2] - start[row, 2]
+        paths += not goes_on
+        way_mm += np.sqrt(x * x + y * y + z * z)
+        path[row], way[row] = paths, way_mm
+    return path, way
 
 
 def moves_of(program: ParsedProgram, deposited: Beads, profile: Profile) -> Moves:
@@ -110,7 +169,7 @@ def moves_of(program: ParsedProgram, deposited: Beads, profile: Profile) -> Move
     low, crossing = np.zeros((2, len(program.line)), dtype=np.bool_)
     low[_below_last_bead(program, others[across > ACROSS_MM], deposited.rows)] = True
     crossing[_ways_to_turns(program, others[across > WAY_MM], deposited.rows)] = True
-    spans, beads = _spans(program, profile), (deposited.rows, deposited.width_mm, deposited.height_mm)
+    spans, beads = _spans(program, profile), (deposited.rows, deposited.sizes, deposited.size)
     return Moves(program.start, program.end, low, crossing, program.remark, spans, *beads)
 
 

@@ -6,11 +6,12 @@ tip = tilt_point + R_tilt (turn_point + R_turn w - tilt_point), X Y Z = tip + to
 import numpy as np
 
 from mdp.kernels.arrays import table
-from mdp.kernels.kernel import kernel
-from mdp.mesh import Floats
+from mdp.kernels.kernel import kernel, no_nrt
+from mdp.mesh import Floats, Indices
 from mdp.pose import Pose, rotation, shift, unit
-from profiles.axes import RotaryAxis
 from profiles.machine import Machine
+
+Point = tuple[float, float, float]
 
 
 def machine_points(machine: Machine, pose: Pose, workpiece_mm: Floats) -> Floats:
@@ -33,29 +34,67 @@ def part_shift(machine: Machine, pose: Pose, base_offset_mm: float) -> Floats:
 
 def workpiece_path(machine: Machine, axes: Floats) -> Floats:
     """(n, 3) workpiece points under the tip for (n, 5) rows X Y Z tilt turn, the angles in degrees."""
-    tilt_point, turn_point = np.array(machine.tilt.point_mm), np.array(machine.turn.point_mm)
-    tip = axes[:, :3] - np.array(machine.tool_mm)
-    tilted_back = _turned_back(unit(machine.tilt.axis), angles_rad(machine.tilt, axes[:, 3]), tip - tilt_point) + tilt_point
-    return _turned_back(unit(machine.turn.axis), angles_rad(machine.turn, axes[:, 4]), tilted_back - turn_point)
+    return _path(np.ascontiguousarray(axes), _chain(machine))
+
+
+def workpiece_segments(machine: Machine, start: Floats, end: Floats, rows: Indices) -> Floats:
+    """(m, 2, 3) places under the tip where (m,) of the moves begin and end; start, end: (n, 5) X Y Z tilt turn."""
+    return _segments(start, end, rows, _chain(machine))
+
+
+def _chain(machine: Machine) -> Floats:
+    """(7, 3) tool; a point and the direction of the tilt axis, of the turn axis; sign and zero, deg, of both."""
+    signs = [(axis.sign, axis.zero_deg, 0.0) for axis in (machine.tilt, machine.turn)]
+    axes = [line for axis in (machine.tilt, machine.turn) for line in (axis.point_mm, unit(axis.axis))]
+    return np.array([machine.tool_mm, *axes, *signs])
 
 
 @kernel
-def _turned_back(unit_axis: Floats, angles: Floats, points: Floats) -> Floats:
-    """(n, 3) points turned about one unit axis by (n,) angles in radians, most of which are that of the point before."""
-    out: Floats = table(len(points), 3)
-    cosine, sine = 1.0, 0.0
-    for k in range(len(points)):
-        if k == 0 or angles[k] != angles[k - 1]:
-            cosine, sine = np.cos(angles[k]), np.sin(angles[k])
-        along = points[k, 0] * unit_axis[0] + points[k, 1] * unit_axis[1] + points[k, 2] * unit_axis[2]
-        for i in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            across = unit_axis[a] * points[k, b] - unit_axis[b] * points[k, a]
-            out[k, i] = points[k, i] * cosine + across * sine + unit_axis[i] * along * (1.0 - cosine)
+def _path(axes: Floats, chain: Floats) -> Floats:
+    out, angles = table(len(axes), 3), table(2, 3)
+    for k in range(len(axes)):
+        out[k, 0], out[k, 1], out[k, 2] = _place(axes[k], chain, angles, k == 0)
     return out
 
 
-def angles_rad(axis: RotaryAxis, values_deg: Floats) -> Floats:
-    """(...) right-handed angles that undo what the axis does to the table at its values."""
-    angles: Floats = np.radians(axis.sign * (values_deg - axis.zero_deg))
-    return angles
+@kernel
+def _segments(start: Floats, end: Floats, rows: Indices, chain: Floats) -> Floats:
+    """Most moves begin where the one before them has ended."""
+    out, angles = np.empty((len(rows), 2, 3)), table(2, 3)
+    for k in range(len(rows)):
+        row = rows[k]
+        goes_on = k > 0 and row == rows[k - 1] + 1
+        for axis in range(5):
+            goes_on = goes_on and start[row, axis] == end[row - 1, axis]
+        if goes_on:
+            for axis in range(3):
+                out[k, 0, axis] = out[k - 1, 1, axis]
+        else:
+            out[k, 0, 0], out[k, 0, 1], out[k, 0, 2] = _place(start[row], chain, angles, k == 0)
+        out[k, 1, 0], out[k, 1, 1], out[k, 1, 2] = _place(end[row], chain, angles, False)
+    return out
+
+
+@no_nrt
+def _place(axes: Floats, chain: Floats, angles: Floats, is_first: bool) -> Point:
+    """The workpiece point of (5,) axes; angles: (2, 3) place, deg, cosine and sine of tilt and turn as they were last."""
+    for axis in range(2):
+        if is_first or axes[3 + axis] != angles[axis, 0]:
+            angle = np.radians(chain[5 + axis, 0] * (axes[3 + axis] - chain[5 + axis, 1]))
+            angles[axis, 0], angles[axis, 1], angles[axis, 2] = axes[3 + axis], np.cos(angle), np.sin(angle)
+    point = (axes[0] - chain[0, 0], axes[1] - chain[0, 1], axes[2] - chain[0, 2])
+    x, y, z = _about(chain[1], chain[2], angles[0], point)
+    return _about(chain[3], chain[4], angles[1], (x + chain[1, 0], y + chain[1, 1], z + chain[1, 2]))
+
+
+@no_nrt
+def _about(middle: Floats, axis: Floats, angle: Floats, point: Point) -> Point:
+    """A point turned about an axis through a middle, seen from there; angle: (3,) with its cosine and sine at the end."""
+    cosine, sine = angle[1], angle[2]
+    x, y, z = point[0] - middle[0], point[1] - middle[1], point[2] - middle[2]
+    along = x * axis[0] + y * axis[1] + z * axis[2]
+    return (
+        x * cosine + (axis[1] * z - axis[2] * y) * sine + axis[0] * along * (1.0 - cosine),
+        y * cosine + (axis[2] * x - axis[0] * z) * sine + axis[1] * along * (1.0 - cosine),
+        z * cosine + (axis[0] * y - axis[1] * x) * sine + axis[2] * along * (1.0 - cosine),
+    )

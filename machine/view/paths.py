@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.strokes import beads_of
-from machine.kinematics.table import workpiece_path
 from machine.reader.levels import fan_shares, temperatures
 from machine.reader.parsed import MoveKind, ParsedProgram
 from machine.view.encoding import Column
@@ -91,11 +90,8 @@ def _jumps(program: ParsedProgram, shown: NDArray[np.int64]) -> NDArray[np.int64
 def _bead_sizes(run: DryRun, profile: Profile) -> tuple[Floats, Floats]:
     """(n,) width and height of the beads, mm, as the file tells or as the filament makes them; 0 where none is laid."""
     program, width, height = run.program, np.zeros(len(run.times_s)), np.zeros(len(run.times_s))
-    turning = np.flatnonzero(turning_strokes(program))
-    ways = np.stack([workpiece_path(profile.machine, side[turning]) for side in (program.start, program.end)], axis=1)
-    for segments, rows in ((run.segments_mm, run.segment_row), (ways, turning)):
-        beads = beads_of(program, segments, rows, profile)
-        width[rows], height[rows] = beads.width_mm, beads.height_mm
+    for beads in (run.deposited, beads_of(program, np.flatnonzero(turning_strokes(program)), profile)):
+        width[beads.rows], height[beads.rows] = beads.width_mm, beads.height_mm
     return width, height
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
 from machine.dryrun.findings import Finding, at_row
-from machine.dryrun.strokes import Beads
+from machine.dryrun.strokes import Beads, lengths_of
 from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose, rotation
@@ -138,15 +138,15 @@ def _interface(
     spare_mm3 = profile.material.prime_extra_mm * _filament_mm2(profile)
     tip_mm = float(np.median(layer.end[:, 2]))
     lattice = lattice_over(np.concatenate([layer.begin, layer.end])[:, :2], CELL_MM)
-    wide = layer._replace(half=0.5 * deposited.width_mm[first])
+    wide = layer._replace(half=0.5 * deposited.sizes[deposited.size[first], 0])
     bead = tops(wide, lattice) > NOTHING
     section = bead | inside_loops(_outer_loops(wide, program, deposited.rows[first]), lattice)
     near = np.zeros(len(earlier), np.bool_)
     for some in pieces(len(earlier)):
-        near[some] = np.abs((deposited.segments_mm[earlier[some]] @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
+        near[some] = np.abs((deposited.segments(earlier[some]) @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
     room = tops(_bars(program, deposited, earlier[near], turn, profile), lattice)  # a lattice is large: worked out in its place
     np.maximum(np.subtract(tip_mm, room, out=room), 0.0, out=room)
-    touching = room < NEAR * max(float(np.median(deposited.height_mm[first])), 0.2)
+    touching = room < NEAR * max(float(np.median(layer.height)), 0.2)
     room[~touching] = 0.0
     room *= lattice.column_mm2
     return Interface(
@@ -166,7 +166,8 @@ def _run_in(deposited: Beads, first: Indices, mm3: Floats, spare_mm3: float) -> 
     """(m,) what the first strokes of a layer have beyond its leanest ones, up to what oozed while the table turned: that is
     missing in the nozzle and fills no room.
     """
-    told = deposited.width_mm[first] * deposited.height_mm[first] * deposited.length_mm[first]
+    width_mm, height_mm = deposited.sizes[deposited.size[first]].T
+    told = width_mm * height_mm * lengths_of(deposited.segments(first))
     lean = float(np.quantile(mm3 / np.maximum(told, 1e-9), LEAN))
     beyond = np.maximum(mm3 - RICH * lean * told, 0.0).cumsum()
     return np.diff(np.minimum(beyond, spare_mm3), prepend=0.0)
@@ -178,9 +179,9 @@ def _filament_mm2(profile: Profile) -> float:
 
 def _bars(program: ParsedProgram, deposited: Beads, which: Indices, turn: Floats, profile: Profile) -> Bars:
     """Some beads as bars in a turned frame, as wide as their plastic makes them at their height."""
-    begin, end = (deposited.segments_mm[which, side] @ turn.T for side in (0, 1))
-    height, length = deposited.height_mm[which], np.maximum(deposited.length_mm[which], 1e-9)
-    rows = deposited.rows[which]
+    segments, rows = deposited.segments(which), deposited.rows[which]
+    begin, end = (segments[:, side] @ turn.T for side in (0, 1))
+    height, length = deposited.sizes[deposited.size[which], 1], np.maximum(lengths_of(segments), 1e-9)
     mm3 = program.e_mm[rows] * _filament_mm2(profile)
     return Bars(begin, end, _printing_directions(program, rows, profile) @ turn.T, 0.5 * mm3 / length / height, height)
 

@@ -11,7 +11,6 @@ from machine.dryrun.conformity.filling import filled_share
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.placement import unsupported_mm
-from machine.dryrun.strokes import beads_of
 from mdp.mesh import Mesh
 from profiles.profile import Profile
 from slicer.sectioning import reach_mm
@@ -44,9 +43,8 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, Dry
     """
     share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm + reach_mm(profile.process))
     filled = filled_share(run, mesh, profile).share
-    deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
     assert run.contacts is not None
-    length, loose, reported = unsupported_mm(run.program, deposited, run.contacts)
+    length, loose, reported = unsupported_mm(run.program, run.deposited, run.contacts)
     whole = max(length, 1e-9)
     moved = registration.shifts(run, mesh, profile)
     farthest = max((shift.size_mm for shift in moved), default=0.0)

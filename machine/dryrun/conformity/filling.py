@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from machine.dryrun.conformity.deposit import AROUND, inside
 from machine.dryrun.dryrun import DryRun
-from machine.dryrun.strokes import beads_of
 from machine.reader.parsed import pose_runs
 from mdp.kernels.arrays import flags, floats, longs
 from mdp.kernels.kernel import kernel, no_nrt
@@ -43,9 +42,8 @@ def filled_share(run: DryRun, mesh: Mesh, profile: Profile, points: int = POINTS
     """How much of the closed model, in the workpiece frame, the beads of its own fill (support and skirt aside)."""
     places = lattice(mesh, points)
     own = np.array([name not in AROUND for name in run.segment_type], dtype=np.bool_)
-    deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
     ups = printing_directions(run, profile)
-    hit = in_beads(places, run.segments_mm[own], ups[own], deposited.width_mm[own], deposited.height_mm[own])
+    hit = in_beads(places, run.segments_mm[own], ups[own], run.deposited.width_mm[own], run.deposited.height_mm[own])
     return Fill(int(hit.sum()), len(places))
 
 

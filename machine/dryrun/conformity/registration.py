@@ -16,7 +16,6 @@ from machine.dryrun.conformity.deposit import nearest_faces, signed
 from machine.dryrun.conformity.filling import printing_directions
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row
-from machine.dryrun.strokes import beads_of
 from mdp.mesh import Floats, Mesh
 from profiles.profile import Profile
 from slicer.paths import Kind
@@ -49,15 +48,14 @@ class Shift:
 def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
     """The shift of every part with enough outer walls against the closed model in the workpiece frame."""
     outer = run.program.rows_of_types(*WALLS)[run.segment_row]
-    deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
-    walls = np.flatnonzero(outer & (deposited.length_mm > LEAST_MM))
+    walls = np.flatnonzero(outer & (run.deposited.length_mm > LEAST_MM))
     part = run.program.part[run.segment_row]
     chosen = [_evenly(walls[part[walls] == index]) for index in np.unique(part[walls])]
     if not chosen:
         return []
     pieces = np.concatenate(chosen)
     ups = printing_directions(run, profile)[pieces]
-    width, height = deposited.width_mm[pieces], deposited.height_mm[pieces]
+    width, height = run.deposited.width_mm[pieces], run.deposited.height_mm[pieces]
     points = run.segments_mm[pieces].mean(axis=1) - 0.5 * height[:, None] * ups
     distance, face = nearest_faces(points, mesh, NEAR_MM)
     normals = mesh.normals[face]

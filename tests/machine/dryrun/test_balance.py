@@ -9,7 +9,6 @@ from machine.dryrun.balance.columns import NOTHING, Bars, inside_loops, laid, la
 from machine.dryrun.balance.interfaces import Interface, interfaces, wall_edges
 from machine.dryrun.balance.layers import PartBalance, layer_balances
 from machine.dryrun.dryrun import dry_run, summary
-from machine.dryrun.strokes import beads_of
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import Lines, layers, on, word
 
@@ -23,13 +22,13 @@ def bar(begin: tuple[float, ...], end: tuple[float, ...], up: tuple[float, ...],
 def faces(lines: Lines, machine: str = "generic_ac") -> list[Interface]:
     profile, _, _ = bent(machine)
     run = dry_run(lines, profile, known=())
-    return list(interfaces(run.program, beads_of(run.program, run.segments_mm, run.segment_row, profile), profile))
+    return list(interfaces(run.program, run.deposited, profile))
 
 
 def balances(lines: Lines) -> list[PartBalance]:
     profile, _, _ = bent("generic_ac")
     run = dry_run(lines, profile, known=())
-    return list(layer_balances(run.program, beads_of(run.program, run.segments_mm, run.segment_row, profile), profile))
+    return list(layer_balances(run.program, run.deposited, profile))
 
 
 def richer(part: int, layer: int, factor: float) -> Lines:
