@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, by_part
 from machine.dryrun.strokes import Beads
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind
@@ -34,7 +34,8 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     """Errors of code extrusion and extruding-travel; a warning of code extrusion where the file tells no widths."""
     if not len(deposited.rows):
         return
-    sized = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
+    told = program.remarks
+    sized = ((told.width_mm > 0) & (told.height_mm > 0))[program.remark[deposited.rows]]
     uneven = program.rows_of_types(*UNEVEN)[deposited.rows] | _fills_grooves(program, deposited.rows, profile)
     counted = ~uneven & ~_climbs(program, deposited)
     length = deposited.length_mm
@@ -46,7 +47,7 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
         if not len(rows):
             continue
         pushed = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0
-        long = length[mine]
+        long = length if len(mine) == len(length) else length[mine]
         del mine
         needed = long * (_area(program, rows, profile) if known else 1.0)
         if known:
@@ -58,11 +59,15 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
 def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
     """(m,) which beads are of a layer that climbs, as a vase does: its first and last turns get less and less plastic."""
     rows = deposited.rows
-    group = program.layer_keys(rows)
-    low, high = np.full(int(group.max()) + 1, np.inf), np.full(int(group.max()) + 1, -np.inf)
-    np.minimum.at(low, group, program.end[rows, 2])
-    np.maximum.at(high, group, program.end[rows, 2])
-    climbs: NDArray[np.bool_] = (high - low)[group] > CLIMBING * deposited.height_mm
+    low, high = np.full((2, program.layer_key_count), [[np.inf], [-np.inf]])
+    for some in pieces(len(rows)):
+        group, z_mm = program.layer_keys(rows[some]), program.end[rows[some], 2]
+        np.minimum.at(low, group, z_mm)
+        np.maximum.at(high, group, z_mm)
+    climbs = np.empty(len(rows), dtype=np.bool_)
+    for some in pieces(len(rows)):
+        climbed = (high - low)[program.layer_keys(rows[some])]
+        climbs[some] = climbed > CLIMBING * deposited.sizes[deposited.size[some], 1]
     return climbs
 
 
@@ -127,12 +132,16 @@ def _layers(
     """
     pushed, needed, length = plastic
     severity: Severity = "error" if most == LAYER_MOST else "warning"
-    usual = np.ones(len(rows))
-    for kind in np.unique(program.type[rows]):
-        mine = program.type[rows] == kind
-        usual[mine] = _weighted_median(pushed[mine] / needed[mine], needed[mine])
+    type_of, usual = program.type[rows], np.ones(len(program.types))
+    for kind in range(len(usual)):
+        if len(mine := np.flatnonzero(type_of == kind)):
+            usual[kind] = _weighted_median(pushed[mine] / needed[mine], needed[mine])
     group = program.layer_keys(rows)
-    got, due, long = (np.bincount(group, weights=values) for values in (pushed, needed * usual, length))
+    got, due, long = np.zeros((3, program.layer_key_count))
+    for some in pieces(len(rows)):
+        np.add.at(got, group[some], pushed[some])
+        np.add.at(due, group[some], needed[some] * usual[type_of[some]])
+        np.add.at(long, group[some], length[some])
     share = got / np.maximum(due, 1e-12)
     bad = np.flatnonzero((long > LAYER_MM) & (np.abs(got - due) > spare) & ((share > most) | (share < 1.0 / most)))
     for mine in by_part(program, np.flatnonzero(np.isin(group, bad)), rows):

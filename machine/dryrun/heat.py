@@ -122,13 +122,17 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Findin
     beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
     if not beads.any():
         return
-    fan = fan_shares(program, profile.machine)
-    layer = program.layer_keys()
-    length = program.way_mm
-    seconds = np.bincount(layer[beads], weights=(length / np.maximum(program.feed, 1e-9))[beads] * 60.0)
-    blown = np.bincount(layer[beads], weights=(length * (fan > 0.0))[beads])
-    at, first = np.unique(layer[beads], return_index=True)
-    rows = np.flatnonzero(beads)[first]
+    blows = fan_shares(program, profile.machine) > 0.0
+    seconds, blown = np.zeros((2, program.layer_key_count))
+    first = np.full(len(seconds), len(beads))
+    for some in pieces(len(beads)):
+        mine = some.start + np.flatnonzero(beads[some])
+        layer, length = program.layer_keys(mine), np.linalg.norm(program.end[mine, :3] - program.start[mine, :3], axis=1)
+        np.add.at(seconds, layer, length / np.maximum(program.feed[mine], 1e-9) * 60.0)
+        np.add.at(blown, layer, length * blows[mine])
+        np.minimum.at(first, layer, mine)
+    at = np.flatnonzero(first < len(beads))
+    rows = first[at]
     part = program.part[rows]
     _, begins, which = np.unique(part, return_index=True, return_inverse=True)
     begun = begins[which]

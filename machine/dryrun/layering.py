@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
-from machine.dryrun.strokes import Beads
+from machine.dryrun.strokes import Beads, lengths_of
 from machine.reader.parsed import Indices32, ParsedProgram, pieces
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
@@ -45,7 +45,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     """
     sized = (program.remarks.height_mm > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
     which = np.flatnonzero(sized[deposited.rows])
-    rows, length_mm = deposited.rows[which], deposited.length_mm[which]
+    rows = deposited.rows[which]
     ends = np.flatnonzero((np.diff(program.part[rows]) != 0) | program.turned_between(rows)) + 1
     support, loose = program.rows_of_types(*SUPPORT), program.rows_of_types(*LOOSE)
     problems, seen = [], set()
@@ -57,7 +57,9 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         layer, height_mm = program.layer[mine], program.height_mm[mine]
         gap = _gaps(program.start, program.end, mine, layer, height_mm, support[mine])
         in_air = ((contacts.air_mm[mine] + contacts.beside_mm[mine]) > 0.0) & ~loose[mine]
-        laid_mm = np.bincount(layer, weights=length_mm[begin:end])
+        laid_mm = np.zeros(int(layer.max()) + 1)
+        for some in pieces(end - begin):
+            np.add.at(laid_mm, layer[some], lengths_of(deposited.segments(which[begin + some.start : begin + some.stop])))
         hangs = (gap < SEEN_SHARE * height_mm) | in_air
         high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * height_mm)) & (laid_mm > CRUMB_MM)[layer] & hangs)
         if len(high):
@@ -96,11 +98,12 @@ def _gaps(start: Floats, end: Floats, rows: Indices, layers: Indices32, height_m
 
 
 def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(m,) which beads are of their part's first layer, of which another finding tells."""
-    parts, part = np.unique(program.part[rows], return_inverse=True)
-    first = np.full(len(parts), np.iinfo(np.int64).max)
-    np.minimum.at(first, part, program.layer[rows])
-    begins: NDArray[np.bool_] = program.layer[rows] == first[part]
+    """(k,) which remarks are of the first layer that their part lays beads in, of which another finding tells."""
+    (part, layer), laid = program.remarks[:2], np.zeros(len(program.remarks.part), dtype=np.bool_)
+    laid[program.remark[rows]] = True
+    first = np.full(int(part.max(initial=0)) + 1, np.iinfo(np.int64).max)
+    np.minimum.at(first, part[laid], layer[laid])
+    begins: NDArray[np.bool_] = layer == first[part]
     return begins
 
 
@@ -109,18 +112,21 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
 
     What spans the cells of sparse infill is a bridge, however much of a layer that is (machine.dryrun.replay).
     """
-    rows = deposited.rows
-    low, height_mm = np.empty(len(rows), np.bool_), deposited.sizes[:, 1]
-    for some in pieces(len(rows)):
-        low[some] = deposited.segments(some)[:, :, 2].min(axis=1) - height_mm[deposited.size[some]] < ON_PLATE_MM
-    counted = ~program.rows_of_types(*LOOSE)[rows] & ~low & ~_begins(program, rows)
-    rows, length = rows[counted], deposited.length_mm[counted]
-    group = program.layer_keys(rows)
-    loose = np.bincount(group, weights=contacts.air_mm[rows] + contacts.beside_mm[rows])
-    air = np.bincount(group, weights=contacts.air_mm[rows])
-    whole = np.bincount(group, weights=length)
+    counted = ~program.rows_of_types(*LOOSE)[deposited.rows] & ~_begins(program, deposited.rows)[program.remark[deposited.rows]]
+    loose, air, whole = np.zeros((3, program.layer_key_count))
+    for some in pieces(len(counted)):
+        segments, height_mm, rows = deposited.segments(some), deposited.sizes[deposited.size[some], 1], deposited.rows[some]
+        counted[some] &= segments[:, :, 2].min(axis=1) - height_mm >= ON_PLATE_MM
+        mine = counted[some]
+        group, air_mm = program.layer_keys(rows[mine]), contacts.air_mm[rows[mine]]
+        np.add.at(loose, group, air_mm + contacts.beside_mm[rows[mine]])
+        np.add.at(air, group, air_mm)
+        np.add.at(whole, group, lengths_of(segments[mine]))
     bad = np.flatnonzero((loose > FLOATING_SHARE * whole) & (whole > LEAST_MM) & (air > 0.0))
-    for mine in by_part(program, rows[np.isin(group, bad)]):
+    if not len(bad):
+        return
+    rows = deposited.rows[counted]
+    for mine in by_part(program, rows[np.isin(program.layer_keys(rows), bad)]):
         layer = program.layer_keys(mine).min()
         row = int(mine[np.argmax(program.layer_keys(mine) == layer)])
         message = (

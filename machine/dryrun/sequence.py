@@ -63,8 +63,9 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterato
     pushing = program.kind[rows] == MoveKind.EXTRUDE
     # What is done between two beads must come to nothing, or to the extra push after it.
     run = np.cumsum(pushing, dtype=np.int32)
-    balance = np.bincount(run, weights=np.where(pushing, 0.0, -e[rows]))
-    stood = np.bincount(run, weights=~pushing) > 0
+    still = np.flatnonzero(~pushing)
+    balance = np.bincount(run[still], weights=-e[rows[still]], minlength=int(run[-1]) + 1)
+    stood = np.bincount(run[still], minlength=len(balance)) > 0
     begins = np.searchsorted(run, np.arange(len(balance) + 1, dtype=np.int32)).clip(max=len(run) - 1)
     turned = np.diff(np.searchsorted(np.flatnonzero(program.kind == MoveKind.ROTATE), rows[begins], side="right")) > 0
     extra = np.where(turned, max(material.prime_extra_mm, material.retract_prime_extra_mm), material.retract_prime_extra_mm)
@@ -85,10 +86,11 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterato
 
 def _far_pulled(program: ParsedProgram) -> Iterator[Finding]:
     """In every part the first place between two beads where more filament is pulled back than a hot end holds."""
-    beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
+    is_bead = (program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0)
+    beads = np.flatnonzero(is_bead)
     if len(beads) < 2:
         return
-    rows, filament_mm = np.setdiff1d(np.arange(beads[0], beads[-1]), beads, assume_unique=True), program.filament_mm
+    rows, filament_mm = beads[0] + np.flatnonzero(~is_bead[beads[0] : beads[-1]]), program.filament_mm
     pulled = filament_mm[beads[np.searchsorted(beads, rows) - 1]] - filament_mm[rows]  # since the bead before each row
     far = np.flatnonzero(pulled > MOST_PULLED_MM)
     for mine in by_part(program, far, rows):

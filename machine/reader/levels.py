@@ -29,6 +29,5 @@ def fan_shares(program: ParsedProgram, machine: Machine) -> Floats:
 
 
 def _levels(program: ParsedProgram, set_by: Sequence[tuple[Event, float]]) -> Floats:
-    rows, values = [event.row for event, _ in set_by], np.array([0.0, *(value for _, value in set_by)])
-    levels: Floats = values[np.searchsorted(rows, np.arange(len(program.line)), side="right")]
-    return levels
+    rows, values = [event.row for event, _ in set_by], [0.0, *(value for _, value in set_by)]
+    return np.repeat(values, np.diff([0, *rows, len(program.line)]))

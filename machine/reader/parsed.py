@@ -154,9 +154,19 @@ class ParsedProgram:
 
     def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
         """(m,) a number for the layer of each row, another in each part."""
-        part, layer = self.remarks.part.astype(np.int64), self.remarks.layer
-        keys: NDArray[np.int64] = (part * (int(layer.max(initial=0)) + 1) + layer)[self.remark[rows]]
+        keys: NDArray[np.int64] = self._remark_keys[self.remark[rows]]
         return keys
+
+    @property
+    def layer_key_count(self) -> int:
+        """All layer_keys are below it."""
+        return int(self._remark_keys.max(initial=-1)) + 1
+
+    @cached_property
+    def _remark_keys(self) -> NDArray[np.int64]:
+        """(k,) the layer_keys of remarks."""
+        layer = self.remarks.layer
+        return self.remarks.part.astype(np.int64) * (int(layer.max(initial=0)) + 1) + layer
 
     def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
         """(n,) which rows belong to these ;TYPE: names."""
