@@ -43,9 +43,9 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
         mine = np.flatnonzero(counted & (sized == known) & (length > 0))
-        rows = deposited.rows[mine]
-        if not len(rows):
+        if not len(mine):
             continue
+        rows = deposited.rows[mine]
         pushed = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0
         long = length if len(mine) == len(length) else length[mine]
         del mine
@@ -136,14 +136,17 @@ def _layers(
     for kind in range(len(usual)):
         if len(mine := np.flatnonzero(type_of == kind)):
             usual[kind] = _weighted_median(pushed[mine] / needed[mine], needed[mine])
-    group = program.layer_keys(rows)
     got, due, long = np.zeros((3, program.layer_key_count))
     for some in pieces(len(rows)):
-        np.add.at(got, group[some], pushed[some])
-        np.add.at(due, group[some], needed[some] * usual[type_of[some]])
-        np.add.at(long, group[some], length[some])
+        group = program.layer_keys(rows[some])
+        np.add.at(got, group, pushed[some])
+        np.add.at(due, group, needed[some] * usual[type_of[some]])
+        np.add.at(long, group, length[some])
     share = got / np.maximum(due, 1e-12)
     bad = np.flatnonzero((long > LAYER_MM) & (np.abs(got - due) > spare) & ((share > most) | (share < 1.0 / most)))
+    if not len(bad):
+        return
+    group = program.layer_keys(rows)
     for mine in by_part(program, np.flatnonzero(np.isin(group, bad)), rows):
         layers = np.unique(group[mine])
         row = int(rows[mine[np.argmax(group[mine] == layers[0])]])

@@ -53,13 +53,13 @@ def _digest(lines: Sequence[str]) -> str:
 
 def at_row(program: ParsedProgram, row: int, severity: Severity, code: str, message: str) -> Finding:
     """A finding about row `row`."""
-    return Finding(severity, code, int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
+    return Finding(severity, code, int(program.line[row]), *program.part_and_layer(row), message)
 
 
 def at_event(program: ParsedProgram, event: Event, severity: Severity, code: str, message: str) -> Finding:
     """A finding about an event, which belongs to the layer of the row before it."""
-    last = min(max(event.row - 1, 0), len(program.line) - 1)
-    part, layer = (int(program.part[last]), int(program.layer[last])) if len(program.line) and event.row > 0 else (0, 0)
+    last = min(event.row, len(program.line)) - 1
+    part, layer = program.part_and_layer(last) if last >= 0 else (0, 0)
     return Finding(severity, code, event.line, part, layer, message)
 
 
@@ -67,7 +67,7 @@ def by_part(
     program: ParsedProgram, places: NDArray[np.int64], rows: NDArray[np.int64] | None = None
 ) -> Iterator[NDArray[np.int64]]:
     """For every part its own of (m,) places, which are rows themselves or places in rows."""
-    part = program.part[places if rows is None else rows[places]]
+    part = program.remarks.part[program.remark[places if rows is None else rows[places]]]
     for index in np.unique(part):
         yield places[part == index]
 

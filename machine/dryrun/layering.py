@@ -46,15 +46,20 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     sized = (program.remarks.height_mm > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
     which = np.flatnonzero(sized[deposited.rows])
     rows = deposited.rows[which]
-    ends = np.flatnonzero((np.diff(program.part[rows]) != 0) | program.turned_between(rows)) + 1
+    part_of, ends = program.remarks.part, []
+    for some in pieces(len(rows) - 1):
+        mine = rows[some.start : some.stop + 1]
+        begins = (np.diff(part_of[program.remark[mine]]) != 0) | program.turned_between(mine)
+        ends += (some.start + 1 + np.flatnonzero(begins)).tolist()
     support, loose = program.rows_of_types(*SUPPORT), program.rows_of_types(*LOOSE)
     problems, seen = [], set()
-    for begin, end in pairwise([0, *ends.tolist(), len(rows)]):
+    for begin, end in pairwise([0, *ends, len(rows)]):
         mine = rows[begin:end]
-        part = int(program.part[mine[0]]) if len(mine) else 0
+        part = program.part_and_layer(mine[0])[0] if len(mine) else 0
         if not len(mine) or part in seen:
             continue
-        layer, height_mm = program.layer[mine], program.height_mm[mine]
+        told = program.remark[mine]
+        layer, height_mm = program.remarks.layer[told], program.remarks.height_mm[told]
         gap = _gaps(program.start, program.end, mine, layer, height_mm, support[mine])
         in_air = ((contacts.air_mm[mine] + contacts.beside_mm[mine]) > 0.0) & ~loose[mine]
         laid_mm = np.zeros(int(layer.max()) + 1)

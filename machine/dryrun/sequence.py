@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_row, by_part
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -38,12 +38,16 @@ def _parts(program: ParsedProgram) -> list[Finding]:
 def _layers(program: ParsedProgram) -> Iterator[Finding]:
     """In every part the first layer that lies lower than the one before it."""
     rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value))
-    z, height = program.end[rows, 2], program.height_mm[rows]
-    same = (np.diff(program.part[rows]) == 0) & ~program.turned_between(rows)
-    lower = np.flatnonzero(same & (np.diff(program.layer[rows]) != 0) & (np.diff(z) < -0.25 * height[1:] - SLACK_MM))
-    for mine in by_part(program, lower + 1, rows):
+    (part, layer), height_mm, lower = program.remarks[:2], program.remarks.height_mm, [np.zeros(0, dtype=np.int64)]
+    for some in pieces(len(rows) - 1):
+        mine = rows[some.start : some.stop + 1]
+        told, z_mm = program.remark[mine], program.end[mine, 2]
+        other_layer = (np.diff(part[told]) == 0) & (np.diff(layer[told]) != 0) & ~program.turned_between(mine)
+        lower.append(some.start + np.flatnonzero(other_layer & (np.diff(z_mm) < -0.25 * height_mm[told[1:]] - SLACK_MM)))
+    for mine in by_part(program, np.concatenate(lower) + 1, rows):
         k = int(mine[0]) - 1
-        message = f"layer {program.layer[rows[k + 1]]} lies {z[k] - z[k + 1]:.2f} mm lower than the layer before it"
+        fall_mm = program.end[rows[k], 2] - program.end[rows[k + 1], 2]
+        message = f"layer {program.layer[rows[k + 1]]} lies {fall_mm:.2f} mm lower than the layer before it"
         yield at_row(program, int(rows[k + 1]), "error", "order", message)
 
 
@@ -64,22 +68,20 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterato
     # What is done between two beads must come to nothing, or to the extra push after it.
     run = np.cumsum(pushing, dtype=np.int32)
     still = np.flatnonzero(~pushing)
-    balance = np.bincount(run[still], weights=-e[rows[still]], minlength=int(run[-1]) + 1)
-    stood = np.bincount(run[still], minlength=len(balance)) > 0
-    begins = np.searchsorted(run, np.arange(len(balance) + 1, dtype=np.int32)).clip(max=len(run) - 1)
-    turned = np.diff(np.searchsorted(np.flatnonzero(program.kind == MoveKind.ROTATE), rows[begins], side="right")) > 0
+    runs, which = np.unique(run[still], return_inverse=True)
+    balance = np.bincount(which, weights=-e[rows[still]])
+    ends = np.stack([np.searchsorted(run, runs), np.searchsorted(run, runs, side="right").clip(max=len(run) - 1)])
+    turned = np.diff(np.searchsorted(np.flatnonzero(program.kind == MoveKind.ROTATE), rows[ends], side="right"), axis=0)[0] > 0
     extra = np.where(turned, max(material.prime_extra_mm, material.retract_prime_extra_mm), material.retract_prime_extra_mm)
-    inner = np.arange(len(balance))
-    over = stood & (balance < -extra - SLACK_MM) & (inner > 0)
-    under = stood & (balance > SLACK_MM) & (inner < run[-1])
+    over = (balance < -extra - SLACK_MM) & (runs > 0)
+    under = (balance > SLACK_MM) & (runs < run[-1])
     for wrong, sentence, next_bead in (
         (over, "{:.3f} mm more filament is pushed than was pulled back", 0),
         (under, "{:.3f} mm of filament stay pulled back", 1),
     ):
-        runs = np.flatnonzero(wrong)
-        places = rows[np.searchsorted(run, runs, side="right") - 1 + next_bead]
+        places = rows[np.searchsorted(run, runs[wrong], side="right") - 1 + next_bead]
         for mine in by_part(program, np.arange(len(places)), places):
-            worst = float(np.abs(balance[runs[mine]]).max())
+            worst = float(np.abs(balance[wrong][mine]).max())
             message = f"{sentence.format(worst)} before the next bead (places: {len(mine)})"
             yield at_row(program, int(places[mine[0]]), "error", "retraction", message)
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -90,15 +91,20 @@ class ParsedProgram:
     announced: int
     part_totals: tuple[PartTotals, ...]
 
-    @cached_property
+    @property
     def part(self) -> Indices32:
         """(n,) from ;PART: comments, 0 before the first."""
         return self.remarks.part[self.remark]
 
-    @cached_property
+    @property
     def layer(self) -> Indices32:
         """(n,) from ;LAYER_CHANGE comments, counted in each part, 0 before the first."""
         return self.remarks.layer[self.remark]
+
+    def part_and_layer(self, row: int) -> tuple[int, int]:
+        """Of one row."""
+        remark = self.remark[row]
+        return int(self.remarks.part[remark]), int(self.remarks.layer[remark])
 
     @property
     def type(self) -> Indices32:
@@ -187,12 +193,17 @@ class PoseRun:
     pose: Pose
 
 
-def pose_runs(program: ParsedProgram) -> list[PoseRun]:
+def pose_runs(program: ParsedProgram) -> Iterator[PoseRun]:
     """The straight moves between turns of the table."""
-    turned = np.any(np.diff(program.end[:, 3:], axis=0, prepend=program.start[:1, 3:]) != 0, axis=1)
-    runs = []
-    for rows in np.split(np.arange(len(turned)), np.flatnonzero(turned)):
-        straight = rows[program.kind[rows] != MoveKind.ROTATE]
-        if len(straight):
-            runs.append(PoseRun(straight, Pose(*(float(v) for v in program.end[straight[0], 3:]))))
-    return runs
+    turns = [np.zeros(1, dtype=np.int64)]
+    for some in pieces(len(program.line)):
+        before = (
+            program.end[max(some.start - 1, 0) : some.stop - 1, 3:]
+            if some.start
+            else np.vstack([program.start[:1, 3:], program.end[: some.stop - 1, 3:]])
+        )
+        turns.append(some.start + np.flatnonzero((program.end[some, 3:] != before).any(axis=1)))
+    for begin, end in pairwise([*np.concatenate(turns).tolist(), len(program.line)]):
+        rows = begin + np.flatnonzero(program.kind[begin:end] != MoveKind.ROTATE)
+        if len(rows):
+            yield PoseRun(rows, Pose(*(float(v) for v in program.end[rows[0], 3:])))
