@@ -40,16 +40,21 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     counted = ~uneven & ~_climbs(program, deposited)
     length = deposited.length_mm
     yield from _fast(program, deposited.rows, length)
+    counted &= length > 0
+    del length
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
-        mine = np.flatnonzero(counted & (sized == known) & (length > 0))
+        mine = np.flatnonzero(counted & (sized == known))
         if not len(mine):
             continue
-        rows = deposited.rows[mine]
-        pushed = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0
-        long = length if len(mine) == len(length) else length[mine]
+        rows, long = deposited.rows[mine], deposited.lengths(mine)
         del mine
-        needed = long * (_area(program, rows, profile) if known else 1.0)
+        pushed = program.e_mm[rows]
+        pushed *= pi
+        pushed *= profile.material.diameter_mm**2
+        pushed /= 4.0
+        needed = _area(program, rows, profile) if known else np.ones(len(rows))
+        needed *= long
         if known:
             whole_file = _whole_file(program, rows, (pushed, needed), profile)
             yield from whole_file or _odd(program, rows, long, pushed / needed)
@@ -85,7 +90,7 @@ def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> 
     told = program.remarks
     width, height = told.width_mm, told.height_mm
     area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
-    on_plate = (told.layer == program.layer[rows].min()) & (told.part <= 1)
+    on_plate = (told.layer == told.layer[program.remark[rows]].min()) & (told.part <= 1)
     factor = np.where(on_plate, profile.process.first_layer_flow, 1.0)
     for part in np.unique(told.part[told.part > 1]):
         on_part = (told.part == part) & (told.layer == 1)

@@ -62,9 +62,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         layer, height_mm = program.remarks.layer[told], program.remarks.height_mm[told]
         gap = _gaps(program.start, program.end, mine, layer, height_mm, support[mine])
         in_air = ((contacts.air_mm[mine] + contacts.beside_mm[mine]) > 0.0) & ~loose[mine]
-        laid_mm = np.zeros(int(layer.max()) + 1)
-        for some in pieces(end - begin):
-            np.add.at(laid_mm, layer[some], lengths_of(deposited.segments(which[begin + some.start : begin + some.stop])))
+        laid_mm = np.bincount(layer, weights=deposited.lengths(which[begin:end]))
         hangs = (gap < SEEN_SHARE * height_mm) | in_air
         high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * height_mm)) & (laid_mm > CRUMB_MM)[layer] & hangs)
         if len(high):

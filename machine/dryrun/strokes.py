@@ -60,9 +60,13 @@ class Beads:
     @property
     def length_mm(self) -> Floats:
         """(m,)."""
-        length_mm = np.empty(len(self.rows))
-        for some in pieces(len(length_mm)):
-            length_mm[some] = lengths_of(self.segments(some))
+        return self.lengths(np.arange(len(self.rows)))
+
+    def lengths(self, which: Indices) -> Floats:
+        """(k,) lengths of some beads, mm."""
+        length_mm = np.empty(len(which))
+        for some in pieces(len(which)):
+            length_mm[some] = lengths_of(self.segments(which[some]))
         return length_mm
 
 
