@@ -10,9 +10,9 @@ from machine.dryrun.findings import MOST, Finding, at_row, cut_short
 from machine.dryrun.strokes import Beads
 from machine.kinematics.collision import Printed, Reach, gaps_of, hull, refined_gap, solids, sweep_gaps, swept, swing_mm
 from machine.planning.limits import axis_limits
-from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pieces, pose_runs
+from machine.reader.parsed import MoveKind, ParsedProgram, pieces, pose_runs
 from mdp.head import Body, bodies, directions
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
 from slicer.paths import Kind
@@ -35,14 +35,14 @@ def findings(program: ParsedProgram, deposited: Beads, machine: Machine) -> list
 
 
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    """Moves with the table at rest, one group for every pose_run between turns: two directions settle almost every move."""
+    """Moves with the table at rest, one group for every pose between turns: two directions settle almost every move."""
     problems: list[Finding] = []
     tried = ~_rises_from_home(program)
-    for pose_run in pose_runs(program):
+    for rows, pose in pose_runs(program):
         if len(problems) >= MOST:
-            return [*problems, cut_short(program, int(pose_run.rows[0]), "straight moves")]
-        for body, solid, rows in _close(program, PoseRun(pose_run.rows[tried[pose_run.rows]], pose_run.pose), machine):
-            problems += _body(program, PoseRun(rows, pose_run.pose), body, solid, machine)
+            return [*problems, cut_short(program, int(rows[0]), "straight moves")]
+        for body, solid, close in _close(program, rows[tried[rows]], pose, machine):
+            problems += _body(program, close, pose, body, solid, machine)
     return problems
 
 
@@ -58,13 +58,13 @@ def _rises_from_home(program: ParsedProgram) -> NDArray[np.bool_]:
     return rises
 
 
-def _close(program: ParsedProgram, run: PoseRun, machine: Machine) -> Iterator[tuple[Body, Solid, NDArray[np.int64]]]:
+def _close(program: ParsedProgram, run: Indices, pose: Pose, machine: Machine) -> Iterator[tuple[Body, Solid, Indices]]:
     """The bodies and the solids that two directions do not part in one pose, and during which moves."""
-    tried = np.array([rotation(machine, run.pose) @ UP, UP])
-    meetings = [(body, solid, solid[1](tried)) for solid in solids(machine, run.pose) for body in bodies(machine)]
+    tried = np.array([rotation(machine, pose) @ UP, UP])
+    meetings = [(body, solid, solid[1](tried)) for solid in solids(machine, pose) for body in bodies(machine)]
     close: list[list[NDArray[np.int64]]] = [[] for _ in meetings]
-    for some in pieces(len(run.rows)):
-        rows = run.rows[some]
+    for some in pieces(len(run)):
+        rows = run[some]
         least = swept(program.start[rows, :3], program.end[rows, :3], tried)
         nearest = least.min(axis=1, initial=np.inf)[:, None]
         for (body, _, reach), own in zip(meetings, close, strict=True):
@@ -75,9 +75,8 @@ def _close(program: ParsedProgram, run: PoseRun, machine: Machine) -> Iterator[t
             yield body, solid, np.concatenate(own)
 
 
-def _body(program: ParsedProgram, run: PoseRun, body: Body, solid: Solid, machine: Machine) -> list[Finding]:
+def _body(program: ParsedProgram, rows: Indices, pose: Pose, body: Body, solid: Solid, machine: Machine) -> list[Finding]:
     """One body and one solid in one pose: the moves that two directions left open, by all directions and a search."""
-    rows, pose = run.rows, run.pose
     start, end = program.start[rows, :3], program.end[rows, :3]
     need = body.need_mm - ROUNDING_MM
     normal = rotation(machine, pose) @ UP

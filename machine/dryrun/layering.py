@@ -120,11 +120,11 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
     for some in pieces(len(counted)):
         segments, height_mm, rows = deposited.segments(some), deposited.sizes[deposited.size[some], 1], deposited.rows[some]
         counted[some] &= segments[:, :, 2].min(axis=1) - height_mm >= ON_PLATE_MM
-        mine = counted[some]
-        group, air_mm = program.layer_keys(rows[mine]), contacts.air_mm[rows[mine]]
-        np.add.at(loose, group, air_mm + contacts.beside_mm[rows[mine]])
+        rows = rows[counted[some]]
+        group, air_mm = program.layer_keys(rows), contacts.air_mm[rows]
+        np.add.at(loose, group, air_mm + contacts.beside_mm[rows])
         np.add.at(air, group, air_mm)
-        np.add.at(whole, group, lengths_of(segments[mine]))
+        np.add.at(whole, group, lengths_of(segments[counted[some]]))
     bad = np.flatnonzero((loose > FLOATING_SHARE * whole) & (whole > LEAST_MM) & (air > 0.0))
     if not len(bad):
         return

@@ -74,16 +74,16 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     ups, turned = np.zeros((0, 3)), 0
     process = profile.process
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
-    for run in pose_runs(program):
-        before, after = (int(at) for at in np.searchsorted(deposited.rows, (run.rows[0], run.rows[-1] + 1)))
-        begins, ups = [*begins, before], np.vstack([ups, rotation(machine, run.pose)[2]])
+    for rows, pose in pose_runs(program):
+        before, after = (int(at) for at in np.searchsorted(deposited.rows, (rows[0], rows[-1] + 1)))
+        begins, ups = [*begins, before], np.vstack([ups, rotation(machine, pose)[2]])
         turned += before
         if turned > MOST_TURNED:
-            return contacts._replace(untested_row=int(run.rows[0]))
+            return contacts._replace(untested_row=int(rows[0]))
         if after:
-            field = _field(deposited, (before, after), run.pose, (ups, begins), machine)
-            about = Surroundings(field, head, int(run.rows[0]), before, gap, _plate(machine, run.pose))
-            _replay_run(run.rows, moves, strokes, about, contacts, np.zeros((len(run.rows), 2)))
+            field = _field(deposited, (before, after), pose, (ups, begins), machine)
+            about = Surroundings(field, head, int(rows[0]), before, gap, _plate(machine, pose))
+            _replay_run(rows, moves, strokes, about, contacts, np.zeros((len(rows), 2)))
             del field, about  # before there is another one
     return contacts
 

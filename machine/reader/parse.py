@@ -4,17 +4,17 @@ import re
 from collections.abc import Iterable
 
 from machine.gcode.commands import PATHS
-from machine.gcode.line_text import FREE_TEXT, command_name, read_line, to_ascii
+from machine.gcode.line_text import FREE_TEXT, begins_layer, begun_part, command_name, read_line, to_ascii
 from machine.gcode.lines import Lines
 from machine.gcode.modes import COMMANDS
+from machine.gcode.settings import PART_TOTALS, read_totals
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, quote, read_words
 from machine.reader.codes import BARE_WORDS, VALUED, dispatch
 from machine.reader.macros import macro
 from machine.reader.motion import flush
-from machine.reader.parsed import ParsedProgram
+from machine.reader.parsed import ParsedProgram, Unheld
 from machine.reader.plain_moves import read_plain_moves
 from machine.reader.program import program_of
-from machine.reader.remarks import remark
 from machine.reader.state import Reader, Words, reader_of
 from profiles.errors import GcodeError
 from profiles.machine import Machine
@@ -52,18 +52,55 @@ def _line(reader: Reader, line: str) -> None:
             f"line {reader.number} is {len(line)} characters long: a G-code line has at most {LONGEST_LINE} before its comment"
         )
     if reader.ended:
-        remark(reader, line.partition(";")[2])
+        _remark(reader, line.partition(";")[2])
         return
     try:
         command, comment = read_line(line)
     except GcodeError as error:
         raise GcodeError(f"line {reader.number}: {error}") from None
     if comment:
-        remark(reader, comment)
+        _remark(reader, comment)
     if command:
         if reader.dialect.statements:
             _check_condition(reader, line, command)
         _command(reader, command)
+
+
+def _remark(reader: Reader, text: str) -> None:
+    """What a comment says, the sign taken off: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
+    text = text.strip()
+    if begins_layer(text):
+        reader.layer += 1
+        reader.layers += 1
+        return
+    if part := begun_part(text):
+        reader.part, reader.layer = part[0], 0
+        reader.parts.append(reader.part)
+        reader.announced = max(reader.announced, part[1])
+        return
+    key, colon, value = text.partition(":")
+    if not colon:
+        return
+    if key == "TYPE":
+        reader.type = reader.types.setdefault(value, len(reader.types))
+    elif key == "WIDTH":
+        reader.width = _positive(value)
+    elif key == "HEIGHT":
+        reader.height = _positive(value)
+    elif key == PART_TOTALS:
+        totals = read_totals(value, reader.number, reader.part)
+        if totals is not None:
+            reader.part_totals.append(totals)
+    elif key == "UNSUPPORTED":
+        area, _, rest = value.partition("@")
+        layer, _, reason = rest.partition(" ")
+        worst = int(layer) if re.fullmatch("[0-9]{1,6}", layer) else 0
+        reader.unsupported.append(Unheld(reader.number, reader.part, _positive(area), worst, reason))
+
+
+def _positive(text: str) -> float:
+    """The number of a comment; 0 when it is none, for a comment must not stop a print."""
+    return float(text) if re.fullmatch(r" *[0-9]{1,9}(?:\.[0-9]{1,12})? *", text) else 0.0
 
 
 def _check_condition(reader: Reader, line: str, command: str) -> None:

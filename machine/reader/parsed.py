@@ -1,6 +1,6 @@
 """Parsed: what a G-code text holds, as arrays with one row per move."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.gcode.part_totals import PartTotals
+from machine.firmware import dialect_of
+from machine.gcode.settings import PartTotals
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
+from profiles.machine import Machine
 
 AT_ONCE = 16_384  # rows
 Indices32 = NDArray[np.int32]
@@ -185,16 +187,8 @@ def pieces(count: int) -> Iterator[slice]:
     return (slice(begin, min(begin + AT_ONCE, count)) for begin in range(0, count, AT_ONCE))
 
 
-@dataclass(frozen=True, eq=False)
-class PoseRun:
-    """Consecutive rows of straight moves at one pose."""
-
-    rows: NDArray[np.int64]
-    pose: Pose
-
-
-def pose_runs(program: ParsedProgram) -> Iterator[PoseRun]:
-    """The straight moves between turns of the table."""
+def pose_runs(program: ParsedProgram) -> Iterator[tuple[Indices, Pose]]:
+    """The rows of straight moves between two turns of the table, and the pose of all of them."""
     turns = [np.zeros(1, dtype=np.int64)]
     for some in pieces(len(program.line)):
         before = (
@@ -206,4 +200,27 @@ def pose_runs(program: ParsedProgram) -> Iterator[PoseRun]:
     for begin, end in pairwise([*np.concatenate(turns).tolist(), len(program.line)]):
         rows = begin + np.flatnonzero(program.kind[begin:end] != MoveKind.ROTATE)
         if len(rows):
-            yield PoseRun(rows, Pose(*(float(v) for v in program.end[rows[0], 3:])))
+            yield rows, Pose(*program.end[rows[0], 3:].tolist())
+
+
+def temperatures(program: ParsedProgram, *codes: str) -> Floats:
+    """(n,) the target that the last of the events of these codes before each row has set, deg C; 0 before the first."""
+    return _levels(program, [(event, event.value) for event in program.events if event.code in codes])
+
+
+def fan_shares(program: ParsedProgram, machine: Machine) -> Floats:
+    """(n,) 0..1; M106 without a value means full, and full is 255 also where the firmware knows 0 to 1 as well."""
+    dialect = dialect_of(machine)
+    shares = []
+    for event in program.events:
+        if event.code == "M106":
+            value = event.value if dialect.value_word in event.letters else dialect.fan_full
+            shares.append((event, min(1.0, value / (dialect.fan_full if value <= dialect.fan_full else 255))))
+        elif event.code == "M107":
+            shares.append((event, 0.0))
+    return _levels(program, shares)
+
+
+def _levels(program: ParsedProgram, set_by: Sequence[tuple[Event, float]]) -> Floats:
+    rows, values = [event.row for event, _ in set_by], [0.0, *(value for _, value in set_by)]
+    return np.repeat(values, np.diff([0, *rows, len(program.line)]))

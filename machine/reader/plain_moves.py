@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from machine.gcode.lines import Lines
 from machine.gcode.modes import E_AXIS
-from machine.reader.state import Reader
-from machine.reader.table import REMARK_COLUMNS, Columns
+from machine.reader.state import REMARK_COLUMNS, Columns, Reader
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 
@@ -25,7 +24,7 @@ LONGEST = 200
 MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
 NONE, F = -1, 6  # what a letter stands for, besides the axes 0 to 5
 MOST_TYPES = 64  # kinds of line; slicers have about 15, a further one ends the run
-WHOLE_DIGITS, DECIMALS = 9, 12  # of a width or height, as machine.reader.remarks reads it
+WHOLE_DIGITS, DECIMALS = 9, 12  # of a width or height, as machine.reader.parse reads it
 FIRST = (b"G0", b"G1", b";", b"\n")  # of lines that may be plain
 # What the reader has, in floats: the axes, F, then what the comments said, as in a remark, and the number of layers.
 PART, LAYER, TYPE, WIDTH, HEIGHT, LAYERS, STATE = range(7, 14)

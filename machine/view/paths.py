@@ -6,8 +6,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.strokes import beads_of
-from machine.reader.levels import fan_shares, temperatures
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram, fan_shares, temperatures
 from machine.view.encoding import Column
 from machine.view.layers import Layers
 from mdp.mesh import Floats

@@ -60,9 +60,9 @@ def lattice(mesh: Mesh, points: int) -> Floats:
 def printing_directions(run: DryRun, profile: Profile) -> Floats:
     """(m, 3) printing direction of each segment, workpiece frame."""
     ups = np.zeros((len(run.segment_row), 3))
-    for pose_run in pose_runs(run.program):
-        first, last = np.searchsorted(run.segment_row, (pose_run.rows[0], pose_run.rows[-1] + 1))
-        ups[first:last] = rotation(profile.machine, pose_run.pose)[2]
+    for rows, pose in pose_runs(run.program):
+        first, last = np.searchsorted(run.segment_row, (rows[0], rows[-1] + 1))
+        ups[first:last] = rotation(profile.machine, pose)[2]
     return ups
 
 
