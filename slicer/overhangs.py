@@ -8,7 +8,8 @@ from mdp.overhang import UP, facing_down
 from mdp.support_need.need import needs_support
 from slicer.fill.bridge import LEAST, Bridge, find_bridge
 from slicer.geometry.cross_section import RIM_MM, faces_by_layer
-from slicer.geometry.polygons import Polygons, edges, islands, offset, union
+from slicer.geometry.edge_index import index_edges
+from slicer.geometry.polygons import Polygons, islands, offset, union
 from slicer.sections import Sections
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
@@ -79,10 +80,10 @@ def _sort_islands(
     places = islands(hanging)
     if all(island.area() < LEAST * width_mm**2 for island in places):
         return Overhang(need)
-    sides = edges(offset(anchors, 0.25 * width_mm))
+    held_by = index_edges(offset(anchors, 0.25 * width_mm))
     rest, bridges = [], []
     for island in places:
-        bridge = find_bridge(island, sides, width_mm)
+        bridge = find_bridge(island, held_by, width_mm)
         most_mm = longest_mm[(island ^ need).area() >= LEAST * width_mm**2]
         if bridge is not None and (most_mm == inf or bridge.carries(most_mm)):
             bridges.append(bridge)

@@ -16,7 +16,8 @@ from slicer.fill.ironing import ironed_areas, ironing_beads
 from slicer.fill.region import Region, regions
 from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_beads
 from slicer.geometry.cross_section import RIM_MM
-from slicer.geometry.polygons import Polygons, edges, islands, of_contours, offset, opening, union
+from slicer.geometry.edge_index import index_edges
+from slicer.geometry.polygons import Polygons, islands, of_contours, offset, opening, union
 from slicer.interface.cut_faces import cover, cut_walls, model_sections
 from slicer.overhangs import Overhang
 from slicer.paths import Kind
@@ -135,7 +136,7 @@ def bridges_of_layers(
         if not bare.is_empty():
             slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
             carrying = union([below if i else offset(below, RIM_MM), held, slopes])
-            anchors = edges(offset(carrying, 0.25 * process.line_width_mm))
+            anchors = index_edges(offset(carrying, 0.25 * process.line_width_mm))
             bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
     return bridges
 

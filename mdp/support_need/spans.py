@@ -1,20 +1,25 @@
-"""Spans: whether straight lines over a hanging place, all in one direction, reach from anchor to anchor and are short enough."""
+"""Spans: whether straight lines over a hanging place, all in one direction, reach from anchor to anchor and are short enough.
+
+One definition for the search, which asks so for patches of the surface, and for the slicer's bridges (slicer.fill.bridge): the
+directions that are tried, where lines cross the sides, and how much of them may be loose or too long. Each says itself how many
+directions and lines it can afford, and what holds a line: the search knows of every side of the rim whether it is an anchor, the
+slicer looks whether a line ends on the layer below.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from mdp.kernels.arrays import floats, ints
-from mdp.kernels.kernel import helper
-from mdp.kernels.sorting import argsort
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 
-TURNS = 8  # directions tried over half a turn, besides those of the place's own sides
+TURNS = 8  # directions tried over half a turn, besides those of the place's own sides: the search asks for thousands of places
 BINS = 36  # of directions of the sides, over half a turn
 BESIDE = 0.37  # of a bin: where in the first one the direction 0 lies; usual angles lie at no end of a bin
 LINES = 24  # over a place at most; else one every line width
 HOPELESS = 0.2  # share of the ends of lines that lie on no anchor, beyond which lines need not be drawn
-TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place, as for the slicer's bridges
+TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place
 ROUNDING_MM = 0.05  # a span may seem longer by this than it was drawn
 
 
@@ -30,7 +35,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
     """Whether lines of one direction span a place of that area, none longer than that; they lie a line width apart or further."""
     if longest_mm <= 0.0 or len(sides.anchored) == 0:
         return False
-    angles = _angles(sides.ends)
+    angles = directions(sides.ends, TURNS)
     for a in range(len(angles)):
         cos, sin = np.cos(angles[a]), np.sin(angles[a])
         across_mm, loose_mm = _across(sides, cos, sin)
@@ -55,8 +60,8 @@ def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
 
 
 @helper
-def _angles(ends: Floats) -> Floats:
-    """Directions worth trying, radians: along and across the two that most of the rim runs in, and others evenly."""
+def directions(ends: Floats, turns: int) -> Floats:
+    """Directions worth trying, radians: along and across the two that most of the sides run in, and others evenly."""
     length, turned = floats(BINS, 0.0), floats(BINS, 0.0)
     for e in range(len(ends)):
         x, y = ends[e, 2] - ends[e, 0], ends[e, 3] - ends[e, 1]
@@ -65,7 +70,7 @@ def _angles(ends: Floats) -> Floats:
         b = min(max(int(angle / np.pi * BINS + BESIDE), 0), BINS - 1)
         length[b] += size
         turned[b] += size * angle
-    angles = floats(TURNS + 4, 0.0)
+    angles = floats(turns + 4, 0.0)
     for own in range(2):
         b = 0
         for candidate in range(1, BINS):
@@ -74,8 +79,8 @@ def _angles(ends: Floats) -> Floats:
         angle = turned[b] / length[b] if length[b] > 0.0 else 0.1 * own
         angles[2 * own], angles[2 * own + 1] = angle + 0.5 * np.pi, angle
         length[b] = 0.0
-    for k in range(TURNS):
-        angles[4 + k] = np.pi * k / TURNS
+    for k in range(turns):
+        angles[4 + k] = np.pi * k / turns
     return angles
 
 
@@ -88,24 +93,36 @@ def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_
         y = ends[e, 1] * cos - ends[e, 0] * sin
         low, high = min(low, y), max(high, y)
     lines = max(min(int((high - low) / width_mm), LINES), 1)
-    places, anchored = floats(count, 0.0), ints(count, 0)
+    places, crossed = floats(count, 0.0), ints(count, 0)
     total, loose = 0.0, 0.0
     for k in range(lines):
         y = low + (high - low) * (((lines // 2 + k) % lines) + 0.5) / lines
-        crossed = 0
-        for e in range(count):
-            begin, end = ends[e, 1] * cos - ends[e, 0] * sin - y, ends[e, 3] * cos - ends[e, 2] * sin - y
-            if (begin < 0.0) != (end < 0.0):
-                share = begin / (begin - end)
-                x = ends[e, 0] + share * (ends[e, 2] - ends[e, 0])
-                places[crossed] = x * cos + (ends[e, 1] + share * (ends[e, 3] - ends[e, 1])) * sin
-                anchored[crossed] = sides.anchored[e]
-                crossed += 1
-        order = argsort(places[:crossed])
-        for c in range(0, crossed - 1, 2):
-            span = places[order[c + 1]] - places[order[c]]
+        for c in range(0, line_across(ends, (cos, sin), y, places, crossed) - 1, 2):
+            span = places[c + 1] - places[c]
             if span > longest_mm + ROUNDING_MM:
                 return False
             total += span
-            loose += 0.0 if anchored[order[c]] > 0 and anchored[order[c + 1]] > 0 else span
+            loose += 0.0 if sides.anchored[crossed[c]] > 0 and sides.anchored[crossed[c + 1]] > 0 else span
     return loose <= TOLERATED * total
+
+
+@no_nrt
+def line_across(ends: Floats, along: tuple[float, float], y: float, places: Floats, crossed: Ints) -> int:
+    """Fills in where, in rising order, and which sides (n, 4) a line crosses; returns how many.
+
+    along: cosine and sine of its direction; y: its height in the frame turned by it; places: along it.
+    """
+    cos, sin = along
+    many = 0
+    for e in range(len(ends)):
+        begin, end = ends[e, 1] * cos - ends[e, 0] * sin - y, ends[e, 3] * cos - ends[e, 2] * sin - y
+        if (begin < 0.0) != (end < 0.0):
+            share = begin / (begin - end)
+            x = ends[e, 0] + share * (ends[e, 2] - ends[e, 0])
+            place, at = x * cos + (ends[e, 1] + share * (ends[e, 3] - ends[e, 1])) * sin, many
+            while at > 0 and places[at - 1] > place:
+                places[at], crossed[at] = places[at - 1], crossed[at - 1]
+                at -= 1
+            places[at], crossed[at] = place, e
+            many += 1
+    return many

@@ -12,7 +12,8 @@ from mdp.kernels.arrays import flags, floats, longs
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats
-from slicer.geometry.clip import Border, Indices, Pieces
+from slicer.geometry.clip import Indices, Pieces
+from slicer.geometry.edge_index import EdgeIndex
 
 TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
 
@@ -34,7 +35,7 @@ class _BorderPoint(NamedTuple):
     way_mm: float
 
 
-def anchor_lines(pieces: Pieces, border: Border, limits: Limits, group: Indices | None = None) -> list[Floats]:
+def anchor_lines(pieces: Pieces, border: EdgeIndex, limits: Limits, group: Indices | None = None) -> list[Floats]:
     """Pieces as long lines (n, 2): joined where ends are near enough along the border, else with hooks.
 
     group: (k,) only pieces of one group are joined.
@@ -58,14 +59,11 @@ def _way(edges: Floats) -> Floats:
 
 
 @helper
-def _contours(pieces: Pieces, border: Border) -> Indices:
+def _contours(pieces: Pieces, border: EdgeIndex) -> Indices:
     """(2 k,) contour on which each end lies."""
-    of, contour = longs(len(border.edges), 0), longs(2 * len(pieces.ends), 0)
-    for c in range(len(border.offsets) - 1):
-        for e in range(border.offsets[c], border.offsets[c + 1]):
-            of[e] = c
+    contour = longs(2 * len(pieces.ends), 0)
     for end in range(len(contour)):
-        contour[end] = of[pieces.ends[end // 2, end % 2]]
+        contour[end] = border.loop[pieces.ends[end // 2, end % 2]]
     return contour
 
 
@@ -163,13 +161,12 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
 
 
 @no_nrt
-def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: Border, way: Floats) -> int:
+def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: EdgeIndex, way: Floats) -> int:
     """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
 
     Also its last point; returns the new n.
     """
-    edges, offsets = border
-    e, first, end = since.edge, offsets[since.contour], offsets[since.contour + 1]
+    edges, e, first, end = border.edges, since.edge, border.begins[since.contour], border.begins[since.contour + 1]
     left, forward = abs(length), length > 0.0
     at = since.way_mm - way[e] if forward else way[e + 1] - since.way_mm
     step = way[e + 1] - way[e]
@@ -208,11 +205,13 @@ def _reverse(out: Floats, first: int, end: int) -> None:
 
 
 @kernel
-def _lay_lines(pieces: Pieces, border: Border, group: Indices, limits: Limits, out: Floats, starts: Indices) -> tuple[int, int]:
+def _lay_lines(
+    pieces: Pieces, border: EdgeIndex, group: Indices, limits: Limits, out: Floats, starts: Indices
+) -> tuple[int, int]:
     """Fills in the lines and where each begins; returns the number of points and of lines."""
     way, contour = _way(border.edges), _contours(pieces, border)
     along_border = _ways_along_border(pieces, border.edges, way)
-    after, gap = _next_ends(along_border, contour, border.offsets, way)
+    after, gap = _next_ends(along_border, contour, border.begins, way)
     partner, sense = _join_ends(after, gap, group, limits.most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, limits))
     done = flags(len(pieces.ends))

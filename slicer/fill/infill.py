@@ -19,7 +19,8 @@ from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
 from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.pattern import Box, LinePattern, Lines, PatternLayer, clip_pattern, grid_numbers, parallel_lines
-from slicer.geometry.clip import border_of, merge_pieces
+from slicer.geometry.clip import merge_pieces
+from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
@@ -112,7 +113,7 @@ def infill_beads(area: Polygons, process: Process, *, density: float, layer: int
         lines = _concentric(inner, spacing, density)
     else:
         drawn = PatternLayer(layer, z_mm, process.infill_angle_deg, spacing, density)
-        border = border_of(inner)
+        border = index_edges(inner)
         pieces = merge_pieces([clip_pattern(border, *pattern) for pattern in PATTERNS[process.infill_pattern](drawn)])
         lines = anchor_lines(pieces, border, Limits(process.infill_anchor_mm, process.infill_joint_mm, width))
     return [Bead(Kind.INFILL, line, width, RANK) for line in lines if length_mm(line) > width]

@@ -11,7 +11,8 @@ import numpy as np
 
 from mdp.mesh import Floats
 from slicer.fill.anchor import Limits, anchor_lines
-from slicer.geometry.clip import Border, Indices, Pieces, rotation_2d
+from slicer.geometry.clip import Indices, Pieces, rotation_2d
+from slicer.geometry.edge_index import EdgeIndex
 
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
@@ -25,7 +26,7 @@ class Cells:
     before: list[set[int]]
 
 
-def monotonic_lines(pieces: Pieces, border: Border, angle_deg: float, spacing_mm: float, most_mm: float) -> list[Floats]:
+def monotonic_lines(pieces: Pieces, border: EdgeIndex, angle_deg: float, spacing_mm: float, most_mm: float) -> list[Floats]:
     """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart."""
     if not len(pieces.ends):
         return []

@@ -6,10 +6,13 @@ from math import ceil
 
 import numpy as np
 
+from mdp.kernels.arrays import flags, longs, table
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
-from slicer.geometry.clip import NO_PIECES, Border, Indices, Pieces, border_of, clip_lines, rotation_2d
+from slicer.geometry.clip import NO_PIECES, Indices, Pieces, clip_lines, rotation_2d
+from slicer.geometry.edge_index import EdgeIndex, free, index_edges
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.scanlines import join_lines, scan_lines
+from slicer.geometry.segments import Segment
 
 Box = tuple[float, float, float, float]
 Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
@@ -29,15 +32,15 @@ class PatternLayer:
     density: float
 
 
-def clip_pattern(border: Border, angle_deg: float, draw: Draw) -> Pieces:
+def clip_pattern(border: EdgeIndex, angle_deg: float, draw: Draw) -> Pieces:
     """What of a pattern, drawn in a frame turned by an angle, lies inside a border, in the border's own frame."""
     if not len(border.edges):
         return NO_PIECES
-    edges = border.turned(angle_deg)
-    x0, y0 = edges[:, :2].min(axis=0)
-    x1, y1 = edges[:, :2].max(axis=0)
-    pieces = clip_lines(*draw((x0 - MARGIN_MM, y0 - MARGIN_MM, x1 + MARGIN_MM, y1 + MARGIN_MM)), edges)
-    return Pieces(pieces.points @ rotation_2d(angle_deg).T, pieces.starts, pieces.ends)
+    turn = rotation_2d(angle_deg)
+    corners = border.edges[:, :2] @ turn
+    (x0, y0), (x1, y1) = corners.min(axis=0) - MARGIN_MM, corners.max(axis=0) + MARGIN_MM
+    points, starts = draw((x0, y0, x1, y1))
+    return clip_lines(points @ turn.T, starts, border)
 
 
 def grid_numbers(low: float, high: float, apart_mm: float) -> Floats:
@@ -50,15 +53,44 @@ def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: fl
 
     Ends of neighbouring lines nearer than reach_mm are joined unless the fence lies between them.
     """
-    sides = border_of(area).turned(angle_deg)
-    if not len(sides):
+    pieces = clip_pattern(index_edges(area), *parallel_lines(angle_deg, apart_mm))
+    if not len(pieces.ends):
         return []
-    heights = (grid_numbers(float(sides[:, 1].min()), float(sides[:, 1].max()), apart_mm) + 0.5) * apart_mm
-    rows = scan_lines(sides, heights)
-    if not len(rows):
-        return []
-    points, starts = join_lines(rows, border_of(fence).turned(angle_deg), reach_mm)
-    return np.split(points @ rotation_2d(angle_deg).T, starts[1:])
+    number = np.rint((pieces.points[::2] @ rotation_2d(angle_deg))[:, 1] / apart_mm - 0.5)
+    following = np.column_stack([np.searchsorted(number, number + 1.0, side) for side in ("left", "right")])
+    points, starts = _join(pieces.points.reshape(-1, 4), following, index_edges(fence), reach_mm)
+    return np.split(points, starts[1:])
+
+
+@kernel
+def _join(lines: Floats, following: Indices, fence: EdgeIndex, reach_mm: float) -> tuple[Floats, Indices]:
+    """Lines (n, 4) joined end to end where one of the next row begins within reach and no edge of the fence lies between.
+
+    following: (n, 2) first of the next row's lines, and first after them. Returns points (n, 2) and the start of each polyline.
+    """
+    points, starts, used = table(2 * len(lines), 2), longs(len(lines), 0), flags(len(lines))
+    n = count = 0
+    for seed in range(len(lines)):
+        if used[seed]:
+            continue
+        starts[count] = n
+        count += 1
+        at, end = seed, 2  # the column at which a line is left
+        while at >= 0:
+            used[at] = True
+            for axis in range(2):
+                points[n, axis], points[n + 1, axis] = lines[at, 2 - end + axis], lines[at, end + axis]
+            x, y = points[n + 1, 0], points[n + 1, 1]
+            n += 2
+            best, best_end, nearest = -1, 0, reach_mm
+            for k in range(following[at, 0], following[at, 1]):
+                for begin in range(0, 0 if used[k] else 4, 2):
+                    to_x, to_y = lines[k, begin], lines[k, begin + 1]
+                    distance = np.hypot(to_x - x, to_y - y)
+                    if distance < nearest and free(fence, Segment(x, y, to_x, to_y)):
+                        best, best_end, nearest = k, 2 - begin, distance
+            at, end = best, best_end
+    return points[:n], starts[:count]
 
 
 def horizontal_lines(heights: Floats, box: Box) -> Lines:

@@ -11,7 +11,7 @@ from slicer.bead import Bead, spacing_mm
 from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.monotonic import monotonic_lines
 from slicer.fill.pattern import MARGIN_MM, Box, Draw, Lines, clip_pattern, horizontal_lines
-from slicer.geometry.clip import border_of
+from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, larger, offset, opening, strips
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
@@ -69,7 +69,7 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     """The centrelines that fill a piece; inner: as far as they reach."""
     if inner.is_empty():
         return []
-    border = border_of(inner)
+    border = index_edges(inner)
     pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
     joint_mm = JOIN * solid.spacing_mm
     if solid.in_order:

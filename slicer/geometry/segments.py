@@ -1,4 +1,4 @@
-"""Segments: the predicates of plane geometry that kernels share: orientation, crossing, nearest point, even-odd rule.
+"""Segments: the predicates of plane geometry that kernels share: orientation, crossing, nearest point.
 
 A point on a line counts as its right side, and a point at the height of an edge's end as below it, for all that meet there alike:
 no crossing is counted twice or missed at a vertex.
@@ -44,22 +44,6 @@ def crossing(segment: Segment, crossed: Segment) -> float:
 
 
 @no_nrt
-def crosses_any(segment: Segment, edges: Floats) -> bool:
-    """Whether a segment crosses any of the (n, 4) edges."""
-    left, right = min(segment.x0, segment.x1), max(segment.x0, segment.x1)
-    low, high = min(segment.y0, segment.y1), max(segment.y0, segment.y1)
-    for e in range(len(edges)):
-        side = edge(edges, e)
-        if max(side.x0, side.x1) < left or min(side.x0, side.x1) > right:
-            continue
-        if max(side.y0, side.y1) < low or min(side.y0, side.y1) > high:
-            continue
-        if crossing(segment, side) >= 0.0:
-            return True
-    return False
-
-
-@no_nrt
 def clamp_projection(along: float, square: float) -> float:
     """Where (0..1) on a segment its point nearest to another one lies.
 
@@ -84,15 +68,6 @@ def squared_distance(segment: Segment, x: float, y: float) -> float:
 
 
 @no_nrt
-def squared_distance_to_any(edges: Floats, x: float, y: float) -> float:
-    """Square of the distance between a point and the nearest of (n, 4) edges; infinite without edges."""
-    least = inf
-    for e in range(len(edges)):
-        least = min(least, squared_distance(edge(edges, e), x, y))
-    return least
-
-
-@no_nrt
 def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
     """Square of the distance between a point and the segment from a to b; each three numbers."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -108,16 +83,6 @@ def level_crossing(segment: Segment, y: float) -> float:
     if (segment.y0 > y) == (segment.y1 > y):
         return -inf
     return float(segment.x0 + (y - segment.y0) / (segment.y1 - segment.y0) * (segment.x1 - segment.x0))
-
-
-@no_nrt
-def inside(edges: Floats, x: float, y: float) -> bool:
-    """Whether a point lies in the polygons of (n, 4) edges, by the even-odd rule."""
-    odd = False
-    for e in range(len(edges)):
-        if level_crossing(edge(edges, e), y) > x:
-            odd = not odd
-    return odd
 
 
 def near_height(segments: Floats, z_mm: float, reach_mm: float) -> Floats:

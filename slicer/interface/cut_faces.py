@@ -12,12 +12,12 @@ from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
 from slicer.fill.region import Cover, Region, shell_layers
 from slicer.fill.skin import uncovered_area
-from slicer.geometry.polygons import CLOSING_MM, Polygons, close_loop, closing, edges, half_plane, islands, offset, union
+from slicer.geometry.polygons import CLOSING_MM, Polygons, close_loop, closing, half_plane, islands, offset, union
 from slicer.geometry.polyline import length_mm
 from slicer.interface.base_plane import limb_planes, plane_in_frame_of
 from slicer.paths import Kind
 from slicer.sections import Sections
-from slicer.strokes.split import Sides, cut_line
+from slicer.strokes.split import cut_line
 from slicer.walls.gap import gaps
 from slicer.walls.layer_walls import layer_walls
 from slicer.walls.walls import Walls, wall_rank, walls
@@ -103,7 +103,7 @@ def _within(loop: Floats, area: Polygons) -> list[Floats]:
     """What of a loop (n, 2) lies in an area, as open or closed polylines."""
     if area.is_empty():
         return []
-    points, within = cut_line(close_loop(loop), Sides.of(edges(area)))
+    points, within = cut_line(close_loop(loop), area)
     if within.all():
         return [points]
     bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]

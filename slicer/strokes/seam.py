@@ -17,8 +17,7 @@ from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead
-from slicer.geometry.distance import distances
-from slicer.geometry.polygons import edges_of, start_at
+from slicer.geometry.polygons import start_at
 from slicer.geometry.segments import Segment, near_height, nearest_share, squared_distance_in_space
 from slicer.paths import Kind
 from slicer.strokes.strokes import RINGS
@@ -101,7 +100,7 @@ def begin_with_room(loop: Floats, lead_mm: float) -> Floats:
 
 def _depth_mm(loop: Floats, lead_mm: float) -> float:
     """How far from the loop a lead begins."""
-    return float(distances((loop[0] + lead_in(loop, lead_mm))[None], edges_of([loop]))[0])
+    return float(_nearest(loop, (loop[0] + lead_in(loop, lead_mm))[None], np.inf)[0])
 
 
 def _inward(loop: Floats) -> Floats:

@@ -5,31 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import flags, floats, table
+from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel
-from mdp.kernels.sorting import rank, sort
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
-from slicer.geometry.polygons import Polygons, edges
-from slicer.geometry.segments import Segment, inside, orientation
+from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
+from slicer.geometry.polygons import Polygons
+from slicer.geometry.segments import Segment
 from slicer.strokes.strokes import Strokes
 
 SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
-
-
-class Sides(NamedTuple):
-    """Sides (k, 4) of an area by rising least y; lows: (k,) that y; tallest: how far a side reaches along y at most."""
-
-    edges: Floats
-    lows: Floats
-    tallest: float
-
-    @classmethod
-    def of(cls, edges: Floats) -> "Sides":
-        """Those of (k, 4) edges in any order."""
-        lows = np.minimum(edges[:, 1], edges[:, 3])
-        order = np.argsort(lows, kind="stable")
-        return cls(edges[order], lows[order], float(np.abs(edges[:, 3] - edges[:, 1]).max(initial=0.0)))
 
 
 class _Pieces(NamedTuple):
@@ -46,11 +31,11 @@ def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float) ->
 
     No piece is shorter than shortest_mm.
     """
-    sides = Sides.of(edges(area))
+    index = index_edges(area)
     count, room = -1, 2 * len(strokes.points) + 64
     while count < 0:
         pieces = _Pieces(np.empty((room, 3)), np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.bool_))
-        count = _split(strokes.points, strokes.starts, wanted, sides, shortest_mm, pieces)
+        count = _split(strokes.points, strokes.starts, wanted, index, shortest_mm, pieces)
         room *= 4
     starts, source = pieces.starts[: count + 1].copy(), pieces.source[:count]
     out = strokes.refined(pieces.points[: starts[-1]].copy(), starts, source)
@@ -59,7 +44,7 @@ def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float) ->
 
 
 @kernel
-def _split(points: Floats, starts: Indices, wanted: Mask, sides: Sides, shortest_mm: float, out: _Pieces) -> int:
+def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, shortest_mm: float, out: _Pieces) -> int:
     """Fills in the pieces and returns how many there are, -1 where there is no room for them."""
     room = len(out.points)
     cut, within = table(room, 3), flags(room)
@@ -69,7 +54,7 @@ def _split(points: Floats, starts: Indices, wanted: Mask, sides: Sides, shortest
         a, b = starts[k], starts[k + 1]
         size = 0
         if wanted[k]:
-            size = _cut_into(points[a:b], sides.edges, sides.lows, sides.tallest, cut, within)
+            size = _cut_into(points[a:b], area, cut, within)
             if size < 0:
                 return -1
             _steady(cut, within, size, shortest_mm)
@@ -120,60 +105,47 @@ def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None
             a = b
 
 
-def cut_line(points: Floats, sides: Sides) -> tuple[Floats, Mask]:
-    """The polyline (n, 2) with the places added where it crosses sides, and which steps lie within."""
-    size, room = -1, 2 * len(points) + 64
+def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
+    """The polyline (n, 2) with the places added where it enters and leaves an area, and which steps lie within."""
+    index, size, room = index_edges(area), -1, 2 * len(points) + 64
     while size < 0:
-        out, within = np.empty((room, 2)), np.empty(room, np.bool_)
-        size = _cut(points, sides, out, within)
+        out, marks = np.empty((room, 2)), np.empty(room, np.bool_)
+        size = _cut(points, index, out, marks)
         room *= 4
-    return out[:size], within[: size - 1]
+    return out[:size], marks[: size - 1]
 
 
 @kernel
-def _cut(points: Floats, sides: Sides, out: Floats, marks: Mask) -> int:
-    return _cut_into(points, sides.edges, sides.lows, sides.tallest, out, marks)
+def _cut(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
+    return _cut_into(points, area, out, marks)
 
 
 @helper
-def _cut_into(points: Floats, sides: Floats, lows: Floats, tallest: float, out: Floats, marks: Mask) -> int:
+def _cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
     """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
 
     points, out: (n, 2 or more), further columns are interpolated.
     """
-    shares, within = floats(len(sides) + 2, 0.0), False
-    columns = points.shape[1]
+    shares, crossed, is_within = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0), False
+    columns, n = points.shape[1], 1
     for axis in range(columns):
         out[0, axis] = points[0, axis]
-    n = 1
     for k in range(len(points) - 1):
         step = Segment(points[k, 0], points[k, 1], points[k + 1, 0], points[k + 1, 1])
-        x0, y0, dx, dy = step.x0, step.y0, step.x1 - step.x0, step.y1 - step.y0
-        low, high = min(y0, y0 + dy), max(y0, y0 + dy)
-        many = 1  # the first share stays 0
-        touched = k == 0
-        for e in range(rank(lows, low - tallest, False), rank(lows, high, True)):
-            ax, ay, bx, by = sides[e, 0], sides[e, 1], sides[e, 2], sides[e, 3]
-            side_a, side_b = orientation(step, ax, ay), orientation(step, bx, by)
-            if (side_a > 0) != (side_b > 0):
-                along = side_a / (side_a - side_b)
-                share = ((ax + along * (bx - ax) - x0) * dx + (ay + along * (by - ay) - y0) * dy) / (dx * dx + dy * dy)
-                touched = touched or -SNAP <= share <= 1.0 + SNAP
-                if SNAP < share < 1.0 - SNAP:
-                    shares[many] = share
-                    many += 1
-        if n + many > len(out):
+        many = crossings(area, step, shares[:-1], crossed)
+        if n + many + 1 > len(out):
             return -1
-        sort(shares, 1, many)
         shares[many] = 1.0
-        for s in range(many):
-            if touched:
-                middle = 0.5 * (shares[s] + shares[s + 1])
-                within = inside(sides, x0 + middle * dx, y0 + middle * dy)
+        since = 0.0
+        for s in range(many + 1):
+            if s < many and not SNAP < shares[s] < 1.0 - SNAP:
+                continue
+            if k == 0 or many > 0:
+                middle = 0.5 * (since + shares[s])
+                is_within = within(area, step.x0 + middle * (step.x1 - step.x0), step.y0 + middle * (step.y1 - step.y0))
             for axis in range(columns):
-                out[n, axis] = points[k, axis] + shares[s + 1] * (points[k + 1, axis] - points[k, axis])
-            marks[n - 1] = within
+                end = points[k + 1, axis]
+                out[n, axis] = end if s == many else points[k, axis] + shares[s] * (end - points[k, axis])
+            marks[n - 1], since = is_within, shares[s]
             n += 1
-        for axis in range(columns):
-            out[n - 1, axis] = points[k + 1, axis]
     return n

@@ -19,7 +19,7 @@ from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import outer_wall_width_mm
-from slicer.geometry.cells import Cells, cells_of, crossings, free, nearest, within
+from slicer.geometry.edge_index import EdgeIndex, crosses, crossings, free, index_edges, lie_within, nearest, within
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.segments import Segment
 
@@ -57,7 +57,7 @@ def travels(
                 if detour is not None:
                     retracts[k], detours[k] = False, detour
     if skin is not None and not skin.is_empty():
-        combing, border = Combing(section, widths_mm[0], skin), cells_of(skin)
+        combing, border = Combing(section, widths_mm[0], skin), index_edges(skin)
         for k in np.flatnonzero(~retracts & ~lie_within(border, since) & ~lie_within(border, to)).tolist():
             way = np.vstack([since[k], detours.get(k, to[:0]), to[k]])
             if not crosses(border, way[:-1], way[1:]).any():
@@ -71,24 +71,6 @@ def travels(
     return retracts, detours
 
 
-@kernel
-def crosses(border: Cells, since: Floats, to: Floats) -> NDArray[np.bool_]:
-    """(n, 2) by two whether segments cross a border."""
-    out = np.empty(len(to), np.bool_)
-    for k in range(len(to)):
-        out[k] = not free(border, Segment(since[k, 0], since[k, 1], to[k, 0], to[k, 1]))
-    return out
-
-
-@kernel
-def lie_within(border: Cells, points: Floats) -> NDArray[np.bool_]:
-    """Which of (n, 2) points a border encloses."""
-    out = np.empty(len(points), np.bool_)
-    for k in range(len(points)):
-        out[k] = within(border, points[k, 0], points[k, 1])
-    return out
-
-
 class Combing:
     """Where the tip may travel over an area of one layer, a section or its support, without a retraction."""
 
@@ -97,23 +79,22 @@ class Combing:
         self._area, self._width_mm, self._barred = area, width_mm, barred
 
     @cached_property
-    def safe(self) -> Cells:
+    def safe(self) -> EdgeIndex:
         """The border that no travel without a retraction crosses."""
         inside = offset(self._area, -SAFE * self._width_mm)
-        return cells_of(inside if self._barred is None else inside - self._barred)
+        return index_edges(inside if self._barred is None else inside - self._barred)
 
     @cached_property
-    def _behind(self) -> Cells:
-        return cells_of(offset(self._area, -BEHIND * self._width_mm))
+    def _behind(self) -> EdgeIndex:
+        return index_edges(offset(self._area, -BEHIND * self._width_mm))
 
     @cached_property
-    def _among(self) -> Cells:
-        return cells_of(offset(self._area, -AMONG * self._width_mm))
+    def _among(self) -> EdgeIndex:
+        return index_edges(offset(self._area, -AMONG * self._width_mm))
 
     def leaves(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
         """(n, 2) by two whether the travels between these points leave the safe inside."""
-        out: NDArray[np.bool_] = _leaves(self.safe, since, to)
-        return out
+        return ~lie_within(self.safe, since) | crosses(self.safe, since, to)
 
     def detour(self, start: Floats, end: Floats, most_mm: float) -> Floats | None:
         """Points (k, 2) between start and end of a path inside, at most most_mm longer than the straight line; or None."""
@@ -136,18 +117,8 @@ class _Stretch(NamedTuple):
     y: float
 
 
-@kernel
-def _leaves(safe: Cells, since: Floats, to: Floats) -> NDArray[np.bool_]:
-    """Which segments cross the border, or begin outside."""
-    out = np.empty(len(to), np.bool_)
-    for k in range(len(to)):
-        x, y = since[k, 0], since[k, 1]
-        out[k] = not within(safe, x, y) or not free(safe, Segment(x, y, to[k, 0], to[k, 1]))
-    return out
-
-
 @helper
-def _enter(safe: Cells, track: Cells, x: float, y: float, reach: float) -> tuple[float, float, bool]:
+def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, float, bool]:
     """Where a detour from a point begins: there, or where it reaches the track's inside; and whether it does."""
     if within(track, x, y):
         return x, y, True
@@ -156,7 +127,7 @@ def _enter(safe: Cells, track: Cells, x: float, y: float, reach: float) -> tuple
 
 
 @kernel
-def _comb(safe: Cells, track: Cells, straight: Segment, longest: float, reach: float, path: Floats) -> int:
+def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, reach: float, path: Floats) -> int:
     """Fills in the path from end to end, both included; returns how many points it has, 0 where there is none."""
     ax, ay, begins = _enter(safe, track, straight.x0, straight.y0, reach)
     if not begins:
@@ -181,7 +152,7 @@ def _comb(safe: Cells, track: Cells, straight: Segment, longest: float, reach: f
 
 
 @helper
-def _follow(track: Cells, straight: Segment, longest: float, path: Floats) -> int:
+def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -> int:
     """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by.
 
     From row 1 on; returns the number of rows, 0 where there is no such path.
@@ -215,7 +186,7 @@ def _follow(track: Cells, straight: Segment, longest: float, path: Floats) -> in
 
 
 @helper
-def _go_round(track: Cells, stretch: _Stretch, longest: float, path: Floats, n: int) -> tuple[int, float]:
+def _go_round(track: EdgeIndex, stretch: _Stretch, longest: float, path: Floats, n: int) -> tuple[int, float]:
     """Appends the shorter of the two stretches of a loop from row n on.
 
     Returns the new number of rows, 0 when the stretch is too long, and its length.
@@ -232,7 +203,7 @@ def _go_round(track: Cells, stretch: _Stretch, longest: float, path: Floats, n: 
 
 
 @helper
-def _walk(track: Cells, stretch: _Stretch, longest: float, sense: int, path: Floats, n: int) -> tuple[int, float]:
+def _walk(track: EdgeIndex, stretch: _Stretch, longest: float, sense: int, path: Floats, n: int) -> tuple[int, float]:
     """Appends a stretch forward (1) or backward (-1) until it is too long; the new number of rows and the length."""
     begin, end = track.begins[track.loop[stretch.leaving]], track.begins[track.loop[stretch.leaving] + 1]
     side, length, corner = stretch.leaving, 0.0, 1 + sense
@@ -246,7 +217,7 @@ def _walk(track: Cells, stretch: _Stretch, longest: float, sense: int, path: Flo
 
 
 @helper
-def _pull_taut(safe: Cells, path: Floats, count: int) -> int:
+def _pull_taut(safe: EdgeIndex, path: Floats, count: int) -> int:
     """Leaves as few points of a path as the border allows, in reverse order; returns how many, 0 when it crosses the border."""
     n, i, last = 1, 0, count - 1
     while i < last:
@@ -265,6 +236,6 @@ def _pull_taut(safe: Cells, path: Floats, count: int) -> int:
 
 
 @helper
-def _sees(safe: Cells, path: Floats, i: int, j: int) -> bool:
+def _sees(safe: EdgeIndex, path: Floats, i: int, j: int) -> bool:
     """Whether the straight line between two points of a path crosses no border."""
     return free(safe, Segment(path[i, 0], path[i, 1], path[j, 0], path[j, 1]))

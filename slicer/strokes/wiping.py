@@ -6,11 +6,10 @@ from mdp.kernels.arrays import table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
 from mdp.overhang import Mask
-from slicer.geometry.cells import cells_of
+from slicer.geometry.edge_index import crosses, index_edges, lie_within
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import length_between
 from slicer.strokes.strokes import Strokes
-from slicer.strokes.travels import crosses, lie_within
 
 STANDING_MM = 1e-6
 RING = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
@@ -21,7 +20,7 @@ def may_wipe_over(strokes: Strokes, skin: Polygons, wipe_mm: float) -> Mask:
     may = np.ones(len(strokes), np.bool_)
     if skin.is_empty() or not len(strokes):
         return may
-    border = cells_of(skin)
+    border = index_edges(skin)
     off = ~lie_within(border, strokes.last_points)
     for k in np.flatnonzero(off).tolist():
         points = np.ascontiguousarray(strokes.points[strokes.starts[k] : strokes.starts[k + 1], :2])

@@ -29,8 +29,8 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.geometry.distance import signed_distances
-from slicer.geometry.polygons import Polygons, closing, contours, edges, islands, offset, union
+from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
+from slicer.geometry.polygons import Polygons, closing, contours, islands, offset, union
 from slicer.support.reachable import (
     EVEN_MM,
     FINE_MM,
@@ -181,7 +181,7 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
     """
     lean, reachable = float(areas.lean_mm[layer]), areas.reachable[layer - 1]
     targets = _target_branches(branches, areas, layer)
-    borders = edges(reachable)
+    borders = index_edges(reachable)
     free = _depths(targets, borders) >= np.array([branch.reach_mm for branch in targets])
     doubtful = [branch.area for branch, is_free in zip(targets, free, strict=True) if not is_free]
     bad = union(doubtful) - reachable
@@ -201,13 +201,9 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
     return _drop_enclosed(low + _move_aside(left, areas, layer))
 
 
-def _depths(branches: Sequence[Branch], borders: Floats) -> Floats:
-    """How deep the middles of branches lie inside an area with those edges.
-
-    Of every edge, for there are but some 400 of them and 15 middles: a search tree made anew for every layer (shapely.STRtree)
-    takes 6 to 20 times as long, measured on tree, fan_support and deer.
-    """
-    depths_mm: Floats = signed_distances(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
+def _depths(branches: Sequence[Branch], borders: EdgeIndex) -> Floats:
+    """How deep the middles of branches lie inside an area with those edges."""
+    depths_mm: Floats = depths(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
     return depths_mm
 
 
@@ -245,7 +241,7 @@ def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in goals]
 
 
-def _narrow(branch: Branch, reachable: Polygons, borders: Floats, depth_mm: float, lean: float) -> Branch | None:
+def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: float, lean: float) -> Branch | None:
     """The branch where it is, as thick as it was or by the lean thinner, if that is free.
 
     borders: edges of the reached places; depth_mm: how deep inside them the branch's middle lies.
@@ -260,7 +256,7 @@ def _narrow(branch: Branch, reachable: Polygons, borders: Floats, depth_mm: floa
     thin = branch.shrink(branch.radius - lean)
     if depth_mm >= thin.radius:
         return thin
-    if signed_distances(contours(thin.area)[0][:1], borders)[0] < 0.0:
+    if depths(contours(thin.area)[0][:1], borders)[0] < 0.0:
         return None
     return thin if (thin.area - reachable).area() < LEAST_MM2 else None
 

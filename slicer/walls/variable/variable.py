@@ -26,8 +26,8 @@ import numpy as np
 
 from mdp.mesh import Floats
 from slicer.bead import Course
-from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, contours, edges
+from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
+from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
 from slicer.walls.variable.counts import Counts, count_beads
@@ -79,7 +79,7 @@ def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
         walls += [Wall(loop, level, True, int(level == 0)) for loop in loops]
     lines = [_along(line, rule) for line in lines_of(trace_chains(triangulation.across, skeleton, counts, rule))]
     lines += [_dash(*dot, rule) for dot in _dots(skeleton, counts)]
-    borders = edges(polygons) if any(line.level == 0 for line in lines) else np.zeros((0, 4))
+    borders = index_edges(polygons if any(line.level == 0 for line in lines) else Polygons())
     clipped = (_clipped(line, borders, rule) for line in lines)
     walls += [_simplified(line) for line in clipped if len(line.points) > 1]
     return [wall for wall in walls if length_mm(wall.course.points) > 0.0]  # points may fall on each other when they are smoothed
@@ -120,7 +120,7 @@ def _dash(begin: Floats, end: Floats, width: float, rule: Rule) -> Wall:
     return Wall(Course(np.array([middle - half * way, middle + half * way]), np.full(2, thinner)), 0, False, 2)
 
 
-def _clipped(line: Wall, borders: Floats, rule: Rule) -> Wall:
+def _clipped(line: Wall, borders: EdgeIndex, rule: Rule) -> Wall:
     """A line that lies alone no wider than its place, but for the least bead, without ends where not even that fits.
 
     Thin walls keep ends of theirs where it nearly fits: a wall that is now thicker and now thinner than the least bead would be
@@ -129,7 +129,7 @@ def _clipped(line: Wall, borders: Floats, rule: Rule) -> Wall:
     if line.level > 0:
         return line
     points = line.course.points
-    room = 2.0 * distances(points, borders)
+    room = 2.0 * np.abs(depths(points, borders))
     widths = np.maximum(np.minimum(line.course.widths, room), rule.least)
     first, last = _fitting(points, room, rule)
     if line.closed and last >= first:

@@ -10,7 +10,8 @@ from shapely.affinity import rotate
 
 from mdp.mesh import Mesh
 from slicer.fill.bridge import Bridge, find_bridge, find_bridges
-from slicer.geometry.polygons import Polygons, edges, offset
+from slicer.geometry.edge_index import index_edges
+from slicer.geometry.polygons import Polygons, offset
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
 from tests.shapes import box, standing
@@ -27,7 +28,7 @@ def gap(length: float, span: float, turn_deg: float) -> tuple[Polygons, Polygons
 
 
 def bridge_over(hanging: Polygons, banks: Polygons) -> Bridge:
-    span = find_bridge(hanging, edges(offset(banks, 0.25 * WIDTH)), WIDTH)
+    span = find_bridge(hanging, index_edges(offset(banks, 0.25 * WIDTH)), WIDTH)
     assert span is not None
     return span
 
@@ -58,7 +59,7 @@ def test_no_direction_has_shorter_squared_spans(corners: list[tuple[float, float
 def test_a_ring_of_bridges_between_four_legs_is_bridged_arm_by_arm() -> None:
     legs = Polygons.compose([Polygons.square((8, 8), True).translate((x, y)) for x in (-8, 8) for y in (-8, 8)])
     ring = Polygons.square((24, 24), True) - Polygons.square((6, 6), True)
-    pieces = find_bridges(ring - legs, edges(offset(legs, 0.25 * WIDTH)), WIDTH)
+    pieces = find_bridges(ring - legs, index_edges(offset(legs, 0.25 * WIDTH)), WIDTH)
     by_angle = {round(piece.angle_deg) % 180: piece.hanging.area() for piece in pieces if piece.loose == 0.0}
     assert by_angle == {0: pytest.approx(2 * 8 * 8, rel=0.03), 90: pytest.approx(2 * 8 * 8, rel=0.03)}
 
@@ -67,7 +68,7 @@ def test_a_ring_of_bridges_between_four_legs_is_bridged_arm_by_arm() -> None:
 @given(st.floats(3, 30), st.floats(2, 30), st.floats(0, 180))
 def test_a_place_that_one_direction_holds_is_one_bridge(length: float, span: float, turn: float) -> None:
     hanging, banks = gap(length, span, turn)
-    (piece,) = find_bridges(hanging, edges(offset(banks, 0.25 * WIDTH)), WIDTH)
+    (piece,) = find_bridges(hanging, index_edges(offset(banks, 0.25 * WIDTH)), WIDTH)
     assert piece.hanging.area() == pytest.approx(hanging.area())
 
 
@@ -88,7 +89,7 @@ def test_a_ledge_is_printed_outwards_from_its_only_bank() -> None:
 
 
 def test_nothing_to_hold_on_to_is_no_bridge() -> None:
-    banks = edges(Polygons.square((5, 5)).translate((20, 0)))
+    banks = index_edges(Polygons.square((5, 5)).translate((20, 0)))
     assert find_bridge(Polygons.square((5, 5)), banks, WIDTH) is None
 
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from slicer.bead import Bead
 from slicer.fill.infill import GYROID_LENGTH, PATTERNS, gyroid, honeycomb, infill_beads, pattern_density, side_mm
 from slicer.fill.pattern import PatternLayer, clip_pattern
-from slicer.geometry.clip import border_of, rotation_2d
+from slicer.geometry.clip import rotation_2d
+from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, ring, square
@@ -127,7 +128,7 @@ def test_clipping_agrees_with_shapely(points: list[tuple[float, float]], angle: 
     assume(hull.area() > 1.0)
     area = hull - Polygons.circle(4.0, 20).translate((3, 1)) - Polygons.square((30, 1.5)).rotate(33)
     turned_deg, draw = gyroid(PatternLayer(0, 1.7, angle, 0.4, 0.4 / apart))
-    pieces = clip_pattern(border_of(area), turned_deg, draw)
+    pieces = clip_pattern(index_edges(area), turned_deg, draw)
     clipped_mm = sum(length_mm(pieces.points[a:b]) for a, b in pairwise(pieces.starts))
     drawn, starts = draw((-60, -60, 60, 60))
     lines = shapely.MultiLineString([line @ rotation_2d(turned_deg).T for line in np.split(drawn, starts[1:])])

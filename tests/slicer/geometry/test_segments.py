@@ -10,11 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numba import njit
 
-from mdp.mesh import Floats
 from slicer.geometry import segments
-from slicer.geometry.polygons import edges
 from slicer.geometry.segments import Segment
-from tests.slicer.hand import as_shapely, ragged
 
 whole = st.integers(-6, 6).map(float)
 places = st.tuples(whole, whole)
@@ -33,11 +30,6 @@ def crossing(segment: Segment, crossed: Segment) -> float:
 
 
 @njit
-def crosses_any(segment: Segment, sides: Floats) -> bool:
-    return segments.crosses_any(segment, sides)
-
-
-@njit
 def squared_distance(segment: Segment, x: float, y: float) -> float:
     return segments.squared_distance(segment, x, y)
 
@@ -45,11 +37,6 @@ def squared_distance(segment: Segment, x: float, y: float) -> float:
 @njit
 def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
     return segments.squared_distance_in_space(p, a, b)
-
-
-@njit
-def inside(sides: Floats, x: float, y: float) -> bool:
-    return segments.inside(sides, x, y)
 
 
 def sides_of(a: tuple[float, float], b: tuple[float, float], p: tuple[float, float]) -> Fraction:
@@ -74,17 +61,6 @@ def test_segments_cross_where_their_ends_lie_on_both_sides_of_each_other_a_point
     if share >= 0.0:
         at = np.array(a) + share * (np.array(b) - np.array(a))
         assert shapely.LineString([p, q]).distance(shapely.Point(at)) < 1e-9
-
-
-@given(st.integers(0, 10**6), spots, spots)
-def test_a_segment_crosses_a_border_and_a_point_lies_inside_as_shapely_has_it(
-    seed: int, a: tuple[float, float], b: tuple[float, float]
-) -> None:
-    star = ragged(seed)
-    area = as_shapely(star)
-    assume(area.boundary.distance(shapely.Point(a)) > 1e-6)
-    assert inside(edges(star), *a) == area.contains(shapely.Point(a))
-    assert crosses_any(Segment(*a, *b), edges(star)) == area.boundary.crosses(shapely.LineString([a, b]))
 
 
 @given(spots, spots, spots)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from slicer.bead import Bead
-from slicer.geometry.polygons import Polygons, edges
+from slicer.geometry.polygons import Polygons
 from slicer.paths import NUMBER, Kind
-from slicer.strokes.split import Sides, cut_line, split
+from slicer.strokes.split import cut_line, split
 from slicer.strokes.strokes import Strokes, strokes_of
 from tests.slicer.hand import Row, as_shapely, ragged, rows_of
 
@@ -67,8 +67,8 @@ def test_the_pieces_of_a_line_are_the_line_and_none_is_shorter_than_allowed(seed
 @settings(max_examples=40)
 @given(seeds)
 def test_every_step_of_a_cut_line_lies_within_or_without_as_its_middle_does(seed: int) -> None:
-    area, sides = as_shapely(ragged(seed)), Sides.of(edges(ragged(seed)))
-    points, within = cut_line(walk(seed), sides)
+    area = as_shapely(ragged(seed))
+    points, within = cut_line(walk(seed), ragged(seed))
     middles = 0.5 * (points[1:] + points[:-1])
     clear = shapely.distance(area.boundary, shapely.points(middles)) > 1e-6
     assert np.array_equal(within[clear], shapely.contains_xy(area, middles)[clear])

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import ROUND_SIDES, Bead, Course
-from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, close_loop, edges
+from slicer.geometry.edge_index import depths, index_edges
+from slicer.geometry.polygons import Polygons, close_loop
 from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
@@ -137,7 +137,7 @@ def test_the_outer_wall_of_a_hall_with_thin_teeth_stays_at_its_border(tooth_mm: 
     teeth = [Polygons.square((tooth_mm, 1.2)).translate((x, 29.5)) for x in (8.0, 9.0, 9.8, 14.0)]
     hall = Polygons.square((30, 30)) + Polygons.compose(teeth)
     outer = [wall for wall in variable_walls(hall, RULE) if wall.level == 0]
-    assert max(distances(wall.points, edges(hall)).max() for wall in outer) < 0.5
+    assert max(np.abs(depths(wall.points, index_edges(hall))).max() for wall in outer) < 0.5
 
 
 def test_a_ring_of_one_bead_runs_round() -> None:

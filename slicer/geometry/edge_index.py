@@ -1,15 +1,20 @@
-"""Cells: the edges of polygons sorted into a grid of square cells, so that a short travel meets only the few edges near it."""
+"""Edge index: the edges of polygons sorted into a grid of square cells, so that a question meets only the few near a place.
 
-from math import sqrt
+Asked are where a segment crosses edges, whether a point lies inside, the nearest edge, and how deep inside points lie. All count
+a point on an edge alike (slicer.geometry.segments): no crossing is counted twice or missed at a vertex.
+"""
+
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import longs
+from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import sort_into_bins
 from mdp.mesh import Floats
+from mdp.overhang import Mask
 from slicer.geometry.polygons import Polygons, contours, edges_of
 from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share
 
@@ -27,7 +32,7 @@ class Grid(NamedTuple):
     rows: int
 
 
-class Cells(NamedTuple):
+class EdgeIndex(NamedTuple):
     """edges: (n, 4) x0 y0 x1 y1, loop after loop; loop: (n,) number of an edge's loop; begins: where each loop begins, and n.
 
     Cell c of row r of the grid holds the edges items[first[r * columns + c] : first[r * columns + c + 1]].
@@ -41,22 +46,16 @@ class Cells(NamedTuple):
     items: Indices
 
 
-def cells_of(polygons: Polygons) -> Cells:
-    """The edges of all contours in cells, about one edge a cell."""
+def index_edges(polygons: Polygons) -> EdgeIndex:
+    """The edges of all contours, about one edge a cell."""
     loops = contours(polygons)
     begins = np.cumsum([0, *(len(loop) for loop in loops)]).astype(np.int64)
-    cells: Cells = _cells_of(edges_of(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
-    return cells
+    index: EdgeIndex = _index(edges_of(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
+    return index
 
 
 @kernel
-def _cells_of(edges: Floats, loop: Indices, begins: Indices) -> Cells:
-    return sort_edges(edges, loop, begins)
-
-
-@helper
-def sort_edges(edges: Floats, loop: Indices, begins: Indices) -> Cells:
-    """The cells of edges."""
+def _index(edges: Floats, loop: Indices, begins: Indices) -> EdgeIndex:
     x0, y0, x1, y1 = 1e9, 1e9, -1e9, -1e9
     for e in range(len(edges)):
         x0, x1 = min(x0, edges[e, 0], edges[e, 2]), max(x1, edges[e, 0], edges[e, 2])
@@ -66,7 +65,7 @@ def sort_edges(edges: Floats, loop: Indices, begins: Indices) -> Cells:
     size = max(sqrt(wide * deep / max(len(edges), 1)), max(wide, deep) / 1000.0)
     grid = Grid(x0, y0, size, int(wide / size) + 1, int(deep / size) + 1)
     first, items = _into_cells(edges, grid)
-    return Cells(edges, loop, begins, grid, first, items)
+    return EdgeIndex(edges, loop, begins, grid, first, items)
 
 
 @helper
@@ -94,7 +93,7 @@ def _rows(grid: Grid, y0: float, y1: float) -> tuple[int, int]:
 
 @helper
 def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
-    """first and items of Cells. An edge is a run of cells in every row that it touches."""
+    """first and items of an EdgeIndex. An edge is a run of cells in every row that it touches."""
     many = 0
     for e in range(len(edges)):
         low, high = _rows(grid, edges[e, 1], edges[e, 3])
@@ -115,24 +114,24 @@ def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
 
 
 @helper
-def _near(cells: Cells, r: int, segment: Segment) -> tuple[int, int]:
+def _near(index: EdgeIndex, r: int, segment: Segment) -> tuple[int, int]:
     """Which of the items lie in the cells that a segment touches in a row: from and to."""
-    grid = cells.grid
+    grid = index.grid
     bottom = grid.y + r * grid.size_mm
     a, b = _columns(grid, segment, bottom - MARGIN_MM, bottom + grid.size_mm + MARGIN_MM)
-    return (cells.first[r * grid.columns + a], cells.first[r * grid.columns + b + 1]) if a <= b else (0, 0)
+    return (index.first[r * grid.columns + a], index.first[r * grid.columns + b + 1]) if a <= b else (0, 0)
 
 
 @helper
-def crossings(cells: Cells, segment: Segment, shares: Floats, crossed: Indices) -> int:
+def crossings(index: EdgeIndex, segment: Segment, shares: Floats, crossed: Indices) -> int:
     """Fills in where (0..1, rising) and which edges a segment crosses; returns how many, -1 where there is no room for them."""
-    low, high = _rows(cells.grid, segment.y0, segment.y1)
+    low, high = _rows(index.grid, segment.y0, segment.y1)
     n = 0
     for r in range(low, high + 1):
-        begin, end = _near(cells, r, segment)
+        begin, end = _near(index, r, segment)
         for k in range(begin, end):
-            e = cells.items[k]
-            share = crossing(segment, edge(cells.edges, e))
+            e = index.items[k]
+            share = crossing(segment, edge(index.edges, e))
             known = share < 0.0
             for i in range(n):
                 known = known or crossed[i] == e
@@ -150,49 +149,81 @@ def crossings(cells: Cells, segment: Segment, shares: Floats, crossed: Indices) 
 
 
 @helper
-def free(cells: Cells, segment: Segment) -> bool:
+def free(index: EdgeIndex, segment: Segment) -> bool:
     """Whether a segment crosses no edge."""
-    low, high = _rows(cells.grid, segment.y0, segment.y1)
+    low, high = _rows(index.grid, segment.y0, segment.y1)
     for r in range(low, high + 1):
-        begin, end = _near(cells, r, segment)
+        begin, end = _near(index, r, segment)
         for k in range(begin, end):
-            if crossing(segment, edge(cells.edges, cells.items[k])) >= 0.0:
+            if crossing(segment, edge(index.edges, index.items[k])) >= 0.0:
                 return False
     return True
 
 
 @no_nrt
-def within(cells: Cells, x: float, y: float) -> bool:
+def within(index: EdgeIndex, x: float, y: float) -> bool:
     """Whether a point lies in the polygons: the edges that a ray to the right crosses, each counted in one cell."""
-    grid = cells.grid
+    grid = index.grid
     row, column = int((y - grid.y) / grid.size_mm), max(int((x - grid.x) / grid.size_mm), 0)
     if y < grid.y or row >= grid.rows:
         return False
     odd = False
     for c in range(column, grid.columns):
         cell = row * grid.columns + c
-        for k in range(cells.first[cell], cells.first[cell + 1]):
-            cut = level_crossing(edge(cells.edges, cells.items[k]), y)
+        for k in range(index.first[cell], index.first[cell + 1]):
+            cut = level_crossing(edge(index.edges, index.items[k]), y)
             if cut > x and int((cut - grid.x) / grid.size_mm) == c:
                 odd = not odd
     return odd
 
 
 @helper
-def nearest(cells: Cells, x: float, y: float, reach: float) -> tuple[float, float, int]:
+def nearest(index: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, float, int]:
     """The nearest point of any edge within reach, and its edge; edge -1: none."""
-    grid = cells.grid
+    grid = index.grid
     best, which, nx, ny = reach, -1, x, y
     low, high = _rows(grid, y - reach, y + reach)
     left = max(int((x - reach - grid.x) / grid.size_mm), 0)
     right = min(int((x + reach - grid.x) / grid.size_mm), grid.columns - 1)
     for r in range(low, high + 1):
         for c in range(r * grid.columns + left, r * grid.columns + right + 1):
-            for k in range(cells.first[c], cells.first[c + 1]):
-                side = edge(cells.edges, cells.items[k])
+            for k in range(index.first[c], index.first[c + 1]):
+                side = edge(index.edges, index.items[k])
                 share = nearest_share(side, x, y)
                 px, py = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
                 distance = np.hypot(px - x, py - y)
                 if distance < best:
-                    best, which, nx, ny = distance, cells.items[k], px, py
+                    best, which, nx, ny = distance, index.items[k], px, py
     return nx, ny, which
+
+
+@kernel
+def crosses(index: EdgeIndex, since: Floats, to: Floats) -> Mask:
+    """(n, 2) by two whether segments cross any edge."""
+    out = np.empty(len(to), np.bool_)
+    for k in range(len(to)):
+        out[k] = not free(index, Segment(since[k, 0], since[k, 1], to[k, 0], to[k, 1]))
+    return out
+
+
+@kernel
+def lie_within(index: EdgeIndex, points: Floats) -> Mask:
+    """Which of (n, 2) points lie in the polygons."""
+    out = np.empty(len(points), np.bool_)
+    for k in range(len(points)):
+        out[k] = within(index, points[k, 0], points[k, 1])
+    return out
+
+
+@kernel
+def depths(points: Floats, index: EdgeIndex) -> Floats:
+    """(n,) mm from points (n, 2) to the nearest edge, negative outside the polygons; -inf where there are none."""
+    out: Floats = floats(len(points), -inf)
+    for k in range(len(points) if len(index.edges) else 0):
+        x, y = points[k, 0], points[k, 1]
+        reach, which = index.grid.size_mm, -1
+        while which < 0:
+            px, py, which = nearest(index, x, y, reach)
+            reach *= 2.0
+        out[k] = np.hypot(px - x, py - y) if within(index, x, y) else -np.hypot(px - x, py - y)
+    return out
