@@ -14,11 +14,11 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.support_need.patches import NARROW
+from mdp.topology.cross_section import cross_sections
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import first_layer_process
 from slicer.fill.region import shell_layers
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import (
     CLOSING_MM,
     Polygons,

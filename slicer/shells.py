@@ -15,11 +15,10 @@ from slicer.fill.infill import infill_beads, pattern_density
 from slicer.fill.ironing import ironed_areas, ironing_beads
 from slicer.fill.region import Region, regions
 from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_beads
-from slicer.geometry.cross_section import RIM_MM
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, of_contours, offset, opening, union
 from slicer.interface.cut_faces import cover, cut_walls, model_sections
-from slicer.overhangs import Overhang
+from slicer.overhangs import RIM_MM, Overhang
 from slicer.paths import Kind
 from slicer.sections import Sections
 from slicer.strokes.overhanging import strengthen_overhangs

@@ -6,8 +6,8 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Indices, Mesh
 from mdp.overhang import Mask
 from mdp.zone import Zone, touched
-from slicer.geometry.cross_section import RIM_MM, faces_by_layer
 from slicer.geometry.polygons import Polygons, offset, union
+from slicer.overhangs import RIM_MM, faces_by_layer
 
 BOX_EDGES = tuple((a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4))  # by the numbers of its corners
 

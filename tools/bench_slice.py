@@ -27,8 +27,8 @@ from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level
 from mdp.save import stl
+from mdp.topology.cross_section import cross_sections
 from profiles.profile import Profile, load
-from slicer.geometry.cross_section import cross_sections
 from slicer.heights import layer_heights
 from slicer.paths import Kind, SlicedPart
 from slicer.slice import slice_part

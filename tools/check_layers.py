@@ -21,8 +21,8 @@ from mdp.decomposition import Part
 from mdp.plane import PLATFORM
 from mdp.pose import level
 from mdp.read import read_mesh
+from mdp.topology.cross_section import cross_sections
 from profiles.profile import Profile, load
-from slicer.geometry.cross_section import cross_sections
 from slicer.heights import layer_heights
 from slicer.paths import Layer
 from slicer.slice import slice_part

@@ -23,8 +23,8 @@ from mdp.mesh import Floats, Mesh
 from mdp.model_file import locate
 from mdp.read import read_mesh
 from mdp.sweep.rays import TriangleTree, blocked_shares, triangle_tree
+from mdp.topology.cross_section import cross_sections
 from profiles.profile import load
-from slicer.geometry.cross_section import cross_sections
 from slicer.paths import Kind
 
 RAYS, LIFT_MM, FAR_MM = 256, 0.05, 1e4

@@ -33,8 +33,8 @@ from mdp.model_file import locate
 from mdp.pose import level
 from mdp.read import read_mesh
 from mdp.save import stl
+from mdp.topology.cross_section import cross_sections
 from profiles.profile import Profile, load
-from slicer.geometry.cross_section import cross_sections
 
 BARE = (
     *SAME,

@@ -13,12 +13,13 @@ from manifold3d import CrossSection, FillRule, JoinType
 
 from mdp.cut import convex_hull
 from mdp.directions.orientation import LEAN_DEG, SIDES, centre_of_mass, diameter_mm, tipping_angle_deg
-from mdp.kernels.arrays import floats, longs, table
+from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
-from mdp.mesh import Floats, Indices, Ints, Mesh, dot
+from mdp.mesh import Floats, Ints, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
+from mdp.topology.cross_section import loops_at
 from mdp.topology.linked_faces import opposites
 from profiles.profile import Profile
 
@@ -110,12 +111,13 @@ class Plate:
 
     def footing(self, rotation: Floats) -> Footing:
         """How the model stands when it is turned by a rotation (3, 3)."""
-        heights, centre = dot(self.mesh.vertices, rotation[2]), rotation @ self.centre
-        low, high = float(heights.min()), float(heights.max())
+        turned, centre = self.mesh.vertices @ rotation.T, rotation @ self.centre
+        low, high = float(turned[:, 2].min()), float(turned[:, 2].max())
         half_mm = 0.5 * (high - low)
-        above_mm = (min(0.5 * PLATFORM_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm))
-        touching, blunt = (self._section(rotation, heights, low + above) for above in above_mm)
-        base = max(touching, blunt, key=CrossSection.area)
+        touching_mm, blunt_mm = min(0.5 * PLATFORM_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm)
+        cuts_mm = low + np.array(sorted([touching_mm, blunt_mm]))
+        areas = [CrossSection(loops, FillRule.Positive) for loops in loops_at(turned, self.mesh.faces, self.across, cuts_mm)]
+        touching, base = areas[int(touching_mm > blunt_mm)], max(areas, key=CrossSection.area)
         brim = base.offset(self.brim_mm, JoinType.Round, circular_segments=BRIM_SEGMENTS) if self.brim_mm > 0.0 else base
         tensions = [_tension_mpa(section_edges(area), high - low, self.weight_n, centre[:2]) for area in (base, brim)]
         corners = section_edges(base)[:, :2] - centre[:2]
@@ -134,51 +136,9 @@ class Plate:
         in_threads(_measure_hull, len(rotations), corners, hull.faces, rotations, above_mm, bounds)
         return bounds[:, 0], bounds[:, 1]
 
-    def _section(self, rotation: Floats, heights: Floats, z_mm: float) -> CrossSection:
-        """The section of the turned model at a height; heights: (n,) of its vertices."""
-        points, starts = _section_loops(self.mesh.vertices, self.mesh.faces, self.across, rotation, heights, z_mm)
-        return CrossSection(np.split(points, starts[1:-1]), FillRule.Positive) if len(points) else CrossSection()
-
     def _shadow_mm2(self, rotation: Floats) -> float:
         """The area of the model's shadow, overlapping surfaces each counted."""
         return 0.5 * float((np.abs(dot(self.mesh.normals, rotation[2])) * self.mesh.areas_mm2).sum())
-
-
-@kernel
-def _section_loops(
-    vertices: Floats, faces: Ints, across: Ints, rotation: Floats, heights: Floats, z_mm: float
-) -> tuple[Floats, Indices]:
-    """The outlines, (n, 2) points and (k + 1,) where each begins, of a closed surface that is turned and cut at a height.
-
-    Walks from face to face over the edges that the plane crosses, the inside on the left. across: (3 m,) the half-edge on the
-    face across each; heights: (v,) of the turned vertices, those at z_mm count as above.
-    """
-    upward = longs(len(faces), -1)  # the half-edge over which the plane leaves each face that it crosses
-    count = 0
-    for face in range(len(faces)):
-        for k in range(3):
-            if heights[faces[face, k]] < z_mm <= heights[faces[face, (k + 1) % 3]]:
-                upward[face] = 3 * face + k
-                count += 1
-    points, starts, n, loops = table(count, 2), longs(count + 1, 0), 0, 0
-    for face in range(len(faces)):
-        if upward[face] < 0:
-            continue
-        at = face
-        while at >= 0 and upward[at] >= 0:
-            h = upward[at]
-            upward[at] = -1
-            low, high = faces[at, h % 3], faces[at, (h % 3 + 1) % 3]
-            share = (z_mm - heights[low]) / (heights[high] - heights[low])
-            for axis in range(2):
-                for k in range(3):
-                    place = vertices[low, k] + share * (vertices[high, k] - vertices[low, k])
-                    points[n, axis] += rotation[axis, k] * place
-            n += 1
-            at = across[h] // 3 if across[h] >= 0 else -1
-        loops += 1
-        starts[loops] = n
-    return points, starts[: loops + 1]
 
 
 @kernel

@@ -9,10 +9,10 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Indices
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.support_need.need import needs_support
+from mdp.topology.cross_section import cross_sections
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import spacing_mm
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, edges
 from slicer.heights import Heights, part_heights
 from slicer.interface.interface import plastic_below

@@ -8,9 +8,9 @@ import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
+from mdp.topology.cross_section import cross_sections
 from profiles.process import Process
 from slicer.bead import outer_wall_width_mm
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, offset, union
 from slicer.geometry.segments import near_height
 

@@ -22,10 +22,10 @@ import numpy as np
 from mdp.cut import Solid, mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
+from mdp.topology.cross_section import cross_sections
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead, interface_process
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, area_mm2, clean, islands, offset, offset_round, union
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights

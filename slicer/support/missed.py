@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mdp.clearance import least_tip_height_mm
-from slicer.geometry.cross_section import RIM_MM
 from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, offset, union
-from slicer.overhangs import LEAST_MM2, drop_small, seen_from_above
+from slicer.overhangs import LEAST_MM2, RIM_MM, drop_small, seen_from_above
 from slicer.paths import Unsupported
 from slicer.sections import Sections
 from slicer.support.blocker import above_base_planes, beside_standing, support_reach_mm

@@ -19,11 +19,12 @@ from slicer.support.reachable import (
     SMOOTH_MM,
     SPECK_MM2,
     ReachableAreas,
+    carrying_area,
     dilate,
     drop_slivers,
     reachable_areas,
 )
-from slicer.support.tree import Columns, Tree
+from slicer.support.tree import JOIN_MM, Branch, add_contact, lower_branches
 
 SLACK_MM = 0.01  # what rounding may add to the lean
 
@@ -94,7 +95,7 @@ def grow(
     wanted: the hanging places of each layer; begins: places of a layer at which support has to begin.
     """
     count, radius = len(areas.reachable), areas.radius_mm
-    grows: Columns | Tree = Tree() if areas.process.support_style == "tree" else Columns(Polygons())
+    is_tree, area, branches = areas.process.support_style == "tree", Polygons(), list[Branch]()
     bodies, contacts = [Polygons()] * count, [Polygons()] * count
     beginning: dict[int, list[tuple[Polygons, int]]] = {}
     for k, hanging in enumerate(wanted):
@@ -104,18 +105,26 @@ def grow(
     pending: list[tuple[Polygons, int]] = []
     for m in range(count - 1, -1, -1):
         pending += beginning.get(m, [])
-        body = _body(grows.area, radius)
+        area = union([branch.area for branch in branches]) if is_tree else area
+        body = _body(area, radius)
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
             contact = _contact(union(asked), body, areas.reachable[m], radius)
-            grows = grows.add_contact(contact, areas.reachable[m], float(areas.heights.tip_mm[m]))
+            if is_tree:
+                branches = add_contact(branches, contact, areas.reachable[m], float(areas.heights.tip_mm[m]))
+            elif not contact.is_empty():
+                area = closing(area + contact, JOIN_MM).simplify(SMOOTH_MM) ^ areas.reachable[m]
             contacts[m] = _body(contact, radius)
             body = body + contacts[m]
         left = [(hanging - body, last) for hanging, last in pending if last < m]
         pending = [(hanging, last) for hanging, last in left if hanging.area() >= LEAST_MM2]
         if not body.is_empty():
             bodies[m] = body
-            grows = grows.lower(areas, m) if m else grows
+            if is_tree and m:
+                branches = lower_branches(branches, areas, m)
+            elif m and not (area - areas.reachable[m - 1]).is_empty():
+                carrying = carrying_area(area, areas.reachable[m - 1], areas.placeable[m], float(areas.lean_mm[m]))
+                area = carrying.simplify(SLIVER_MM)
     return bodies, contacts
 
 

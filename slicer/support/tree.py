@@ -94,56 +94,21 @@ def trunk(x: float, y: float, radius: float, top_mm: float) -> Branch:
     return Branch(around.translate((x, y)), x, y, radius, top_mm, True)
 
 
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """The places of a layer's support."""
-
-    area: Polygons
-
-    def add_contact(self, contact: Polygons, reachable: Polygons, top_mm: float) -> "Columns":
-        """With what begins in this layer."""
-        return self if contact.is_empty() else Columns(closing(self.area + contact, JOIN_MM).simplify(SMOOTH_MM) ^ reachable)
-
-    def lower(self, areas: ReachableAreas, layer: int) -> "Columns":
-        """What carries a layer's support in the layer below."""
-        if (self.area - areas.reachable[layer - 1]).is_empty():
-            return self
-        lower = carrying_area(self.area, areas.reachable[layer - 1], areas.placeable[layer], float(areas.lean_mm[layer]))
-        return Columns(lower.simplify(SLIVER_MM))
-
-
-@dataclass(frozen=True, eq=False)
-class Tree:
-    """The branches of a layer; those that are no trunks yet take up what begins in their square."""
-
-    branches: tuple[Branch, ...] = ()
-
-    @property
-    def area(self) -> Polygons:
-        """The places of all branches."""
-        return union([branch.area for branch in self.branches])
-
-    def add_contact(self, contact: Polygons, reachable: Polygons, top_mm: float) -> "Tree":
-        """With what begins in this layer."""
-        if contact.is_empty():
-            return self
-        branches = list(self.branches)
-        young = {_cell(b.x, b.y): k for k, b in enumerate(branches) if not b.full}
-        for cell, piece in _pieces(contact):
-            k = young.get(cell)
-            area = piece if k is None else branches[k].area + piece
-            area = closing(area, JOIN_MM).simplify(SMOOTH_MM) ^ reachable
-            if area.area() <= LEAST_MM2:
-                continue
-            if k is None:
-                branches.append(branch_of(area, top_mm))
-            else:
-                branches[k] = branch_of(area, branches[k].top_mm)
-        return Tree(tuple(branches))
-
-    def lower(self, areas: ReachableAreas, layer: int) -> "Tree":
-        """What carries a layer's support in the layer below."""
-        return Tree(tuple(lower_branches(self.branches, areas, layer))) if self.branches else self
+def add_contact(branches: Sequence[Branch], contact: Polygons, reachable: Polygons, top_mm: float) -> list[Branch]:
+    """The branches of a layer with what begins in it: those that are no trunks yet take up what begins in their square."""
+    grown = list(branches)
+    young = {_cell(branch.x, branch.y): k for k, branch in enumerate(branches) if not branch.full}
+    for cell, piece in _pieces(contact) if not contact.is_empty() else ():
+        k = young.get(cell)
+        area = piece if k is None else grown[k].area + piece
+        area = closing(area, JOIN_MM).simplify(SMOOTH_MM) ^ reachable
+        if area.area() <= LEAST_MM2:
+            continue
+        if k is None:
+            grown.append(branch_of(area, top_mm))
+        else:
+            grown[k] = branch_of(area, grown[k].top_mm)
+    return grown
 
 
 def _cell(x: float, y: float) -> tuple[int, int]:
@@ -179,6 +144,8 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
     """The branches of a layer in the layer below: every place of the former is within the lean of one of the latter, or
     where it may stand.
     """
+    if not branches:
+        return []
     lean, reachable = float(areas.lean_mm[layer]), areas.reachable[layer - 1]
     targets = _target_branches(branches, areas, layer)
     borders = index_edges(reachable)

@@ -14,8 +14,8 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation, unit
+from mdp.topology.cross_section import cross_sections
 from profiles.profile import Profile, load
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights
 from slicer.paths import KINDS, Kind, SlicedPart

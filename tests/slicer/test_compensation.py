@@ -6,8 +6,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdp.topology.cross_section import cross_sections
 from profiles.process import Process
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import MITRE, Polygons, clean, half_plane, offset
 from slicer.interface.interface import sections_of
 from slicer.sectioning import compensate, compensate_elephant_foot, compensated, reach_mm

@@ -9,10 +9,10 @@ from mdp.cost.footing import tips_over
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
+from mdp.topology.cross_section import cross_sections
 from profiles.errors import PlanError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import clean
 
 GAP_MM = 5.0  # between copies, or between their brims

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
+from mdp.topology.cross_section import cross_sections
 from slicer.bead import OUTSIDE, Bead
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean
 from slicer.interface.base_plane import plane_in_frame_of
 from slicer.interface.cut_faces import joined, nearest_areas

@@ -7,8 +7,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdp.topology.cross_section import cross_sections
 from slicer.bead import spacing_mm
-from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import PATH_RESOLUTION_MM
 from slicer.paths import Kind, bead_area_mm2

@@ -1,4 +1,4 @@
-"""Cross sections: the exact outlines of a closed mesh at many heights at once, and which faces belong to which layer.
+"""Cross sections: the exact outlines of a closed mesh at many heights at once.
 
 Each face that a plane crosses gives one segment, from the edge on which the face's boundary goes down through the plane
 to the edge on which it goes up; the neighbour over the upward edge gives the next segment, so chains close by topology alone.
@@ -14,11 +14,8 @@ from mdp.kernels.arrays import ints, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.kernels.sorting import rank, sort_into_bins
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import Mask
 from mdp.topology.linked_faces import opposites
 from profiles.errors import SliceError
-
-RIM_MM = 0.04  # the shadows of faces in neighbouring layers overlap by this so that they unite
 
 
 def cross_sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
@@ -35,7 +32,12 @@ def cross_sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
     open_edges = int((across < 0).sum())
     if open_edges:
         raise SliceError(f"the mesh is not closed: {open_edges} edges have a face on one side only")
-    points, ends, counts = _walk(mesh.vertices, mesh.faces, across, np.ascontiguousarray(cuts_mm, dtype=np.float64))
+    return loops_at(mesh.vertices, mesh.faces, across, np.ascontiguousarray(cuts_mm, dtype=np.float64))
+
+
+def loops_at(vertices: Floats, faces: Ints, across: Ints, cuts_mm: Floats) -> list[list[Floats]]:
+    """The loops as cross_sections gives them, of a closed mesh of which (3 m,) the half-edge across each half-edge is known."""
+    points, ends, counts = _walk(vertices, faces, across, cuts_mm)
     ends = ends[: counts.sum()]
     loops = np.split(points, ends[:-1]) if len(ends) else []
     bounds = np.concatenate([[0], np.cumsum(counts)])
@@ -85,17 +87,3 @@ def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Fl
             loop += 1
             counts[layer] += 1
     return points, ends, counts
-
-
-def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
-    """Chosen faces seen from above, (3, 2) counter-clockwise where they look down, by the layers whose strip of the surface they
-    belong to."""
-    corners = mesh.vertices[mesh.faces[chosen]]
-    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1), side="right")  # a section is what lies just below its plane
-    last = np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1))
-    last = np.minimum(np.maximum(last, first), len(cuts_mm) - 1)
-    faces: dict[int, list[Floats]] = {}
-    for corner, a, b in zip(np.ascontiguousarray(corners[:, ::-1, :2]), first.tolist(), last.tolist(), strict=True):
-        for layer in range(a, b + 1):
-            faces.setdefault(layer, []).append(corner)
-    return faces
