@@ -2,14 +2,14 @@
 
 import numpy as np
 
+from mdp.cut import convex_hull
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Indices, Mesh
 from mdp.overhang import Mask
+from mdp.topology.cross_section import cross_sections
 from mdp.zone import Zone, touched
 from slicer.geometry.polygons import Polygons, offset, union
 from slicer.overhangs import RIM_MM, faces_by_layer
-
-BOX_EDGES = tuple((a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4))  # by the numbers of its corners
 
 
 def no_support_areas(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
@@ -22,24 +22,15 @@ def no_support_areas(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
     if not marked.anywhere:
         return []
     named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))
-    boxes = [box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm) for box in marked.boxes]
+    boxes = [convex_hull(box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm)) for box in marked.boxes]
+    sections = [cross_sections(box, cuts_mm) for box in boxes]
     layers = []
-    for k, height_mm in enumerate(cuts_mm.tolist()):
-        pieces = [_box_section(box, height_mm) for box in boxes]
+    for k in range(len(cuts_mm)):
+        pieces = [Polygons(loops[k]) for loops in sections]
         if k in named:
             pieces.append(offset(Polygons([_upward(face) for face in named[k]]), RIM_MM))
         layers.append(union(pieces))
     return layers
-
-
-def _box_section(box: Floats, height_mm: float) -> Polygons:
-    """What a level plane cuts of a box given by its (8, 3) corners."""
-    points = []
-    for a, b in BOX_EDGES:
-        low, high = box[a, 2] - height_mm, box[b, 2] - height_mm
-        if (low > 0.0) != (high > 0.0):
-            points.append(box[a, :2] + low / (low - high) * (box[b, :2] - box[a, :2]))
-    return Polygons() if len(points) < 3 else Polygons.hull_points(np.array(points))
 
 
 def _upward(face: Floats) -> Floats:

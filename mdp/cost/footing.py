@@ -19,7 +19,7 @@ from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
-from mdp.topology.cross_section import loops_at
+from mdp.topology.cross_section import loop_edges, loops_at
 from mdp.topology.linked_faces import opposites
 from profiles.profile import Profile
 
@@ -194,8 +194,7 @@ def section_modulus_mm3(base: CrossSection) -> float:
 
 def section_edges(area: CrossSection) -> Floats:
     """(n, 4) the edges x, y, x, y of an area's outlines, the area on the left of each."""
-    loops = [np.asarray(loop) for loop in area.to_polygons()]
-    return np.concatenate([np.zeros((0, 4)), *(np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops)])
+    return loop_edges([np.asarray(loop) for loop in area.to_polygons()])
 
 
 def _tension_mpa(edges: Floats, height_mm: float, weight_n: float = 0.0, centre: Floats | None = None) -> float:

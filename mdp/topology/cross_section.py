@@ -5,6 +5,7 @@ to the edge on which it goes up; the neighbour over the upward edge gives the ne
 A vertex exactly in a plane counts as above it: the section of a flat top is taken from the solid below.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -87,3 +88,16 @@ def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Fl
             loop += 1
             counts[layer] += 1
     return points, ends, counts
+
+
+def loop_edges(loops: Sequence[Floats]) -> Floats:
+    """(n, 4) edges x0, y0, x1, y1 of closed loops (k, 2), loop after loop."""
+    if not loops:
+        return np.zeros((0, 4))
+    out = np.empty((sum(map(len, loops)), 4))
+    n = 0
+    for loop in loops:
+        end = n + len(loop)
+        out[n:end, :2], out[n : end - 1, 2:], out[end - 1, 2:] = loop, loop[1:], loop[0]
+        n = end
+    return out

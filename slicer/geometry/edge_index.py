@@ -15,7 +15,8 @@ from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import sort_into_bins
 from mdp.mesh import Floats
 from mdp.overhang import Mask
-from slicer.geometry.polygons import Polygons, contours, edges_of
+from mdp.topology.cross_section import loop_edges
+from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share
 
 MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
@@ -50,7 +51,7 @@ def index_edges(polygons: Polygons) -> EdgeIndex:
     """The edges of all contours, about one edge a cell."""
     loops = contours(polygons)
     begins = np.cumsum([0, *(len(loop) for loop in loops)]).astype(np.int64)
-    index: EdgeIndex = _index(edges_of(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
+    index: EdgeIndex = _index(loop_edges(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
     return index
 
 

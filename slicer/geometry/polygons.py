@@ -12,6 +12,7 @@ from manifold3d import CrossSection, FillRule, JoinType, OpType
 
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
+from mdp.topology.cross_section import loop_edges
 
 Polygons: TypeAlias = CrossSection
 
@@ -189,20 +190,7 @@ def close_loop(loop: Floats) -> Floats:
 
 def edges(polygons: Polygons) -> Floats:
     """(n, 4) edges of all contours, x0 y0 x1 y1."""
-    return edges_of(contours(polygons))
-
-
-def edges_of(loops: Sequence[Floats]) -> Floats:
-    """(n, 4) edges of loops (k, 2), loop after loop."""
-    if not loops:
-        return np.zeros((0, 4))
-    out = np.empty((sum(map(len, loops)), 4))
-    n = 0
-    for loop in loops:
-        end = n + len(loop)
-        out[n:end, :2], out[n : end - 1, 2:], out[end - 1, 2:] = loop, loop[1:], loop[0]
-        n = end
-    return out
+    return loop_edges(contours(polygons))
 
 
 def area_mm2(loop: Floats) -> float:

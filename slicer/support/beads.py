@@ -42,17 +42,12 @@ def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: 
     inner = offset(area, SEAM * width - edge) if edge else area
     roof = opening(inner ^ dense, 0.5 * width) if not dense.is_empty() else dense
     rest = inner if roof.is_empty() else opening(inner - roof, 0.25 * width)
-    density = process.support_foot_density if first else process.support_density
-    beads += [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in _sparse(rest, density, process, spacing)]
-    lines = _lines(roof, [process.infill_angle_deg + 90.0], process.support_interface_density, process, spacing)
+    across_deg = process.infill_angle_deg + 90.0
+    angles_deg = [process.infill_angle_deg] if process.support_pattern == "lines" else [process.infill_angle_deg, across_deg]
+    density = (process.support_foot_density if first else process.support_density) / len(angles_deg)
+    beads += [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in _lines(rest, angles_deg, density, process, spacing)]
+    lines = _lines(roof, [across_deg], process.support_interface_density, process, spacing)
     return beads + [Bead(Kind.SUPPORT_INTERFACE, line, width, OUTSIDE) for line in lines]
-
-
-def _sparse(area: Polygons, density: float, process: Process, spacing: float) -> list[Floats]:
-    angle = process.infill_angle_deg
-    if process.support_pattern == "lines":
-        return _lines(area, [angle], density, process, spacing)
-    return _lines(area, [angle, angle + 90.0], 0.5 * density, process, spacing)
 
 
 def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process: Process, spacing: float) -> list[Floats]:
