@@ -27,14 +27,6 @@ class Limits(NamedTuple):
     apart_mm: float
 
 
-class _BorderPoint(NamedTuple):
-    """A point of the border: on which edge of which contour, and how far along the way to it."""
-
-    edge: int
-    contour: int
-    way_mm: float
-
-
 def anchor_lines(pieces: Pieces, border: EdgeIndex, limits: Limits, group: Indices | None = None) -> list[Floats]:
     """Pieces as long lines (n, 2): joined where ends are near enough along the border, else with hooks.
 
@@ -59,15 +51,6 @@ def _way(edges: Floats) -> Floats:
 
 
 @helper
-def _contours(pieces: Pieces, border: EdgeIndex) -> Indices:
-    """(2 k,) contour on which each end lies."""
-    contour = longs(2 * len(pieces.ends), 0)
-    for end in range(len(contour)):
-        contour[end] = border.loop[pieces.ends[end // 2, end % 2]]
-    return contour
-
-
-@helper
 def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
     """(2 k,) way along all contours to each end."""
     points, bounds, ends = pieces
@@ -81,9 +64,11 @@ def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
 
 
 @helper
-def _next_ends(along_border: Floats, contour: Indices, offsets: Indices, way: Floats) -> tuple[Indices, Floats]:
-    """Of each end the next one on its contour, which may be itself, and how far it is."""
-    order = argsort(along_border)
+def _next_ends(along_border: Floats, ends: Indices, border: EdgeIndex, way: Floats) -> tuple[Indices, Floats]:
+    """Of each end the next one on its contour, which may be itself, and how far it is. ends: (k, 2) edges on which they lie."""
+    order, contour = argsort(along_border), longs(len(along_border), 0)
+    for end in range(len(contour)):
+        contour[end] = border.loop[ends[end // 2, end % 2]]
     after, gap = longs(len(along_border), 0), floats(len(along_border), 0.0)
     i = 0
     while i < len(order):
@@ -95,7 +80,7 @@ def _next_ends(along_border: Floats, contour: Indices, offsets: Indices, way: Fl
             after[here] = there
             gap[here] = along_border[there] - along_border[here]
             if k + 1 == j:
-                gap[here] += way[offsets[c + 1]] - way[offsets[c]]
+                gap[here] += way[border.begins[c + 1]] - way[border.begins[c]]
         i = j
     return after, gap
 
@@ -161,14 +146,15 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
 
 
 @no_nrt
-def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: EdgeIndex, way: Floats) -> int:
+def _append_run(out: Floats, n: int, since: tuple[int, float], length: float, border: EdgeIndex, way: Floats) -> int:
     """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
 
-    Also its last point; returns the new n.
+    since: the point's edge, and the way to it. Also the run's last point; returns the new n.
     """
-    edges, e, first, end = border.edges, since.edge, border.begins[since.contour], border.begins[since.contour + 1]
+    e, way_mm = since
+    edges, first, end = border.edges, border.begins[border.loop[e]], border.begins[border.loop[e] + 1]
     left, forward = abs(length), length > 0.0
-    at = since.way_mm - way[e] if forward else way[e + 1] - since.way_mm
+    at = way_mm - way[e] if forward else way[e + 1] - way_mm
     step = way[e + 1] - way[e]
     corner = 2 if forward else 0
     while left > step - at:
@@ -209,9 +195,9 @@ def _lay_lines(
     pieces: Pieces, border: EdgeIndex, group: Indices, limits: Limits, out: Floats, starts: Indices
 ) -> tuple[int, int]:
     """Fills in the lines and where each begins; returns the number of points and of lines."""
-    way, contour = _way(border.edges), _contours(pieces, border)
+    way = _way(border.edges)
     along_border = _ways_along_border(pieces, border.edges, way)
-    after, gap = _next_ends(along_border, contour, border.begins, way)
+    after, gap = _next_ends(along_border, pieces.ends, border, way)
     partner, sense = _join_ends(after, gap, group, limits.most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, limits))
     done = flags(len(pieces.ends))
@@ -225,7 +211,7 @@ def _lay_lines(
         starts[count] = n
         count += 1
         if runs[end] != 0.0:
-            since = _BorderPoint(pieces.ends[end // 2, end % 2], contour[end], along_border[end])
+            since = (pieces.ends[end // 2, end % 2], along_border[end])
             first, n = n, _append_run(out, n, since, runs[end], border, way)
             _reverse(out, first, n)
         while True:
@@ -233,7 +219,7 @@ def _lay_lines(
             n = _append_piece(out, n, pieces, end)
             end ^= 1
             if runs[end] != 0.0:
-                since = _BorderPoint(pieces.ends[end // 2, end % 2], contour[end], along_border[end])
+                since = (pieces.ends[end // 2, end % 2], along_border[end])
                 n = _append_run(out, n, since, runs[end], border, way)
             if partner[end] < 0:
                 break

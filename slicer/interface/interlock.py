@@ -14,6 +14,7 @@ the part below it is a hole like any other, with walls round it and a floor.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 from math import ceil, pi
 
 import manifold3d as m3
@@ -26,6 +27,7 @@ from mdp.topology.cross_section import cross_sections
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead, interface_process
+from slicer.geometry.edge_index import index_edges, lie_within
 from slicer.geometry.polygons import Polygons, area_mm2, clean, islands, offset, offset_round, union
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights
@@ -42,7 +44,6 @@ RANK = OUTSIDE - 1  # before all else of the layer
 ROUND = 12  # chords of a circle that the tip goes
 MOST_AREA = 3.0  # of a stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
 HALVINGS = 20
-DOT_MM = 1e-3  # a square so small stands for a point
 WIDENED, MOST_WIDENED = 1.1, 60  # a grid with too many places, by so much and so often
 
 Pins = Mapping[int, Floats]  # by the part that fills them: (k, 3) x and y of the mouth's middle, mm, and the mm3 of its hole
@@ -160,11 +161,12 @@ def _places(room: Polygons, process: Process) -> list[tuple[float, float]]:
 
 def _grid(room: Polygons, step_mm: float) -> list[tuple[float, float]]:
     """In every piece of the room a square grid about its middle, or its deepest place where that meets none."""
-    dot, places = Polygons.square((DOT_MM, DOT_MM), True), list[tuple[float, float]]()
+    places: list[tuple[float, float]] = []
     for island in sorted(islands(room), key=lambda piece: piece.bounds()):
         x0, y0, x1, y1 = island.bounds()
         grid = [(x, y) for y in _row(y0, y1, step_mm) for x in _row(x0, x1, step_mm)]
-        places += [place for place in grid if not (dot.translate(place) ^ island).is_empty()] or [_deepest(island)]
+        within = lie_within(index_edges(island), np.array(grid)).tolist()
+        places += list(compress(grid, within)) or [_deepest(island)]
     return places
 
 
