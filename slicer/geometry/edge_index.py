@@ -20,6 +20,7 @@ from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share
 
 MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
+FARTHEST_MM = 1e7  # no edge is farther from a point that is asked for
 Indices = NDArray[np.int64]
 
 
@@ -223,7 +224,7 @@ def depths(points: Floats, index: EdgeIndex) -> Floats:
     for k in range(len(points) if len(index.edges) else 0):
         x, y = points[k, 0], points[k, 1]
         reach, which = index.grid.size_mm, -1
-        while which < 0:
+        while which < 0 and reach < FARTHEST_MM:
             px, py, which = nearest(index, x, y, reach)
             reach *= 2.0
         out[k] = np.hypot(px - x, py - y) if within(index, x, y) else -np.hypot(px - x, py - y)
