@@ -1,9 +1,9 @@
 """Spans: whether straight lines over a hanging place, all in one direction, reach from anchor to anchor and are short enough.
 
-One definition for the search, which asks so for patches of the surface, and for the slicer's bridges (slicer.fill.bridge): the
-directions that are tried, where lines cross the sides, and how much of them may be loose or too long. Each says itself how many
-directions and lines it can afford, and what holds a line: the search knows of every side of the rim whether it is an anchor, the
-slicer looks whether a line ends on the layer below.
+One definition for the search, which asks so for patches of the surface, and for the slicer's bridges (slicer.fill.bridge): where
+lines cross the sides, and how much of them may be loose or too long. Each says itself which directions and lines it can afford,
+and what holds a line: the search knows of every side of the rim whether it is an anchor, the slicer looks whether a line ends on
+the layer below.
 """
 
 from typing import NamedTuple
@@ -35,7 +35,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
     """Whether lines of one direction span a place of that area, none longer than that; they lie a line width apart or further."""
     if longest_mm <= 0.0 or len(sides.anchored) == 0:
         return False
-    angles = directions(sides.ends, TURNS)
+    angles = _angles(sides.ends)
     for a in range(len(angles)):
         cos, sin = np.cos(angles[a]), np.sin(angles[a])
         across_mm, loose_mm = _across(sides, cos, sin)
@@ -60,7 +60,7 @@ def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
 
 
 @helper
-def directions(ends: Floats, turns: int) -> Floats:
+def _angles(ends: Floats) -> Floats:
     """Directions worth trying, radians: along and across the two that most of the sides run in, and others evenly."""
     length, turned = floats(BINS, 0.0), floats(BINS, 0.0)
     for e in range(len(ends)):
@@ -70,7 +70,7 @@ def directions(ends: Floats, turns: int) -> Floats:
         b = min(max(int(angle / np.pi * BINS + BESIDE), 0), BINS - 1)
         length[b] += size
         turned[b] += size * angle
-    angles = floats(turns + 4, 0.0)
+    angles = floats(TURNS + 4, 0.0)
     for own in range(2):
         b = 0
         for candidate in range(1, BINS):
@@ -79,8 +79,8 @@ def directions(ends: Floats, turns: int) -> Floats:
         angle = turned[b] / length[b] if length[b] > 0.0 else 0.1 * own
         angles[2 * own], angles[2 * own + 1] = angle + 0.5 * np.pi, angle
         length[b] = 0.0
-    for k in range(turns):
-        angles[4 + k] = np.pi * k / turns
+    for k in range(TURNS):
+        angles[4 + k] = np.pi * k / TURNS
     return angles
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
-from mdp.support_need.spans import ROUNDING_MM, TOLERATED, directions, line_across
+from mdp.support_need.spans import ROUNDING_MM, TOLERATED, line_across
 from slicer.bead import Bead
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.clip import rotation_2d
@@ -16,6 +16,7 @@ from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, 
 from slicer.paths import Kind
 
 TURNS = 18  # directions tried over half a turn, besides those of the place's own sides: more than by the search, they are printed
+SIDES = 8  # so many of its longest sides are tried, along and across: lines follow a side that is there, not the mean of several
 LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
 NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges
 REACH = 2.0  # line widths that the lines of a bridge reach over its anchors
@@ -51,8 +52,9 @@ def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridg
     """
     if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):
         return None
-    angle, longest_mm, loose, _ = _least_sag(edges(hanging), anchors, width_mm)
-    return None if np.isnan(angle) else Bridge(hanging, float(np.degrees(angle) % 180.0), longest_mm, loose)
+    sides = edges(hanging)
+    angle, longest_mm, loose, _ = _least_sag(sides, anchors, _angles(sides), width_mm)
+    return None if np.isnan(angle) else Bridge(hanging, float(np.degrees(angle)), longest_mm, loose)
 
 
 def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> list[Bridge]:
@@ -77,8 +79,7 @@ def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> list
 def _held_piece(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
     """What of a place has lines held at both ends in the direction that has most of them; None where that is next to nothing."""
     sides = edges(hanging)
-    *_, angle = _least_sag(sides, anchors, width_mm)
-    angle_deg = float(np.degrees(angle) % 180.0)
+    *_, angle = _least_sag(sides, anchors, _angles(sides), width_mm)
     lines = _lines_across(sides, anchors, angle, width_mm)
     lines = lines[lines[:, 3] == 2.0]
     if not len(lines):
@@ -87,7 +88,16 @@ def _held_piece(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridg
     piece = opening(strips(list(ends), 0.5 * width_mm + RIM_MM) ^ hanging, 0.5 * width_mm)
     if piece.area() < LEAST * width_mm**2:
         return None
-    return Bridge(piece, angle_deg, float((lines[:, 1] - lines[:, 0]).max()), 0.0)
+    return Bridge(piece, float(np.degrees(angle)), float((lines[:, 1] - lines[:, 0]).max()), 0.0)
+
+
+def _angles(sides: Floats) -> Floats:
+    """Directions worth trying, radians in 0 .. pi, those of the place's sides first."""
+    steps = sides[:, 2:] - sides[:, :2]
+    longest = np.argsort(-np.hypot(*steps.T), kind="stable")[:SIDES]
+    along = np.arctan2(steps[longest, 1], steps[longest, 0])
+    own = np.round(np.concatenate([along, along + 0.5 * np.pi]) % np.pi, 4)
+    return np.concatenate([np.unique(own), np.pi * np.arange(TURNS) / TURNS])
 
 
 @kernel
@@ -112,12 +122,12 @@ def _lines_across(sides: Floats, anchors: EdgeIndex, angle: float, width_mm: flo
 
 
 @kernel
-def _least_sag(sides: Floats, anchors: EdgeIndex, width_mm: float) -> tuple[float, float, float, float]:
-    """The angle that sags least (nan: none is held), its longest span and the share of its lines that is loose; and the angle
-    with most of them held at both ends."""
+def _least_sag(sides: Floats, anchors: EdgeIndex, angles: Floats, width_mm: float) -> tuple[float, float, float, float]:
+    """Of some angles the one that sags least (nan: none is held), its longest span and the share of its lines that is loose; and
+    the one with most of them held at both ends."""
     best, least, longest_mm, loose = np.nan, np.inf, 0.0, 0.0
     holding, most_mm = 0.0, -1.0
-    for angle in directions(sides, TURNS):
+    for angle in angles:
         lines = _lines_across(sides, anchors, angle, width_mm)
         total = sagging = free = longest = 0.0
         any_held = False

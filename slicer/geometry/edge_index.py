@@ -17,7 +17,7 @@ from mdp.mesh import Floats
 from mdp.overhang import Mask
 from mdp.topology.cross_section import loop_edges
 from slicer.geometry.polygons import Polygons, contours
-from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share
+from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share, squared_distance
 
 MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
 FARTHEST_MM = 1e7  # no edge is farther from a point that is asked for
@@ -225,7 +225,8 @@ def depths(points: Floats, index: EdgeIndex) -> Floats:
         x, y = points[k, 0], points[k, 1]
         reach, which = index.grid.size_mm, -1
         while which < 0 and reach < FARTHEST_MM:
-            px, py, which = nearest(index, x, y, reach)
+            _, _, which = nearest(index, x, y, reach)
             reach *= 2.0
-        out[k] = np.hypot(px - x, py - y) if within(index, x, y) else -np.hypot(px - x, py - y)
+        distance = sqrt(squared_distance(edge(index.edges, which), x, y)) if which >= 0 else inf
+        out[k] = distance if within(index, x, y) else -distance
     return out
