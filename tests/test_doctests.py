@@ -24,4 +24,4 @@ def test_the_examples_of_a_module_are_true(module: str) -> None:
 
 
 def test_a_newcomer_finds_an_example_of_slicing() -> None:
-    assert {"slicer.slice", "slicer.geometry.cross_section"} <= set(modules_with_examples())
+    assert {"slicer.slice", "mdp.topology.cross_section"} <= set(modules_with_examples())

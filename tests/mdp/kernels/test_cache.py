@@ -34,7 +34,7 @@ def test_the_sources_of_a_kernel_are_its_file_and_what_its_parts_and_constants_c
         "mdp/kernels/kernel.py",
         "mdp/mesh.py",
     }
-    assert cache.PACKAGES / "slicer" / "geometry" / "cells.py" in cache.sources(strokes / "travels.py")
+    assert cache.PACKAGES / "slicer" / "geometry" / "edge_index.py" in cache.sources(strokes / "travels.py")
 
 
 def test_the_folder_is_the_one_named_or_the_user_s_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

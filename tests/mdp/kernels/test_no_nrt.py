@@ -4,7 +4,17 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
-NUMBERS = {"None", "int", "float", "bool", "Segment", "tuple[int, int]", "tuple[float, float]", "tuple[float, float, float]"}
+NUMBERS = {
+    "None",
+    "int",
+    "float",
+    "bool",
+    "Segment",
+    "Point",
+    "tuple[int, int]",
+    "tuple[float, float]",
+    "tuple[float, float, float]",
+}
 NUMERIC = (
     "abs",
     "arccos",
