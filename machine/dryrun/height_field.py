@@ -46,7 +46,7 @@ def empty_field(low: Floats, high: Floats) -> Field:
     cell = max(CELL_MM, float(np.sqrt(size.prod() / MOST_CELLS)))
     shape = np.ceil(size / cell).astype(np.int64) + 1
     count, blocks = int(shape.prod()), (shape + BLOCK - 1) // BLOCK
-    # below and owner are asked of cells with plastic alone: what is not written takes no memory.
+    # below and owner say nothing of cells without plastic: what is not written takes no memory.
     heights = (np.full(count, NOTHING, np.float32), np.empty(count, np.float32), np.zeros(count, np.int32))
     coarse, order = np.full(int(blocks.prod()), NOTHING), np.arange(int(blocks.prod()))
     return Field(np.asarray(low, np.float64), cell, shape, *heights, coarse, order, np.full(2, NOTHING))

@@ -174,6 +174,8 @@ def _under(
         return 0
     k = i * field.shape[1] + j
     top, owner = field.top[k], field.owner[k]
+    if top <= NOTHING:
+        return 0
     same_path = owner >= about.first and strokes.path[owner] == strokes.path[row]
     if same_path and at - strokes.way[owner] < 2.0 * OWN * half and top > z - 0.5 * height:
         top = field.below[k]
@@ -183,9 +185,9 @@ def _under(
     if top > (z - 0.3 * height if owner >= about.first else z + ROUGH * half):
         return 2
     reach = 0.6 * height if strict else 1.6 * height
-    if not strict and owner >= 0 and owner < about.first:
+    if not strict and owner < about.first:
         reach += half
-    if not strict and (strokes.stands_off[row] or (owner >= 0 and strokes.stands_off[owner])):
+    if not strict and (strokes.stands_off[row] or strokes.stands_off[owner]):
         reach += height * np.ceil(about.gap / height - EVEN)  # support ends with a layer: its gap is rounded up to whole ones
     return 1 if top > z - reach else 0
 

@@ -111,7 +111,7 @@ class Plate:
 
     def footing(self, rotation: Floats) -> Footing:
         """How the model stands when it is turned by a rotation (3, 3)."""
-        turned, centre = self.mesh.vertices @ rotation.T, rotation @ self.centre
+        turned, centre = np.column_stack([dot(self.mesh.vertices, row) for row in rotation]), rotation @ self.centre
         low, high = float(turned[:, 2].min()), float(turned[:, 2].max())
         half_mm = 0.5 * (high - low)
         touching_mm, blunt_mm = min(0.5 * PLATFORM_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm)

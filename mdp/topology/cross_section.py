@@ -83,6 +83,8 @@ def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Fl
                         n += 1
                     elif below_tail and not below_head:
                         up = k
+                if across[3 * f + up] < 0:  # the rim of an open mesh ends the loop
+                    break
                 f = across[3 * f + up] // 3
             ends[loop] = n
             loop += 1

@@ -15,7 +15,7 @@ from slicer.geometry.edge_index import EdgeIndex, within
 from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, strips
 from slicer.paths import Kind
 
-TURNS = 18  # directions tried over half a turn, besides those of the place's own sides: more than by the search, they are printed
+TURNS = 18  # directions tried over half a turn, besides those of the place's own sides; the search tries fewer
 SIDES = 8  # so many of its longest sides are tried, along and across: lines follow a side that is there, not the mean of several
 LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
 NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges

@@ -126,7 +126,7 @@ def _cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
 
     points, out: (n, 2 or more), further columns are interpolated.
     """
-    shares, crossed, is_within = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0), False
+    shares, crossed = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0)
     columns, n = points.shape[1], 1
     for axis in range(columns):
         out[0, axis] = points[0, axis]
@@ -140,9 +140,9 @@ def _cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
         for s in range(many + 1):
             if s < many and not SNAP < shares[s] < 1.0 - SNAP:
                 continue
-            if k == 0 or many > 0:
-                middle = 0.5 * (since + shares[s])
-                is_within = within(area, step.x0 + middle * (step.x1 - step.x0), step.y0 + middle * (step.y1 - step.y0))
+            # Asked of every piece: where a line leaves the area exactly at one of its points, no step crosses an edge.
+            middle = 0.5 * (since + shares[s])
+            is_within = within(area, step.x0 + middle * (step.x1 - step.x0), step.y0 + middle * (step.y1 - step.y0))
             for axis in range(columns):
                 end = points[k + 1, axis]
                 out[n, axis] = end if s == many else points[k, axis] + shares[s] * (end - points[k, axis])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from slicer.bead import Bead
-from slicer.geometry.polygons import Polygons
+from slicer.geometry.polygons import Polygons, of_contours
 from slicer.paths import NUMBER, Kind
 from slicer.strokes.split import cut_line, split
 from slicer.strokes.strokes import Strokes, strokes_of
@@ -106,3 +106,10 @@ def test_beads_of_other_kinds_are_left_alone() -> None:
     left, within = split(skin, SQUARE, skin.is_of(Kind.OUTER_WALL), 0.0)
     assert all(np.array_equal(getattr(left, column.name), getattr(skin, column.name)) for column in fields(Strokes))
     assert within.tolist() == [False]
+
+
+def test_a_line_that_leaves_a_place_exactly_at_one_of_its_own_points_is_outside_from_there() -> None:
+    corner = [3.307692304253578, 4.615384608507156]
+    place = of_contours([np.array([[6.0, 4.0], [4.0, 6.0], corner, [6.0, 3.0]])])
+    _, within = cut_line(np.array([[6.0, 4.0], corner, [1.3415410790929447, 3.2335858933747845]]), place)
+    assert within.tolist() == [True, False]
