@@ -21,6 +21,7 @@ FLAGS = [
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),  # WebGL2 without a graphics card
 ]
 PATIENCE_S = 150.0  # on a busy machine its start alone has taken 50 s
+NAVIGATED = "Inspected target navigated or closed"  # what the browser answers where the page it was asked of is left
 
 
 class Browser:
@@ -101,11 +102,20 @@ class Browser:
     def wait(self, condition: str) -> None:
         """Until a JavaScript condition, or what it promises, holds. Raises TimeoutError with the console's complaints."""
         end = time.monotonic() + PATIENCE_S
-        while not self.value(f"Promise.resolve({condition}).then(Boolean)"):
+        while not self._holds(condition):
             if time.monotonic() > end:
                 root = self.value("({...document.documentElement.dataset, title: document.title})")
                 raise TimeoutError(f"{condition}; the page is {root}, the console says {self.complaints}")
             time.sleep(0.02)
+
+    def _holds(self, condition: str) -> bool:
+        """Whether a condition holds; not yet where the page is left for another while it is asked."""
+        try:
+            return bool(self.value(f"Promise.resolve({condition}).then(Boolean)"))
+        except RuntimeError as error:
+            if NAVIGATED not in str(error):
+                raise
+            return False
 
     def click(self, selector: str) -> None:
         """A click on an element, as its own handler gets it."""
