@@ -21,31 +21,20 @@ INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin
 EVEN_MM = 0.03  # widths that differ by less are one
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
-    """The way of a bead and how wide it is along it. points: (n, 2) mm, a closed one repeats its first; widths: (n,) mm."""
-
-    points: Floats
-    widths: Floats
-
-    @property
-    def width_mm(self) -> float:
-        """Mean width."""
-        return float(_mean_width(self.points, self.widths))
-
-    @property
-    def varies(self) -> bool:
-        """Whether its widths differ by more than EVEN_MM."""
-        return float(np.ptp(self.widths)) > EVEN_MM
-
-
 @kernel
-def _mean_width(points: Floats, widths: Floats) -> float:
+def mean_width_mm(course: Floats) -> float:
+    """Mean width of a bead along its course (n, 3) of x, y and width."""
+    first = course[0, 2]
     more = length = 0.0  # more than the first, so that the mean of equal widths is exactly theirs
-    for k in range(len(points) - 1):
-        step = np.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
-        more, length = more + (0.5 * (widths[k] + widths[k + 1]) - widths[0]) * step, length + step
-    return float(widths[0] + more / length) if length > 0.0 else float(widths[0])
+    for k in range(len(course) - 1):
+        step = np.hypot(course[k + 1, 0] - course[k, 0], course[k + 1, 1] - course[k, 1])
+        more, length = more + (0.5 * (course[k, 2] + course[k + 1, 2]) - first) * step, length + step
+    return float(first + more / length) if length > 0.0 else float(first)
+
+
+def varying(course: Floats) -> Floats | None:
+    """The course (n, 3) of a bead if its widths differ by more than EVEN_MM, else None."""
+    return course if float(np.ptp(course[:, 2])) > EVEN_MM else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +45,7 @@ class Bead:
     each outer wall, what is below all ranks of walls comes before them. over_infill: a bridge over the sparse infill of the
     layer below, which has a speed and a fan of its own. follows: printed right after the bead before it in the list. overhang:
     of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or nothing of it lies on plastic. line: a wall that does not run
-    round. course: where the width varies, of which width_mm is then the mean; the points lie on it.
+    round. course: (k, 3) x, y and width where the width varies; width_mm is then their mean, and the points lie on the course.
     """
 
     kind: Kind
@@ -68,7 +57,7 @@ class Bead:
     follows: bool = False
     overhang: int = 0
     line: bool = False
-    course: Course | None = None
+    course: Floats | None = None
 
     @property
     def closed(self) -> bool:

@@ -14,7 +14,7 @@ from slicer.fill.bridge import Bridge, bridge_area, bridge_beads, find_bridges, 
 from slicer.fill.infill import infill_beads, pattern_density
 from slicer.fill.ironing import ironed_areas, ironing_beads
 from slicer.fill.region import Region, regions
-from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_beads
+from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_lines
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, of_contours, offset, opening, union
 from slicer.interface.cut_faces import cover, cut_walls, model_sections
@@ -160,7 +160,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     process, region, height_mm = shell.process, shell.region, float(heights.height_mm[layer])
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     lines = SolidLines(angle_of_layer_deg(process.infill_angle_deg, layer), width, height_mm, overlap)
-    beads = wall_beads(shell.walls, process, height_mm) + gaps(shell.walls.narrow, width, height_mm)
+    beads = wall_beads(shell.walls, process, height_mm)
     for bridge in shell.bridges:
         area = bridge_area(bridge, shell.walls.inside, width)
         if not area.is_empty():
@@ -171,9 +171,14 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         if not area.is_empty():
             beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
             region = region.without(area, width)
-    beads += skin_beads(region.solid, Kind.SKIN, lines)
     top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
-    beads += skin_beads(region.top, Kind.TOP_SKIN, top)
+    places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
+    for area, kind, solid in ((region.solid, Kind.SKIN, lines), (region.top, Kind.TOP_SKIN, top)):
+        skin, rests = skin_lines(area, kind, solid)
+        beads += skin
+        places.setdefault(solid.width_mm, []).extend(rests)
+    for width_mm, around in places.items():
+        beads += gaps(around, width_mm, height_mm)
     beads += ironing_beads(shell.ironed, lines, process)
     sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
     return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from profiles.process import Process
 from slicer.bead import Bead, width_for_mm
 from slicer.fill.region import Region
-from slicer.fill.skin import SolidLines, skin_beads
+from slicer.fill.skin import SolidLines, skin_lines
 from slicer.geometry.polygons import Polygons, larger, offset, opening
 from slicer.paths import Kind, bead_area_mm2
 
@@ -36,5 +36,5 @@ def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Be
     spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
     flow = process.ironing_flow * spacing * height_mm / bead_area_mm2(width, height_mm)
     dense = SolidLines(skin.angle_deg + 90.0, width_for_mm(spacing, height_mm), height_mm, in_order=True)
-    beads = skin_beads(area, Kind.IRONING, dense)
-    return [replace(bead, width_mm=width, flow=flow, rank=RANK) for bead in beads if bead.kind is Kind.IRONING]
+    beads, _ = skin_lines(area, Kind.IRONING, dense)
+    return [replace(bead, width_mm=width, flow=flow, rank=RANK) for bead in beads]

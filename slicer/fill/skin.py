@@ -47,22 +47,28 @@ class SolidLines:
 
 
 def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
-    """Beads that fill an area completely.
+    """Beads that fill an area completely: lines, and what fills the places that they leave."""
+    beads, rests = skin_lines(area, kind, solid)
+    return beads + gaps(rests, solid.width_mm, solid.height_mm)
 
-    The lines of each connected piece are spread evenly; places they leave get beads of their own. The flow makes the
-    plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill it.
+
+def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead], list[Polygons]]:
+    """The lines that fill an area, those of each connected piece spread evenly, and the places that they leave in each.
+
+    The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
+    it.
     """
     spacing, width_mm = solid.spacing_mm, solid.width_mm
-    beads: list[Bead] = []
+    beads, rests = list[Bead](), list[Polygons]()
     for island in islands(area):
         lines = _lines(offset(island, -(0.5 * spacing - solid.overlap * width_mm)), solid)
         rest = uncovered_area(island, lines, width_mm)
-        beads += gaps(rest, width_mm, solid.height_mm)
+        rests.append(rest)
         total = sum(length_mm(line) for line in lines)
         if total > 0:
             flow = min(max((island.area() - rest.area()) / (total * spacing), LEAST_FLOW), MOST_FLOW)
             beads += [Bead(kind, line, width_mm, RANK, flow, follows=solid.in_order and k > 0) for k, line in enumerate(lines)]
-    return beads
+    return beads, rests
 
 
 def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:

@@ -20,27 +20,35 @@ class Triangulation(NamedTuple):
     """points: (n, 2) mm. Half-edge 3 t + k runs from the point tails[3 t + k] of triangle t to its next one.
 
     tails: (3 m,) counter-clockwise in every triangle; across: (3 m,) the half-edge on the other side, -1 on the boundary.
+    piece: (n,) the piece that each point belongs to.
     """
 
     points: Floats
     tails: Ints
     across: Ints
+    piece: Indices
 
 
-def triangulate(loops: Sequence[Floats], step_mm: float = np.inf) -> Triangulation | None:
-    """The Delaunay triangulation of polygons given by their contours (k, 2); None where they have no area.
+def triangulate(pieces: Sequence[Sequence[Floats]], step_mm: float = np.inf) -> Triangulation | None:
+    """The Delaunay triangulation of several polygons given by their contours (k, 2), each by itself; None where none has an area.
 
     step_mm: sides get points so that none is longer. They are put in after the polygons have been triangulated without them,
     which takes a fraction of the time. The result is a Delaunay triangulation; where four points lie on a circle there are two.
     """
+    loops = [loop for piece in pieces for loop in piece]
     if not loops:
         return None
-    triangles = np.asarray(manifold3d.triangulate(list(loops)), dtype=np.int32).reshape(-1, 3)
+    sizes = [sum(map(len, piece)) for piece in pieces]
+    begins = np.cumsum([0, *sizes])
+    apart = [
+        np.asarray(manifold3d.triangulate(list(piece))) + begin for piece, begin in zip(pieces, begins, strict=False) if piece
+    ]
+    triangles = np.concatenate(apart).astype(np.int32).reshape(-1, 3)
     if not len(triangles):
         return None
     points, first, between = resample(np.concatenate(loops), np.cumsum([0, *map(len, loops)]), step_mm)
     tails, across = _with_samples(triangles.ravel(), opposites(triangles), first, between)
-    triangulation = Triangulation(points, tails, across)
+    triangulation = Triangulation(points, tails, across, np.repeat(np.repeat(np.arange(len(pieces)), sizes), between + 1))
     _flip(triangulation)
     return triangulation
 
@@ -131,7 +139,7 @@ def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
 @kernel
 def _flip(triangulation: Triangulation) -> int:
     """Flips inner sides in place until every one is locally Delaunay; returns how many times."""
-    points, tails, across = triangulation
+    points, tails, across, _ = triangulation
     waiting, stack, queued = len(tails), longs(len(tails), 0), flags(len(tails))
     for k in range(len(tails)):
         stack[k], queued[k] = len(tails) - 1 - k, True

@@ -95,7 +95,7 @@ def cut_walls(
         *(bead.points for bead in ending),
         *(close_loop(loop) for level in loops[process.interface_walls :] for loop in level),
     ]
-    ending += gaps(uncovered_area(round_.inside - inside, lines, width), width, height_mm)
+    ending += gaps([uncovered_area(round_.inside - inside, lines, width)], width, height_mm)
     return replace(round_, loops=tuple(loops), inside=inside), tuple(ending), fewer.inside
 
 

@@ -105,7 +105,7 @@ def strokes_of(
     for k, bead in enumerate(beads):
         if bead.course is not None:
             way = points[starts[k] : starts[k + 1]]
-            way[:, 2] = _widths_at(way, bead.course.points, bead.course.widths)
+            way[:, 2] = _widths_at(way, bead.course)
     ends = points[starts[1:] - 1, :2] - points[starts[:-1], :2]
     closed = np.hypot(ends[:, 0], ends[:, 1]) <= width_mm  # a seam gap leaves a wall a little open
     small = is_of(kind, RINGS) & closed & (lengths_mm(points, starts) <= small_wall_mm)
@@ -127,21 +127,21 @@ def strokes_of(
 
 
 @kernel
-def _widths_at(places: Floats, points: Floats, widths: Floats) -> Floats:
-    """(n,) widths at places (n, 2 or 3) on a course (k, 2); the search for a place begins at the step nearest to the last one."""
+def _widths_at(places: Floats, course: Floats) -> Floats:
+    """(n,) widths at places (n, 2 or 3) on a course (k, 3); the search for a place begins at the step nearest to the last one."""
     out: Floats = floats(len(places), 0.0)
-    steps, at = len(points) - 1, 0
+    steps, at = len(course) - 1, 0
     for i in range(len(places)):
         least = np.inf
         for tried in range(steps):
             k = (at + tried) % steps
-            side = Segment(points[k, 0], points[k, 1], points[k + 1, 0], points[k + 1, 1])
+            side = Segment(course[k, 0], course[k, 1], course[k + 1, 0], course[k + 1, 1])
             share = nearest_share(side, places[i, 0], places[i, 1])
             x, y = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
             away = (x - places[i, 0]) ** 2 + (y - places[i, 1]) ** 2
             if away < least:
                 least, nearest = away, k
-                out[i] = widths[k] + share * (widths[k + 1] - widths[k])
+                out[i] = course[k, 2] + share * (course[k + 1, 2] - course[k, 2])
                 if away < 1e-16:
                     break
         at = nearest

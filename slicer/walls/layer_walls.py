@@ -3,8 +3,6 @@
 An island that is nowhere narrower than its walls want gets walls of one width, which the variable ones would be too.
 """
 
-from itertools import chain
-
 import numpy as np
 
 from profiles.process import Process
@@ -57,7 +55,7 @@ def layer_walls(section: Polygons, count: int, process: Process, height_mm: floa
     even = walls(Polygons.compose(thick), count, process, height_mm)
     if not narrow:
         return even
-    varying = tuple(chain.from_iterable(variable_walls(island, rule) for island in narrow))
+    varying = tuple(variable_walls(narrow, rule))
     inside = _enclosed(Polygons.compose(narrow), varying, rule)
     return Walls(even.loops, even.inside + inside, even.narrow, varying)
 
@@ -82,6 +80,6 @@ def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polyg
     inside = offset_round(section, -_wall_mm(rule)).simplify(PATH_RESOLUTION_MM)
     middle = [wall.course for wall in varying if wall.level == rule.walls]
     if middle:
-        reach_mm = [0.25 * (course.widths[1:] + course.widths[:-1]) for course in middle]
-        inside = inside - strips([course.points for course in middle], np.concatenate(reach_mm))
+        reach_mm = [0.25 * (course[1:, 2] + course[:-1, 2]) for course in middle]
+        inside = inside - strips([course[:, :2] for course in middle], np.concatenate(reach_mm))
     return inside if inside.is_empty() else opening(inside, 0.5 * rule.inner)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, bulge_flow, outer_wall_width_mm, spacing_mm
+from slicer.bead import Bead, bulge_flow, mean_width_mm, outer_wall_width_mm, spacing_mm, varying
 from slicer.geometry.polygons import Polygons, contours, offset, opening
 from slicer.geometry.polyline import PATH_RESOLUTION_MM
 from slicer.paths import Kind
@@ -81,11 +81,10 @@ def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
 def _varying_bead(wall: Wall, process: Process, height_mm: float) -> Bead:
     """A wall of varying width as a bead; one that fills a place from side to side bulges on both."""
     kind = Kind.INNER_WALL if wall.level else Kind.OUTER_WALL
-    course = wall.course
-    width = course.width_mm
+    width = mean_width_mm(wall.course)
     flow = bulge_flow(width, height_mm, wall.free, process.outer_bulge * process.line_width_mm)
-    rank, varying = wall_rank(wall.level, process), course if course.varies else None
-    return Bead(kind, wall.points, width, rank, flow, line=not wall.closed, course=varying)
+    rank = wall_rank(wall.level, process)
+    return Bead(kind, wall.points, width, rank, flow, line=not wall.closed, course=varying(wall.course))
 
 
 def wall_rank(level: int, process: Process) -> int:

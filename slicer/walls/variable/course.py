@@ -54,23 +54,24 @@ def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> F
 
 
 @kernel
-def corners(points: Floats, widths: Floats, level: int) -> NDArray[np.bool_]:
-    """(n,) points that the wall of a level keeps when it is simplified (Douglas and Peucker 1973), in place and in width."""
+def corners(course: Floats, level: int) -> NDArray[np.bool_]:
+    """(n,) points of a course (n, 3) that the wall of a level keeps when it is simplified (Douglas and Peucker 1973), in place
+    and in width."""
     tolerance_mm = PATH_RESOLUTION_MM if level else SEEN_RESOLUTION_MM
-    keep = flags(len(points))
-    keep[0], keep[len(points) - 1] = True, True
-    stack = longs(2 * len(points), 0)
-    stack[1], waiting = len(points) - 1, 2
+    keep = flags(len(course))
+    keep[0], keep[len(course) - 1] = True, True
+    stack = longs(2 * len(course), 0)
+    stack[1], waiting = len(course) - 1, 2
     while waiting > 0:
         waiting -= 2
         a, b = stack[waiting], stack[waiting + 1]
-        chord = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
+        chord = Segment(course[a, 0], course[a, 1], course[b, 0], course[b, 1])
         worst, at = 1.0, -1
         for k in range(a + 1, b):
-            x, y = points[k, 0], points[k, 1]
+            x, y = course[k, 0], course[k, 1]
             share = nearest_share(chord, x, y)
             dx, dy = x - chord.x0 - share * (chord.x1 - chord.x0), y - chord.y0 - share * (chord.y1 - chord.y0)
-            wider = (widths[a] + share * (widths[b] - widths[a]) - widths[k]) / WIDTH_STEP_MM
+            wider = (course[a, 2] + share * (course[b, 2] - course[a, 2]) - course[k, 2]) / WIDTH_STEP_MM
             far = max((dx * dx + dy * dy) / (tolerance_mm * tolerance_mm), wider * wider)
             if far > worst:
                 worst, at = far, k

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import flags, floats, longs, table
+from mdp.kernels.arrays import flags, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from slicer.walls.variable.counts import Counts
@@ -20,13 +20,12 @@ ABUT = 0.45  # of a bead's width: a line ends so far from the middle of a bead t
 
 
 class Chains(NamedTuple):
-    """points: (n, 2); widths: (n,); starts: (k + 1,) where each chain begins; levels: (k,) loops on both sides of it.
+    """courses: (n, 3) x, y and width; starts: (k + 1,) where each chain begins; levels: (k,) loops on both sides of it.
 
     ends: (k, 2) nodes; forks: (k, 2) whether more chains meet there; taken: (k, 2) mm that a loop across that end takes of it.
     """
 
-    points: Floats
-    widths: Floats
+    courses: Floats
     starts: NDArray[np.int64]
     levels: NDArray[np.int64]
     ends: NDArray[np.int64]
@@ -36,10 +35,9 @@ class Chains(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """points: (n, 2) mm, a ring repeats its first; widths: (n,) mm; level: loops on both sides; ends, taken: as in Chains."""
+    """course: (n, 3) x, y and width, a ring repeats its first; level: loops on both sides; ends, taken: as in Chains."""
 
-    points: Floats
-    widths: Floats
+    course: Floats
     level: int
     ends: tuple[int, int]
     taken: tuple[float, float]
@@ -47,7 +45,7 @@ class Line:
     @property
     def reversed(self) -> "Line":
         """The same line from its other end."""
-        return Line(self.points[::-1], self.widths[::-1], self.level, self.ends[::-1], self.taken[::-1])
+        return Line(self.course[::-1], self.level, self.ends[::-1], self.taken[::-1])
 
 
 def lines_of(chains: Chains) -> list[Line]:
@@ -56,14 +54,14 @@ def lines_of(chains: Chains) -> list[Line]:
     at: defaultdict[int, list[int]] = defaultdict(list)
     for k, (a, b) in enumerate(pairwise(chains.starts)):
         (first, last), taken = chains.ends[k].tolist(), chains.taken[k].tolist()
-        lines[k] = Line(chains.points[a:b], chains.widths[a:b], int(chains.levels[k]), (first, last), (taken[0], taken[1]))
+        lines[k] = Line(chains.courses[a:b], int(chains.levels[k]), (first, last), (taken[0], taken[1]))
         for node, fork in zip((first, last), chains.forks[k].tolist(), strict=True):
             if fork:
                 at[node].append(k)
     for node, members in sorted(at.items()):
         _join(lines, at, node, members)
     cut = (_cut_back(_cut_back(line).reversed).reversed for _, line in sorted(lines.items()))
-    return [line for line in cut if len(line.points) > 1]
+    return [line for line in cut if len(line.course) > 1]
 
 
 def _join(lines: dict[int, Line], at: dict[int, list[int]], node: int, members: list[int]) -> None:
@@ -73,18 +71,18 @@ def _join(lines: dict[int, Line], at: dict[int, list[int]], node: int, members: 
     leaving = {k: lines[k] if lines[k].ends[0] == node else lines[k].reversed for k in members}
     a, b = min(combinations(members, 2), key=lambda pair: float(_heading(leaving[pair[0]]) @ _heading(leaving[pair[1]])))
     into, onward = leaving[a].reversed, leaving[b]
-    points, widths = np.concatenate([into.points, onward.points[1:]]), np.concatenate([into.widths, onward.widths[1:]])
+    course = np.concatenate([into.course, onward.course[1:]])
     for k in members:
         if k not in (a, b):
-            lines[k] = replace(leaving[k], taken=(ABUT * float(onward.widths[0]), leaving[k].taken[1]))
-    lines[a] = Line(points, widths, into.level, (into.ends[0], onward.ends[1]), (into.taken[0], onward.taken[1]))
+            lines[k] = replace(leaving[k], taken=(ABUT * float(onward.course[0, 2]), leaving[k].taken[1]))
+    lines[a] = Line(course, into.level, (into.ends[0], onward.ends[1]), (into.taken[0], onward.taken[1]))
     del lines[b]
     at[onward.ends[1]] = [a if k == b else k for k in at[onward.ends[1]]]
 
 
 def _heading(line: Line) -> Floats:
     """Unit vector from the first point of a line to where it is a little later."""
-    steps = line.points - line.points[0]
+    steps = line.course[:, :2] - line.course[0, :2]
     away = np.hypot(*steps.T)
     far = int(np.argmax(away > LOOK_MM)) if (away > LOOK_MM).any() else len(away) - 1
     heading: Floats = steps[far] / max(float(away[far]), 1e-9)
@@ -95,13 +93,14 @@ def _cut_back(line: Line) -> Line:
     """The line without what is taken of its beginning."""
     if line.taken[0] <= 0.0 or line.ends[0] == line.ends[1]:
         return line
-    done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line.points, axis=0).T))])
+    done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line.course[:, :2], axis=0).T))])
     if done[-1] <= line.taken[0]:
-        return replace(line, points=line.points[:0], widths=line.widths[:0])
+        return replace(line, course=line.course[:0])
     first = int(np.searchsorted(done, line.taken[0], side="right")) - 1
     share = (line.taken[0] - done[first]) / (done[first + 1] - done[first])
-    point = line.points[first] + share * (line.points[first + 1] - line.points[first])
-    return replace(line, points=np.vstack([point, line.points[first + 1 :]]), widths=line.widths[first:])
+    course = line.course[first:].copy()
+    course[0, :2] += share * (course[1, :2] - course[0, :2])
+    return replace(line, course=course)
 
 
 @no_nrt
@@ -123,7 +122,7 @@ def trace_chains(across: Ints, skeleton: Skeleton, counts: Counts, rule: Rule) -
             degree[h // 3] += 1
     room = 2 * size + 2
     ends, forks = longs(2 * room, 0).reshape(room, 2), longs(2 * room, 0).reshape(room, 2)
-    out = Chains(table(2 * room, 2), floats(2 * room, 0.0), longs(room, 0), longs(room, 0), ends, forks, table(room, 2))
+    out = Chains(table(2 * room, 3), longs(room, 0), longs(room, 0), ends, forks, table(room, 2))
     n = many = 0
     for rings in range(2):
         for first in range(len(across)):
@@ -147,16 +146,14 @@ def trace_chains(across: Ints, skeleton: Skeleton, counts: Counts, rule: Rule) -
                 out.taken[many, k] = _taken(across, skeleton, counts, rule, node)
             many += 1
             out.starts[many] = n
-    return Chains(
-        out.points[:n], out.widths[:n], out.starts[: many + 1], out.levels[:many], out.ends[:many], out.forks[:many],
-        out.taken[:many],
-    )  # fmt: skip
+    levels, ends, forks, taken = out.levels[:many], out.ends[:many], out.forks[:many], out.taken[:many]
+    return Chains(out.courses[:n], out.starts[: many + 1], levels, ends, forks, taken)
 
 
 @no_nrt
 def _add(skeleton: Skeleton, counts: Counts, rule: Rule, t: int, out: Chains, n: int) -> int:
-    out.points[n, 0], out.points[n, 1] = skeleton.centres[t, 0], skeleton.centres[t, 1]
-    out.widths[n] = middle_width(rule, counts.beads[t], skeleton.radii[t])
+    out.courses[n, 0], out.courses[n, 1] = skeleton.centres[t, 0], skeleton.centres[t, 1]
+    out.courses[n, 2] = middle_width(rule, counts.beads[t], skeleton.radii[t])
     return n + 1
 
 

@@ -29,7 +29,7 @@ SHORTEST = 1.0  # nominal spacings: a shorter loop is none
 class _Ribs(NamedTuple):
     """Points of loops. feet: (n, 2); ways: (n, 2) what is added to a foot for every mm of depth; reach: (n,) half thickness.
 
-    depth, spacing: (n,) of the loop there; starts: (k + 1,) where each loop begins.
+    depth, spacing: (n,) of the loop there; starts: (k + 1,) where each loop begins; node: (k,) the first triangle of each.
     """
 
     feet: Floats
@@ -38,24 +38,25 @@ class _Ribs(NamedTuple):
     depth: Floats
     spacing: Floats
     starts: NDArray[np.int64]
+    node: NDArray[np.int64]
 
 
 @kernel
 def lay_loops(
     triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
+) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
     """All loops of a level, 0 outermost, their widths smoothed where counts change.
 
-    Returns points (n, 2), the first of each loop repeated at its end, widths (n,) and where each loop begins (k + 1,).
+    Returns courses (n, 3) of x, y and width, the first point of each loop repeated at its end, where each loop begins (k + 1,)
+    and one of its triangles (k,).
     """
     ribs = _trace(triangulation, skeleton, counts, rule, level)
     loops, reach_mm = len(ribs.starts) - 1, TRANSITION * rule.inner
-    points, widths = table(len(ribs.reach) + loops, 2), floats(len(ribs.reach) + loops, 0.0)
-    starts = longs(loops + 1, 0)
+    courses, starts, node = table(len(ribs.reach) + loops, 3), longs(loops + 1, 0), longs(loops, 0)
     n = count = 0
     for loop in range(loops):
         a, size = ribs.starts[loop], ribs.starts[loop + 1] - ribs.starts[loop]
-        way, width = table(size + 1, 2), floats(size + 1, 0.0)
+        way = table(size + 1, 3)
         for k in range(size + 1):
             i = a + k % size
             for axis in range(2):
@@ -67,17 +68,19 @@ def lay_loops(
         for k in range(size + 1):
             i = a + k % size
             deep = min(depth[k % size], ribs.reach[i])
-            width[k] = spacing[k % size] + rule.round if level else 2.0 * deep
+            way[k, 2] = spacing[k % size] + rule.round if level else 2.0 * deep
             for axis in range(2):
                 way[k, axis] = ribs.feet[i, axis] + ribs.ways[i, axis] * deep
-        keep = corners(way, width, level)
+        keep = corners(way, level)
         for k in range(size + 1):
             if keep[k]:
-                points[n, 0], points[n, 1], widths[n] = way[k, 0], way[k, 1], width[k]
+                for axis in range(3):
+                    courses[n, axis] = way[k, axis]
                 n += 1
+        node[count] = ribs.node[loop]
         count += 1
         starts[count] = n
-    return points[:n].copy(), widths[:n].copy(), starts[: count + 1].copy()
+    return courses[:n].copy(), starts[: count + 1].copy(), node[:count].copy()
 
 
 @helper
@@ -92,7 +95,8 @@ def _trace(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rul
             depth[t] = depth_of(rule, counts.beads[t], counts.radii[t], level)
             active[t] = skeleton.radii[t] > depth[t]
             room += 3 * PER_CORNER if active[t] else 0
-    out = _Ribs(table(room, 2), table(room, 2), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(room + 1, 0))
+    feet, ways, reach = table(room, 2), table(room, 2), floats(room, 0.0)
+    out = _Ribs(feet, ways, reach, floats(room, 0.0), floats(room, 0.0), longs(room + 1, 0), longs(room, 0))
     n = loops = 0
     for start in range(3 * many):
         if seen[start] or not active[start // 3]:
@@ -115,9 +119,11 @@ def _trace(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rul
                 h = after(h)
             for k in range(begun, n):
                 out.depth[k], out.spacing[k] = depth[t], spacing
+        out.node[loops] = start // 3
         loops += 1
         out.starts[loops] = n
-    return _Ribs(out.feet[:n], out.ways[:n], out.reach[:n], out.depth[:n], out.spacing[:n], out.starts[: loops + 1])
+    starts, node = out.starts[: loops + 1], out.node[:loops]
+    return _Ribs(out.feet[:n], out.ways[:n], out.reach[:n], out.depth[:n], out.spacing[:n], starts, node)
 
 
 @no_nrt
@@ -131,7 +137,7 @@ def _add(out: _Ribs, n: int, foot: tuple[float, float], way: tuple[float, float]
 @no_nrt
 def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: _Ribs, n: int) -> int:
     """Adds the place on the rib of a corner; in the tip of a triangle in a corner of the polygon, that on its bisector."""
-    points, tails, across = triangulation
+    points, tails, across, _ = triangulation
     x, y = skeleton.centres[h // 3, 0], skeleton.centres[h // 3, 1]
     fx, fy, reach = skeleton.feet[h, 0], skeleton.feet[h, 1], skeleton.radii[h // 3]
     if across[h] < 0 and across[before(h)] < 0:
@@ -144,7 +150,7 @@ def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: _Ribs, n
 @no_nrt
 def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], out: _Ribs, n: int) -> int:
     """Adds the mitre between two ribs from one point, where the polygon's outline turns into it."""
-    points, tails, _ = triangulation
+    points, tails, _, _ = triangulation
     a, b = corners
     p = tails[b]
     ax, ay = skeleton.centres[a // 3, 0] - skeleton.feet[a, 0], skeleton.centres[a // 3, 1] - skeleton.feet[a, 1]

@@ -50,7 +50,7 @@ def before(h: int) -> int:
 @kernel
 def skeleton_of(triangulation: Triangulation) -> Skeleton:
     """The skeleton of a triangulated polygon."""
-    points, tails, across = triangulation
+    points, tails, across, _ = triangulation
     following, preceding = ints(len(points), 0), ints(len(points), 0)
     for h in range(len(tails)):
         if across[h] < 0:
@@ -90,7 +90,7 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
 @no_nrt
 def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
     """Whether a node lies beyond the boundary, seen from its triangle: needles in a neck have their centres anywhere."""
-    points, tails, across = triangulation
+    points, tails, across, _ = triangulation
     for _ in range(MOST_STEPS):
         onward = -1
         for h in range(3 * t, 3 * t + 3):
@@ -109,7 +109,7 @@ def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
 @no_nrt
 def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Fills in the circumcentre of a triangle."""
-    points, tails, _ = triangulation
+    points, tails, _, _ = triangulation
     a, b, c = tails[3 * t], tails[3 * t + 1], tails[3 * t + 2]
     bx, by = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     cx, cy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
@@ -125,7 +125,7 @@ def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) ->
 @no_nrt
 def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     """Puts a node into its triangle, where that has no circumcentre of use."""
-    points, tails, _ = triangulation
+    points, tails, _, _ = triangulation
     a, b, c = tails[3 * t], tails[3 * t + 1], tails[3 * t + 2]
     for axis in range(2):
         out.centres[t, axis] = (points[a, axis] + points[b, axis] + points[c, axis]) / 3.0

@@ -18,14 +18,13 @@ along the skeleton where the count is odd (lines). Here widths are smoothed wher
 inside the place. What is printed are pieces of one width each (pieces).
 """
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from mdp.mesh import Floats
-from slicer.bead import Course
+from mdp.mesh import Floats, Indices
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.polyline import length_mm
@@ -47,77 +46,83 @@ THIN = 4.0  # least widths: what is narrower than one and longer than this is a 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """course: its way and widths; level: 0 outermost; closed: it runs round, and its course ends where it begins.
+    """course: (n, 3) x, y and width; level: 0 outermost; closed: it runs round, and its course ends where it begins.
 
-    free: sides on which no bead lies beside it.
+    free: sides on which no bead lies beside it; piece: the number of the polygons that it lies in.
     """
 
-    course: Course
+    course: Floats
     level: int
     closed: bool
     free: int
+    piece: int
 
     @property
     def points(self) -> Floats:
         """(n, 2) mm, of one that runs round without its first repeated."""
-        return self.course.points[:-1] if self.closed else self.course.points
+        return np.ascontiguousarray(self.course[: -1 if self.closed else None, :2])
 
 
-def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
-    """All walls of polygons."""
-    triangulation = triangulate(contours(polygons), STEP * rule.inner)
+def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
+    """All walls of polygons, each laid out by itself, piece after piece."""
+    triangulation = triangulate([contours(piece) for piece in pieces], STEP * rule.inner)
     if triangulation is None:
         return []
     skeleton = skeleton_of(triangulation)
     counts = count_beads(triangulation.across, skeleton, rule)
+    piece_of = triangulation.piece[triangulation.tails[::3]]
     walls: list[Wall] = []
     for level in range(rule.walls):
-        points, widths, starts = lay_loops(triangulation, skeleton, counts, rule, level)
-        loops = [Course(points[a:b], widths[a:b]) for a, b in pairwise(starts.tolist())]
-        if not loops:
+        courses, starts, node = lay_loops(triangulation, skeleton, counts, rule, level)
+        if not len(node):
             break
-        walls += [Wall(loop, level, True, int(level == 0)) for loop in loops]
-    lines = [_along(line, rule) for line in lines_of(trace_chains(triangulation.across, skeleton, counts, rule))]
-    lines += [_dash(*dot, rule) for dot in _dots(skeleton, counts)]
-    borders = index_edges(polygons if any(line.level == 0 for line in lines) else Polygons())
-    clipped = (_clipped(line, borders, rule) for line in lines)
-    walls += [_simplified(line) for line in clipped if len(line.points) > 1]
-    return [wall for wall in walls if length_mm(wall.course.points) > 0.0]  # points may fall on each other when they are smoothed
+        loops = zip(pairwise(starts.tolist()), piece_of[node].tolist(), strict=True)
+        walls += [Wall(courses[a:b], level, True, int(level == 0), piece) for (a, b), piece in loops]
+    lines = lines_of(trace_chains(triangulation.across, skeleton, counts, rule))
+    middle = [_along(line, rule, int(piece_of[line.ends[0]])) for line in lines] + _dots(skeleton, counts, rule, piece_of)
+    borders = {piece: index_edges(pieces[piece]) for piece in {wall.piece for wall in middle if wall.level == 0}}
+    middle = [wall if wall.level else _clipped(wall, borders[wall.piece], rule) for wall in middle]
+    walls += [_simplified(wall) for wall in middle if len(wall.course) > 1]
+    laid = [wall for wall in walls if length_mm(wall.course) > 0.0]  # points may fall on each other when they are smoothed
+    return sorted(laid, key=lambda wall: wall.piece)
 
 
-def _along(line: Line, rule: Rule) -> Wall:
+def _along(line: Line, rule: Rule, piece: int) -> Wall:
     """The bead along a line."""
-    closed = line.ends[0] == line.ends[1]
-    widths = smoothed(line.points, line.widths, TRANSITION * rule.inner, closed)
-    x, y = (smoothed(line.points, np.ascontiguousarray(row), 0.5 * TRANSITION * rule.inner, closed) for row in line.points.T)
-    points, free = np.column_stack([x, y]), 2 * int(line.level == 0)
+    closed, reach_mm = line.ends[0] == line.ends[1], TRANSITION * rule.inner
+    course = np.empty_like(line.course)
+    for column, reach in enumerate((0.5 * reach_mm, 0.5 * reach_mm, reach_mm)):
+        course[:, column] = smoothed(line.course, np.ascontiguousarray(line.course[:, column]), reach, closed)
     if closed:
-        points[-1], widths[-1] = points[0], widths[0]
+        course[-1] = course[0]
     else:
-        points[0], points[-1] = line.points[0], line.points[-1]
-        if line.level == 0 and length_mm(points) < DOT * widths.max():
-            return _dash(points[0], points[-1], float(widths.mean()), rule)
-    return Wall(Course(points, widths), line.level, closed, free)
+        course[[0, -1], :2] = line.course[[0, -1], :2]
+        if line.level == 0 and length_mm(course) < DOT * course[:, 2].max():
+            return _dash(course[0, :2], course[-1, :2], float(course[:, 2].mean()), rule, piece)
+    return Wall(course, line.level, closed, 2 * int(line.level == 0), piece)
 
 
-def _dots(skeleton: Skeleton, counts: Counts) -> Iterator[tuple[Floats, Floats, float]]:
-    """Begin, end and width of round places with room for a single bead."""
-    last = np.full(2, np.inf)
-    for t in np.flatnonzero(counts.dots):
+def _dots(skeleton: Skeleton, counts: Counts, rule: Rule, piece_of: Indices) -> list[Wall]:
+    """The dashes in round places with room for a single bead."""
+    dashes, last = list[Wall](), np.full(2, np.inf)
+    nodes = np.flatnonzero(counts.dots)
+    for t in nodes[np.argsort(piece_of[nodes], kind="stable")].tolist():
         centre, radius = skeleton.centres[t], float(skeleton.radii[t])
         if float(np.hypot(*(centre - last))) > radius:
-            yield centre, centre, 2.0 * radius
+            dashes.append(_dash(centre, centre, 2.0 * radius, rule, int(piece_of[t])))
         last = centre
+    return dashes
 
 
-def _dash(begin: Floats, end: Floats, width: float, rule: Rule) -> Wall:
+def _dash(begin: Floats, end: Floats, width: float, rule: Rule, piece: int) -> Wall:
     """A dash in place of a dot, which no printer draws: as much thinner as it is longer."""
     thinner = max((1.0 - DASH) * width, rule.least)
     step = end - begin
     length = float(np.hypot(*step))
     way = step / length if length > 1e-6 else np.array([1.0, 0.0])
     middle, half = 0.5 * (begin + end), 0.5 * (length + max(width - thinner, SHORT * width))
-    return Wall(Course(np.array([middle - half * way, middle + half * way]), np.full(2, thinner)), 0, False, 2)
+    course = np.array([[*(middle - half * way), thinner], [*(middle + half * way), thinner]])
+    return Wall(course, 0, False, 2, piece)
 
 
 def _clipped(line: Wall, borders: EdgeIndex, rule: Rule) -> Wall:
@@ -126,15 +131,13 @@ def _clipped(line: Wall, borders: EdgeIndex, rule: Rule) -> Wall:
     Thin walls keep ends of theirs where it nearly fits: a wall that is now thicker and now thinner than the least bead would be
     all gaps, each above another place than the one in the layer below.
     """
-    if line.level > 0:
-        return line
-    points = line.course.points
-    room = 2.0 * np.abs(depths(points, borders))
-    widths = np.maximum(np.minimum(line.course.widths, room), rule.least)
-    first, last = _fitting(points, room, rule)
+    course = line.course.copy()
+    room = 2.0 * np.abs(depths(course, borders))
+    course[:, 2] = np.maximum(np.minimum(course[:, 2], room), rule.least)
+    first, last = _fitting(course[:, :2], room, rule)
     if line.closed and last >= first:
         first, last = 0, len(room) - 1
-    return replace(line, course=Course(points[first : last + 1], widths[first : last + 1]))
+    return replace(line, course=course[first : last + 1])
 
 
 def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
@@ -159,5 +162,4 @@ def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
 
 
 def _simplified(wall: Wall) -> Wall:
-    keep = corners(wall.course.points, wall.course.widths, wall.level)
-    return replace(wall, course=Course(wall.course.points[keep], wall.course.widths[keep]))
+    return replace(wall, course=wall.course[corners(wall.course, wall.level)])

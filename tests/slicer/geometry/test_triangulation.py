@@ -14,7 +14,7 @@ from tests.slicer.hand import as_shapely, ragged
 
 def corners(polygons: Polygons) -> Floats:
     """(m, 3, 2) the triangles of our triangulation."""
-    triangulation = triangulate(contours(polygons))
+    triangulation = triangulate([contours(polygons)])
     assert triangulation is not None
     return triangulation.points[triangulation.tails].reshape(-1, 3, 2)
 
@@ -48,7 +48,7 @@ def points_in_circles(mesh: Triangulation) -> int:
 @pytest.mark.parametrize("corners", [64, 128, 180, 256])
 @pytest.mark.parametrize("radius_mm", [3.0, 13.7, 15.3, 60.0])
 def test_points_on_one_circle_have_a_triangulation_of_delaunay(corners: int, radius_mm: float) -> None:
-    mesh = triangulate(contours(Polygons.circle(radius_mm, corners)), 0.17)
+    mesh = triangulate([contours(Polygons.circle(radius_mm, corners))], 0.17)
     assert mesh is not None
     assert points_in_circles(mesh) == 0
 
@@ -57,7 +57,7 @@ def test_points_on_one_circle_have_a_triangulation_of_delaunay(corners: int, rad
 @given(st.integers(0, 10**6), st.sampled_from([0.17, 0.5, 3.0]))
 def test_sides_with_samples_have_the_triangles_of_polygons_that_have_these_points(seed: int, step_mm: float) -> None:
     star = ragged(seed)
-    mesh = triangulate(contours(star), step_mm)
+    mesh = triangulate([contours(star)], step_mm)
     assert mesh is not None
     assert points_in_circles(mesh) == 0
     outer = sum(area_mm2(loop) > 0 for loop in contours(star))

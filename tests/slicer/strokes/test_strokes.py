@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slicer.bead import Bead, Course
+from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, bead_area_mm2
 from slicer.strokes.pieces import in_pieces
@@ -29,7 +29,7 @@ def test_the_pieces_of_several_strokes_keep_their_own_travels() -> None:
 
 def test_pieces_of_a_rich_stroke_hold_what_is_more_of_the_whole() -> None:
     line, widths = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([0.3, 0.6])
-    bead = Bead(Kind.OUTER_WALL, line, 0.45, 0, flow=1.2, course=Course(line, widths))
+    bead = Bead(Kind.OUTER_WALL, line, 0.45, 0, flow=1.2, course=np.column_stack([line, widths]))
     strokes = strokes_of([(bead, line)], np.array([True]), {}, 0.0)
     pieces = in_pieces(strokes, 0.2)
     areas_mm2 = bead_area_mm2(pieces.width_mm, 0.2)

@@ -23,7 +23,7 @@ WIDTH, HEIGHT = 0.45, 0.2
 
 def strips(beads: Sequence[Bead]) -> list[tuple[shapely.LineString, float]]:
     """The middle of every piece as it is printed, and its cross-section over the height, mm: as wide a place it fills."""
-    placed = [(bead, bead.points if bead.course is None else bead.course.points) for bead in beads]
+    placed = [(bead, bead.points if bead.course is None else bead.course[:, :2]) for bead in beads]
     pieces = in_pieces(strokes_of(placed, np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
     return [(shapely.LineString(row.points), bead_area_mm2(row.width_mm, HEIGHT) / HEIGHT) for row in rows_of(pieces)]
 
@@ -38,7 +38,7 @@ def covered(beads: Sequence[Bead]) -> shapely.Geometry:
 
 @pytest.mark.parametrize("thickness", [0.06, 0.1, 0.2, 0.4, 0.6])
 def test_a_slit_gets_one_line_in_its_middle_with_its_plastic(thickness: float) -> None:
-    (bead,) = gaps(Polygons.square((20.0, thickness)), WIDTH, HEIGHT)
+    (bead,) = gaps([Polygons.square((20.0, thickness))], WIDTH, HEIGHT)
     assert bead.kind is Kind.GAP
     assert bead.points[:, 1] == pytest.approx(0.5 * thickness, abs=1e-3)
     assert bead_area_mm2(bead.width_mm, HEIGHT) / HEIGHT == pytest.approx(thickness, rel=0.07)
@@ -48,13 +48,13 @@ def test_a_slit_gets_one_line_in_its_middle_with_its_plastic(thickness: float) -
 @pytest.mark.parametrize("thickness", np.arange(0.1, 3.0, 0.23).round(2).tolist())
 def test_a_slot_is_filled_from_side_to_side(thickness: float) -> None:
     middle = shapely.box(3, 0, 9, thickness)
-    beads = gaps(Polygons.square((12.0, thickness)), WIDTH, HEIGHT)
+    beads = gaps([Polygons.square((12.0, thickness))], WIDTH, HEIGHT)
     assert covered(beads).intersection(middle).area > 0.99 * middle.area
 
 
 def test_what_is_narrower_than_the_least_gap_stays_empty() -> None:
-    assert gaps(Polygons.square((20.0, 0.4 * LEAST_GAP * WIDTH)), WIDTH, HEIGHT) == []
-    assert gaps(Polygons(), WIDTH, HEIGHT) == []
+    assert gaps([Polygons.square((20.0, 0.4 * LEAST_GAP * WIDTH))], WIDTH, HEIGHT) == []
+    assert gaps([Polygons()], WIDTH, HEIGHT) == []
 
 
 @settings(max_examples=25, deadline=None)
@@ -63,7 +63,7 @@ def test_the_line_in_a_wedge_runs_in_its_middle_and_is_as_wide_as_it(
     length: float, start: float, end: float, turn: float
 ) -> None:
     wedge = Polygons([np.array([[0, -start / 2], [length, -end / 2], [length, end / 2], [0, start / 2]])])
-    beads = gaps(wedge.rotate(turn), WIDTH, HEIGHT)
+    beads = gaps([wedge.rotate(turn)], WIDTH, HEIGHT)
     back = np.radians(turn)
     for line, wide in strips(beads):
         along, across = (shapely.get_coordinates(line) @ [[np.cos(back), -np.sin(back)], [np.sin(back), np.cos(back)]]).T
@@ -74,7 +74,7 @@ def test_the_line_in_a_wedge_runs_in_its_middle_and_is_as_wide_as_it(
 
 
 def test_a_ring_gets_a_line_that_runs_round() -> None:
-    (bead,) = gaps(Polygons.circle(5, 64) - Polygons.circle(4.7, 64), WIDTH, HEIGHT)
+    (bead,) = gaps([Polygons.circle(5, 64) - Polygons.circle(4.7, 64)], WIDTH, HEIGHT)
     assert bead.closed
     assert np.hypot(*bead.points.T) == pytest.approx(4.85, abs=0.02)
     assert bead_area_mm2(bead.width_mm, HEIGHT) / HEIGHT == pytest.approx(0.3, abs=0.02)
@@ -83,7 +83,7 @@ def test_a_ring_gets_a_line_that_runs_round() -> None:
 @pytest.mark.parametrize("diameter", [0.5, 0.7, 1.0, 1.5, 2.5])
 def test_a_round_place_is_filled_by_rings(diameter: float) -> None:
     disc = Polygons.circle(0.5 * diameter, 48)
-    beads = gaps(disc, WIDTH, HEIGHT)
+    beads = gaps([disc], WIDTH, HEIGHT)
     assert covered(beads).intersection(as_shapely(disc)).area > 0.75 * disc.area()
     assert plastic_mm2(beads) == pytest.approx(disc.area(), rel=0.1)
 
@@ -94,7 +94,7 @@ def test_beads_in_any_place_hold_no_more_than_it_and_keep_to_it(
     points: list[tuple[float, float]], hole: float, aside: float
 ) -> None:
     area = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
-    beads = gaps(area, WIDTH, HEIGHT)
+    beads = gaps([area], WIDTH, HEIGHT)
     assert plastic_mm2(beads) < 1.005 * area.area() + 1e-6
     assert all(length_mm(bead.points) > 0.25 * WIDTH for bead in beads)
     assert all(bead.width_mm <= 2.0 * WIDTH + 1e-9 for bead in beads)

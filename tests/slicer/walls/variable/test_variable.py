@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import ROUND_SIDES, Bead, Course
+from slicer.bead import ROUND_SIDES, Bead, mean_width_mm
 from slicer.geometry.edge_index import depths, index_edges
 from slicer.geometry.polygons import Polygons, close_loop
 from slicer.geometry.polyline import length_mm
@@ -42,7 +42,7 @@ def plate(thickness: float, length: float = 12.0) -> Polygons:
 
 def plastic(walls: Sequence[Wall]) -> shapely.Geometry:
     """What walls cover, laid in pieces of one width as they are printed."""
-    beads = [Bead(Kind.OUTER_WALL, wall.course.points, wall.course.width_mm, 0, course=wall.course) for wall in walls]
+    beads = [Bead(Kind.OUTER_WALL, wall.course[:, :2], mean_width_mm(wall.course), 0, course=wall.course) for wall in walls]
     pieces = in_pieces(strokes_of([(bead, bead.points) for bead in beads], np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
     return shapely.union_all([shapely.LineString(row.points).buffer(0.5 * row.width_mm) for row in rows_of(pieces)])
 
@@ -50,7 +50,7 @@ def plastic(walls: Sequence[Wall]) -> shapely.Geometry:
 def across(walls: Sequence[Wall], x: float) -> int:
     """How many beads lie side by side at x."""
     line = shapely.LineString([(x, -50), (x, 50)])
-    met = [line.intersection(shapely.LineString(wall.course.points)) for wall in walls]
+    met = [line.intersection(shapely.LineString(wall.course[:, :2])) for wall in walls]
     return sum(int(shapely.get_num_geometries(met_wall)) for met_wall in met if not met_wall.is_empty)
 
 
@@ -68,21 +68,21 @@ def farthest_out_mm(walls: Sequence[Wall], section: Polygons) -> float:
     [(0.1, 0), (0.15, 1), (0.25, 1), (0.5, 1), (0.7, 2), (1.0, 2), (1.3, 3), (1.6, 4), (2.0, 5), (2.4, 6), (3.0, 7)],
 )
 def test_a_plate_gets_as_many_beads_as_fit(thickness: float, beads: int) -> None:
-    assert across(variable_walls(plate(thickness), RULE), 6.0) == beads
+    assert across(variable_walls([plate(thickness)], RULE), 6.0) == beads
 
 
 @pytest.mark.parametrize("thickness", np.arange(0.25, 3.1, 0.15).round(2).tolist())
 def test_a_plate_is_filled_from_side_to_side(thickness: float) -> None:
-    walls = variable_walls(plate(thickness), RULE)
+    walls = variable_walls([plate(thickness)], RULE)
     middle = shapely.box(3, 0, 9, thickness)
     assert plastic(walls).intersection(middle).area > 0.995 * middle.area
-    spacings = sum(wall.course.width_mm - HEIGHT * ROUND_SIDES for wall in walls for _ in range(across([wall], 6.0)))
+    spacings = sum(mean_width_mm(wall.course) - HEIGHT * ROUND_SIDES for wall in walls for _ in range(across([wall], 6.0)))
     assert spacings + HEIGHT * ROUND_SIDES == pytest.approx(thickness, abs=0.02)
 
 
 def test_the_count_changes_where_the_thickness_does() -> None:
     wedge = Polygons([np.array([[0, -0.1], [28, -1.4], [28, 1.4], [0, 0.1]])])
-    walls = variable_walls(wedge, RULE)
+    walls = variable_walls([wedge], RULE)
     counts = np.array([across(walls, x) for x in np.arange(2.0, 26.0, 0.35)])
     highest = np.maximum.accumulate(counts)
     assert [(a, b) for a, b in pairwise(highest.tolist()) if a != b] == [(1, 2), (2, 3), (3, 4), (4, 5), (5, 6)]
@@ -90,11 +90,11 @@ def test_the_count_changes_where_the_thickness_does() -> None:
 
 
 def test_outer_walls_of_a_thin_plate_are_walls_of_half_its_thickness() -> None:
-    (loop,) = variable_walls(plate(0.8), RULE)
+    (loop,) = variable_walls([plate(0.8)], RULE)
     assert loop.closed
     assert loop.level == 0
-    assert loop.course.widths == pytest.approx(0.4 + 0.5 * HEIGHT * ROUND_SIDES, abs=0.01)
-    assert np.abs(loop.points[:, 1] - 0.4).max() == pytest.approx(0.4 - 0.5 * loop.course.widths[0], abs=0.005)
+    assert loop.course[:, 2] == pytest.approx(0.4 + 0.5 * HEIGHT * ROUND_SIDES, abs=0.01)
+    assert np.abs(loop.points[:, 1] - 0.4).max() == pytest.approx(0.4 - 0.5 * loop.course[:, 2][0], abs=0.005)
 
 
 def test_a_wall_of_one_bead_is_an_outer_wall_that_does_not_run_round() -> None:
@@ -118,7 +118,7 @@ def test_without_walls_a_place_too_narrow_for_a_fill_gets_one_bead_and_the_rest_
     block = Polygons.square((10, 10)) + Polygons.square((8, 0.5)).translate((10, 5))
     walled = layer_walls(block, 0, PROCESS, HEIGHT, NOZZLE)
     (line,) = walled.varying
-    assert line.course.width_mm == pytest.approx(0.5, abs=0.01)
+    assert mean_width_mm(line.course) == pytest.approx(0.5, abs=0.01)
     assert line.points[:, 1] == pytest.approx(5.25, abs=0.1)
     assert line.points[:, 0].min() > 9.4
     assert walled.inside.area() == pytest.approx(100.0, rel=0.005)
@@ -127,30 +127,30 @@ def test_without_walls_a_place_too_narrow_for_a_fill_gets_one_bead_and_the_rest_
 def test_a_wall_that_is_now_thicker_and_now_thinner_than_the_least_bead_is_laid_from_end_to_end() -> None:
     x = np.linspace(0, 30, 121)
     side = 0.12 + 0.02 * np.sin(2.0 * x)  # of half the least bead: 0.2 to 0.28 mm thick, 0.24 mm is the least
-    walls = variable_walls(Polygons([np.concatenate([np.column_stack([x, -side]), np.column_stack([x, side])[::-1]])]), RULE)
+    walls = variable_walls([Polygons([np.concatenate([np.column_stack([x, -side]), np.column_stack([x, side])[::-1]])])], RULE)
     assert len(walls) == 1
-    assert length_mm(walls[0].course.points) > 29.0
+    assert length_mm(walls[0].course) > 29.0
 
 
 @pytest.mark.parametrize("tooth_mm", [0.2, 0.35, 0.5])
 def test_the_outer_wall_of_a_hall_with_thin_teeth_stays_at_its_border(tooth_mm: float) -> None:
     teeth = [Polygons.square((tooth_mm, 1.2)).translate((x, 29.5)) for x in (8.0, 9.0, 9.8, 14.0)]
     hall = Polygons.square((30, 30)) + Polygons.compose(teeth)
-    outer = [wall for wall in variable_walls(hall, RULE) if wall.level == 0]
+    outer = [wall for wall in variable_walls([hall], RULE) if wall.level == 0]
     assert max(np.abs(depths(wall.points, index_edges(hall))).max() for wall in outer) < 0.5
 
 
 def test_a_ring_of_one_bead_runs_round() -> None:
-    (bead,) = variable_walls(Polygons.circle(6, 128) - Polygons.circle(5.4, 128), RULE)
+    (bead,) = variable_walls([Polygons.circle(6, 128) - Polygons.circle(5.4, 128)], RULE)
     assert bead.closed
-    assert length_mm(bead.course.points) == pytest.approx(2 * np.pi * 5.7, rel=0.01)
-    assert bead.course.widths == pytest.approx(0.6, abs=0.02)
+    assert length_mm(bead.course) == pytest.approx(2 * np.pi * 5.7, rel=0.01)
+    assert bead.course[:, 2] == pytest.approx(0.6, abs=0.02)
 
 
 @pytest.mark.parametrize("diameter", np.arange(0.3, 2.4, 0.1).round(1).tolist())
 def test_a_pin_is_filled_by_rings_or_a_dash_inside_it(diameter: float) -> None:
     pin = Polygons.circle(0.5 * diameter, 64)
-    walls = variable_walls(pin, RULE)
+    walls = variable_walls([pin], RULE)
     assert plastic(walls).area > (0.6 if diameter < 0.5 else 0.74) * pin.area()
     assert farthest_out_mm(walls, pin) < 0.05 * WIDTH
 
@@ -159,11 +159,11 @@ def test_a_pin_is_filled_by_rings_or_a_dash_inside_it(diameter: float) -> None:
 @given(st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4)), min_size=4, max_size=9), st.floats(0.3, 2.0), st.floats(0.0, 1.5))
 def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: Points, hole: float, aside: float) -> None:
     section = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
-    walls = variable_walls(section, RULE)
-    wider = [wall for wall in walls if wall.level > 0 or wall.closed or wall.course.widths.min() > RULE.least + 1e-9]
+    walls = variable_walls([section], RULE)
+    wider = [wall for wall in walls if wall.level > 0 or wall.closed or wall.course[:, 2].min() > RULE.least + 1e-9]
     assert farthest_out_mm(wider, section) < 0.05 * WIDTH
     assert farthest_out_mm(walls, section) < 0.05 * WIDTH + 0.5 * (1.0 - FEATURE) * RULE.least  # where a wall is that thin
-    widths = np.concatenate([wall.course.widths for wall in walls]) if walls else np.array([WIDTH])
+    widths = np.concatenate([wall.course[:, 2] for wall in walls]) if walls else np.array([WIDTH])
     assert widths.min() > 0.6 * NOZZLE - 1e-9
     assert widths.max() < 2.0 * NOZZLE + 1e-9
 
@@ -207,8 +207,8 @@ def test_the_tip_of_a_sharp_corner_is_filled(tip_deg: float) -> None:
 @pytest.mark.parametrize("diameter", [0.7, 1.5, 2.5])
 def test_the_rings_of_a_circle_never_turn_back(corners: int, diameter: float) -> None:
     """The two sides at each of its points are as near to its middle as each other, but for rounding."""
-    for wall in variable_walls(Polygons.circle(0.5 * diameter, corners), RULE):
-        around = np.diff(np.unwrap(np.arctan2(*wall.course.points.T[::-1])))
+    for wall in variable_walls([Polygons.circle(0.5 * diameter, corners)], RULE):
+        around = np.diff(np.unwrap(np.arctan2(*wall.course[:, 1::-1].T)))
         assert (around > -1e-6).all()
         assert around.sum() == pytest.approx(2.0 * np.pi)
 
@@ -241,26 +241,26 @@ def test_walls_stay_inside_a_plate_that_a_notch_all_but_cuts_through(neck: float
     tip = [(5.5, neck), (5.5 + wide, max(neck + lean, 1e-6))]
     notch = Polygons([np.array([(5.3, deep + 1.0), *tip, (6.5, deep + 1.0)])])
     plate_with_notch = plate(deep) - notch
-    assert farthest_out_mm(variable_walls(plate_with_notch, RULE), plate_with_notch) < 0.1
+    assert farthest_out_mm(variable_walls([plate_with_notch], RULE), plate_with_notch) < 0.1
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.floats(1.0, 9.0), st.floats(-1e-8, 1e-8), st.floats(-1e-10, 1e-10))
 def test_two_corners_that_all_but_meet_throw_no_wall_out_of_a_plate(x: float, aside: float, away: float) -> None:
     corners = np.array([(0, 0), (x, -1e-3), (x + aside, -1e-3 + away), (10, 0), (10, 5), (0, 5)])
-    triangulation = triangulate([corners], STEP * RULE.inner)
+    triangulation = triangulate([[corners]], STEP * RULE.inner)
     assert triangulation is not None
     skeleton = skeleton_of(triangulation)
-    points, _, _ = lay_loops(triangulation, skeleton, count_beads(triangulation.across, skeleton, RULE), RULE, 0)
-    assert (points.min(axis=0) >= 0.0).all()
-    assert (points.max(axis=0) <= (10.0, 5.0)).all()
+    courses, _, _ = lay_loops(triangulation, skeleton, count_beads(triangulation.across, skeleton, RULE), RULE, 0)
+    assert (courses[:, :2].min(axis=0) >= 0.0).all()
+    assert (courses[:, :2].max(axis=0) <= (10.0, 5.0)).all()
 
 
 def test_a_wall_whose_points_fall_on_each_other_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     def fallen(line: Wall, *_: object) -> Wall:
-        return replace(line, course=Course(line.course.points[[0, 0]], line.course.widths[[0, 0]]))
+        return replace(line, course=line.course[[0, 0]])
 
     fin, rule = Polygons.square((8.0, 0.5)), bead_rule(2, profile().process, 0.2, 0.4)
-    assert [wall.closed for wall in variable_walls(fin, rule)] == [False]
+    assert [wall.closed for wall in variable_walls([fin], rule)] == [False]
     monkeypatch.setattr("slicer.walls.variable.variable._clipped", fallen)
-    assert variable_walls(fin, rule) == []
+    assert variable_walls([fin], rule) == []
