@@ -34,8 +34,8 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     """Errors of code extrusion and extruding-travel; a warning of code extrusion where the file tells no widths."""
     if not len(deposited.rows):
         return
-    told = program.remarks
-    sized = ((told.width_mm > 0) & (told.height_mm > 0))[program.remark[deposited.rows]]
+    remarks = program.remarks
+    sized = ((remarks.width_mm > 0) & (remarks.height_mm > 0))[program.remark[deposited.rows]]
     uneven = program.rows_of_types(*UNEVEN)[deposited.rows] | _fills_grooves(program, deposited.rows, profile)
     counted = ~uneven & ~_climbs(program, deposited)
     length = deposited.length_mm
@@ -87,13 +87,13 @@ def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Pro
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:
     """(m,) cross-section that the told width and height need, with the factors of the profile and of its parts."""
-    told = program.remarks
-    width, height = told.width_mm, told.height_mm
+    remarks = program.remarks
+    width, height = remarks.width_mm, remarks.height_mm
     area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
-    on_plate = (told.layer == told.layer[program.remark[rows]].min()) & (told.part <= 1)
+    on_plate = (remarks.layer == remarks.layer[program.remark[rows]].min()) & (remarks.part <= 1)
     factor = np.where(on_plate, profile.process.first_layer_flow, 1.0)
-    for part in np.unique(told.part[told.part > 1]):
-        on_part = (told.part == part) & (told.layer == 1)
+    for part in np.unique(remarks.part[remarks.part > 1]):
+        on_part = (remarks.part == part) & (remarks.layer == 1)
         factor[on_part] = profile.of_part(int(part)).process.interface_flow
     needed: Floats = (area * factor * profile.material.flow)[program.remark[rows]]
     return needed

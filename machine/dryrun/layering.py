@@ -58,8 +58,8 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         part = program.part_and_layer(mine[0])[0] if len(mine) else 0
         if not len(mine) or part in seen:
             continue
-        told = program.remark[mine]
-        layer, height_mm = program.remarks.layer[told], program.remarks.height_mm[told]
+        remark = program.remark[mine]
+        layer, height_mm = program.remarks.layer[remark], program.remarks.height_mm[remark]
         gap = _gaps(program.start, program.end, mine, layer, height_mm, support[mine])
         in_air = ((contacts.air_mm[mine] + contacts.beside_mm[mine]) > 0.0) & ~loose[mine]
         laid_mm = np.bincount(layer, weights=deposited.lengths(which[begin:end]))

@@ -113,8 +113,8 @@ def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts)
 
 def off_plate(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
     """Strokes of the layer on the plate that lie beyond its edge: an error a part, with the farthest."""
-    told_mm = program.remarks.height_mm
-    heights = np.where(told_mm > 0, told_mm, profile.process.first_layer_height_mm)
+    remark_mm = program.remarks.height_mm
+    heights = np.where(remark_mm > 0, remark_mm, profile.process.first_layer_height_mm)
     purge, beyond, over_mm, edge = program.rows_of_types(PURGE), [np.zeros(0, np.int64)], [np.zeros(0)], ""
     for some in pieces(len(deposited.rows)):
         segments, rows = deposited.segments(some), deposited.rows[some]

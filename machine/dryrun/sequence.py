@@ -41,9 +41,9 @@ def _layers(program: ParsedProgram) -> Iterator[Finding]:
     (part, layer), height_mm, lower = program.remarks[:2], program.remarks.height_mm, [np.zeros(0, dtype=np.int64)]
     for some in pieces(len(rows) - 1):
         mine = rows[some.start : some.stop + 1]
-        told, z_mm = program.remark[mine], program.end[mine, 2]
-        other_layer = (np.diff(part[told]) == 0) & (np.diff(layer[told]) != 0) & ~program.turned_between(mine)
-        lower.append(some.start + np.flatnonzero(other_layer & (np.diff(z_mm) < -0.25 * height_mm[told[1:]] - SLACK_MM)))
+        remark, z_mm = program.remark[mine], program.end[mine, 2]
+        other_layer = (np.diff(part[remark]) == 0) & (np.diff(layer[remark]) != 0) & ~program.turned_between(mine)
+        lower.append(some.start + np.flatnonzero(other_layer & (np.diff(z_mm) < -0.25 * height_mm[remark[1:]] - SLACK_MM)))
     for mine in by_part(program, np.concatenate(lower) + 1, rows):
         k = int(mine[0]) - 1
         fall_mm = program.end[rows[k], 2] - program.end[rows[k + 1], 2]

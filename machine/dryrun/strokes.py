@@ -30,7 +30,7 @@ ZIGZAG = 3.0  # spans: infill that turns at a wall may have a line's end, the jo
 
 @dataclass(frozen=True, eq=False)
 class Beads:
-    """What some rows of a program deposit on a machine; rows: (m,). What they come to is worked out where it is asked for.
+    """The beads that (m,) rows of a program deposit; their ends and sizes are computed on demand, to save memory.
 
     sizes: (k, 2) widths and heights, mm; size: (m,) which of them each bead has.
     """
@@ -47,19 +47,19 @@ class Beads:
 
     @property
     def width_mm(self) -> Floats:
-        """(m,)."""
+        """(m,) widths."""
         width_mm: Floats = self.sizes[self.size, 0]
         return width_mm
 
     @property
     def height_mm(self) -> Floats:
-        """(m,)."""
+        """(m,) heights."""
         height_mm: Floats = self.sizes[self.size, 1]
         return height_mm
 
     @property
     def length_mm(self) -> Floats:
-        """(m,)."""
+        """(m,) lengths."""
         return self.lengths(np.arange(len(self.rows)))
 
     def lengths(self, which: Indices) -> Floats:
@@ -101,28 +101,28 @@ class Moves(NamedTuple):
 
 def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Beads:
     """Widths and heights as the program's comments tell, else by its layers or the profile's, and the filament pushed."""
-    told, size = program.remarks, program.remark[rows]
-    sizes = np.column_stack([told.width_mm, told.height_mm])
-    untold = np.flatnonzero((np.minimum(told.width_mm, told.height_mm) <= 0.0)[size])
+    remarks, size = program.remarks, program.remark[rows]
+    sizes = np.column_stack([remarks.width_mm, remarks.height_mm])
+    unsized = np.flatnonzero((np.minimum(remarks.width_mm, remarks.height_mm) <= 0.0)[size])
     beads = Beads(program, profile.machine, rows, sizes, size)
-    if not len(untold):
+    if not len(unsized):
         return beads
-    first_mm, layer_mm = _layers_mm(beads, bool((told.height_mm > 0)[size].any()), profile)
-    own = np.empty((len(untold), 2))
-    for some in pieces(len(untold)):
-        mine, ends = untold[some], beads.segments(untold[some])
-        told_width_mm, told_height_mm = sizes[size[mine]].T
+    first_mm, layer_mm = _layers_mm(beads, bool((remarks.height_mm > 0)[size].any()), profile)
+    own = np.empty((len(unsized), 2))
+    for some in pieces(len(unsized)):
+        mine, ends = unsized[some], beads.segments(unsized[some])
+        width_mm, height_mm = sizes[size[mine]].T
         usual = np.where(np.maximum(ends[:, 0, 2], ends[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
-        height = np.where(told_height_mm > 0, told_height_mm, usual)
+        height = np.where(height_mm > 0, height_mm, usual)
         area = program.e_mm[rows[mine]] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(lengths_of(ends), 1e-9)
         by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
-        own[some, 0], own[some, 1] = np.where(told_width_mm > 0, told_width_mm, by_flow), height
-    size[untold] = len(sizes) + np.arange(len(untold), dtype=np.int32)
+        own[some, 0], own[some, 1] = np.where(width_mm > 0, width_mm, by_flow), height
+    size[unsized] = len(sizes) + np.arange(len(unsized), dtype=np.int32)
     return replace(beads, sizes=np.concatenate([sizes, own]))
 
 
 def lengths_of(segments: Floats) -> Floats:
-    """(k,) of (k, 2, 3) segments."""
+    """(k,) lengths of (k, 2, 3) segments."""
     lengths: Floats = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     return lengths
 

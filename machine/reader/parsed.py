@@ -104,7 +104,7 @@ class ParsedProgram:
         return self.remarks.layer[self.remark]
 
     def part_and_layer(self, row: int) -> tuple[int, int]:
-        """Of one row."""
+        """Part and layer of one row."""
         remark = self.remark[row]
         return int(self.remarks.part[remark]), int(self.remarks.layer[remark])
 

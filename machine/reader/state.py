@@ -47,7 +47,7 @@ class Table:
         )  # fmt: skip
 
     def begin(self, place: list[float], rows: int) -> None:
-        """Have room for so many more rows, the first of which begins at a place (X Y Z tilt turn, then anything)."""
+        """Make room for a number of further rows, the first of which begins at a place (X Y Z tilt turn, then anything)."""
         count, columns, room = self.rows, self.columns, len(self.columns.places) - 1
         if count + rows > room:
             fixed = ("remark_rows",) if len(columns.starts) else ("remark_rows", "starts")

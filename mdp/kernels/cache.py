@@ -26,12 +26,7 @@ PACKAGES = Path(__file__).resolve().parents[2]
 SHIPPED = Path(__file__).resolve().parent / "compiled"  # made by tools/ship_kernels.py; not there in a checkout
 IMPORTED = re.compile(rb"^from ((?:profiles|mdp|slicer|machine)(?:\.\w+)+) import", re.MULTILINE)
 HAS_KERNELS = b"from mdp.kernels.kernel import"
-UNREADABLE = (
-    OSError,
-    EOFError,
-    ValueError,
-    UnpicklingError,
-)  # may not be read, or was not written to its end
+UNREADABLE = (OSError, EOFError, ValueError, UnpicklingError)  # what a file raises that may not be read or is cut short
 UNUSED_S = 60 * 86400.0  # folders of older versions go after this time: a program that still runs may be using them
 
 _loaded: set[str] = set()  # names of the folders of the files whose kernels are loaded and were not shipped

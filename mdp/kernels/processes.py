@@ -42,7 +42,7 @@ def parallel_map(
     """work(0), work(1) .. work(count - 1), in this order; copies of this process work ahead while the caller uses the results.
 
     Results are pickled. The error of the first piece that raises one is raised. Within `work` there are no further copies.
-    fewest: so many pieces are worth a copy. helps: whether this process does pieces, too; while it does one that takes long,
+    fewest: the least number of pieces worth a copy. helps: whether this process does pieces, too; while it does a long one,
     copies wait for it to receive results that no pipe holds. on_wait: called now and then while results are waited for.
     """
     cores = min(threads.THREADS, count)

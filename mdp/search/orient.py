@@ -27,7 +27,7 @@ from mdp.directions.orientation import (
 from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Mesh
-from mdp.overhang import ROUNDING, UP
+from mdp.overhang import UP
 from mdp.search.coarse import as_it_is, coarse_copy
 from mdp.search.front import EQUAL, Price, Pricing, Worth, charge_mm2, front_row, price_row
 from mdp.search.parts import one_piece
@@ -36,6 +36,7 @@ from mdp.search.search import decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 
+BOUND_SLACK = 1e-4  # degrees, and share of an area, by which rounding may lower a bound
 RANKED = 20  # orientations that are ranked
 FORECAST = 3  # orientations whose time is estimated, beside the model as it stands
 # Shares of a model's surface that count as blemished for a narrow base, for an unsteady stance, and for being turned from how the
@@ -234,14 +235,14 @@ def _with_footing(
 
 
 def _that_may_hold(orientations: list[Orientation], plate: Plate, on_face: bool) -> list[Orientation]:
-    """Those in which, as far as the model's hull tells, the plate may hold it. on_face: not on a tip."""
+    """Those that the model's hull does not rule out: the plate may hold it, with on_face on more than a tip."""
     if not orientations:
         return []
     touching_mm2, lean_deg = plate.stance_bounds(np.array([orientation.rotation for orientation in orientations]))
-    able = lean_deg > -ROUNDING
+    able = lean_deg > -BOUND_SLACK
     if on_face:
         shadows_mm2 = np.array([orientation.shadow_mm2 for orientation in orientations])
-        able &= touching_mm2 > (1.0 - ROUNDING) * SMALL_BASE * shadows_mm2
+        able &= touching_mm2 > (1.0 - BOUND_SLACK) * SMALL_BASE * shadows_mm2
     return [orientations[k] for k in np.flatnonzero(able)]
 
 
@@ -250,8 +251,7 @@ def _cheapest_first(
 ) -> Iterator[tuple[Orientation, Footing]]:
     """Orientations by the sum of their guessed cost and their footing's, equal sums in the order given.
 
-    A footing takes a hundred times as long as a guess and never lowers the sum, so only those are measured whose guess is not
-    above the sums that are asked for.
+    A footing takes a hundred times as long as a guess and never lowers the sum, so it is measured only when the guess comes up.
     """
     surface_mm2, guesses_mm2 = float(plate.mesh.areas_mm2.sum()), [guess_mm2(orientation) for orientation in orientations]
     measured: list[tuple[float, int, Footing]] = []

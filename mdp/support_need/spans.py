@@ -1,9 +1,8 @@
 """Spans: whether straight lines over a hanging place, all in one direction, reach from anchor to anchor and are short enough.
 
-One definition for the search, which asks so for patches of the surface, and for the slicer's bridges (slicer.fill.bridge): where
-lines cross the sides, and how much of them may be loose or too long. Each says itself which directions and lines it can afford,
-and what holds a line: the search knows of every side of the rim whether it is an anchor, the slicer looks whether a line ends on
-the layer below.
+One definition for the search's patches of the surface and for the slicer's bridges (slicer.fill.bridge): where lines cross the
+sides, and how much of their length may be loose or too long. Each chooses the directions and lines that it can afford, and what
+holds a line: in the search the sides of the rim that are anchors, in the slicer the layer below.
 """
 
 from typing import NamedTuple
@@ -113,16 +112,16 @@ def line_across(ends: Floats, along: tuple[float, float], y: float, places: Floa
     along: cosine and sine of its direction; y: its height in the frame turned by it; places: along it.
     """
     cos, sin = along
-    many = 0
+    count = 0
     for e in range(len(ends)):
         begin, end = ends[e, 1] * cos - ends[e, 0] * sin - y, ends[e, 3] * cos - ends[e, 2] * sin - y
         if (begin < 0.0) != (end < 0.0):
             share = begin / (begin - end)
             x = ends[e, 0] + share * (ends[e, 2] - ends[e, 0])
-            place, at = x * cos + (ends[e, 1] + share * (ends[e, 3] - ends[e, 1])) * sin, many
+            place, at = x * cos + (ends[e, 1] + share * (ends[e, 3] - ends[e, 1])) * sin, count
             while at > 0 and places[at - 1] > place:
                 places[at], crossed[at] = places[at - 1], crossed[at - 1]
                 at -= 1
             places[at], crossed[at] = place, e
-            many += 1
-    return many
+            count += 1
+    return count

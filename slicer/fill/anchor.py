@@ -65,7 +65,7 @@ def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
 
 @helper
 def _next_ends(along_border: Floats, ends: Indices, border: EdgeIndex, way: Floats) -> tuple[Indices, Floats]:
-    """Of each end the next one on its contour, which may be itself, and how far it is. ends: (k, 2) edges on which they lie."""
+    """The next end along the contour from each end (itself if it is alone), and its distance. ends: (k, 2) edges they lie on."""
     order, contour = argsort(along_border), longs(len(along_border), 0)
     for end in range(len(contour)):
         contour[end] = border.loop[ends[end // 2, end % 2]]

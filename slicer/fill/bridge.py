@@ -16,7 +16,7 @@ from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, 
 from slicer.paths import Kind
 
 TURNS = 18  # directions tried over half a turn, besides those of the place's own sides; the search tries fewer
-SIDES = 8  # so many of its longest sides are tried, along and across: lines follow a side that is there, not the mean of several
+SIDES = 8  # of its longest sides are tried, along and across: lines follow a real side, not the mean of several
 LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
 NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges
 REACH = 2.0  # line widths that the lines of a bridge reach over its anchors
@@ -123,8 +123,8 @@ def _lines_across(sides: Floats, anchors: EdgeIndex, angle: float, width_mm: flo
 
 @kernel
 def _least_sag(sides: Floats, anchors: EdgeIndex, angles: Floats, width_mm: float) -> tuple[float, float, float, float]:
-    """Of some angles the one that sags least (nan: none is held), its longest span and the share of its lines that is loose; and
-    the one with most of them held at both ends."""
+    """The angle at which lines sag least (nan: none is held), its longest span and the loose share of its lines; and the angle
+    with the greatest length of lines held at both ends."""
     best, least, longest_mm, loose = np.nan, np.inf, 0.0, 0.0
     holding, most_mm = 0.0, -1.0
     for angle in angles:

@@ -33,7 +33,7 @@ def rotation_2d(angle_deg: float) -> Floats:
 
 
 def clip_lines(points: Floats, starts: Indices, border: EdgeIndex) -> Pieces:
-    """What of open lines (n, 2) lies inside the polygons of a border, by the even-odd rule.
+    """The pieces of open lines (n, 2) inside the polygons of a border, by the even-odd rule.
 
     Every line must begin and end outside.
     """

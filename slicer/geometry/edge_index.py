@@ -1,7 +1,7 @@
-"""Edge index: the edges of polygons sorted into a grid of square cells, so that a question meets only the few near a place.
+"""Edge index: the edges of polygons sorted into a grid of square cells, so that a query meets only the few edges near it.
 
-Asked are where a segment crosses edges, whether a point lies inside, the nearest edge, and how deep inside points lie. All count
-a point on an edge alike (slicer.geometry.segments): no crossing is counted twice or missed at a vertex.
+It finds where a segment crosses edges, whether a point lies inside, the nearest edge, and how deep inside points lie. All queries
+treat a point on an edge alike (slicer.geometry.segments): no crossing is counted twice or missed at a vertex.
 """
 
 from math import inf, sqrt
@@ -20,7 +20,7 @@ from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share, squared_distance
 
 MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
-FARTHEST_MM = 1e7  # no edge is farther from a point that is asked for
+FARTHEST_MM = 1e7  # where the search for the nearest edge ends
 Indices = NDArray[np.int64]
 
 
@@ -201,7 +201,7 @@ def nearest(index: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, 
 
 @kernel
 def crosses(index: EdgeIndex, since: Floats, to: Floats) -> Mask:
-    """(n, 2) by two whether segments cross any edge."""
+    """(n,) whether the segments between (n, 2) points cross any edge."""
     out = np.empty(len(to), np.bool_)
     for k in range(len(to)):
         out[k] = not free(index, Segment(since[k, 0], since[k, 1], to[k, 0], to[k, 1]))
@@ -210,7 +210,7 @@ def crosses(index: EdgeIndex, since: Floats, to: Floats) -> Mask:
 
 @kernel
 def lie_within(index: EdgeIndex, points: Floats) -> Mask:
-    """Which of (n, 2) points lie in the polygons."""
+    """(n,) whether (n, 2) points lie in the polygons."""
     out = np.empty(len(points), np.bool_)
     for k in range(len(points)):
         out[k] = within(index, points[k, 0], points[k, 1])

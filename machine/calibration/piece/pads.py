@@ -76,10 +76,11 @@ def _laid(program: ParsedProgram, machine: Machine) -> tuple[dict[int, Pose], di
     """By part the pose of its beads, and the middle of the lowest of them."""
     poses: dict[int, Pose] = {}
     middles: dict[int, Floats] = {}
+    parts = program.part
     for straight, pose in pose_runs(program):
         rows = straight[program.kind[straight] == MoveKind.EXTRUDE]
-        for part in np.unique(program.part[rows]).tolist():
-            own = rows[program.part[rows] == part]
+        for part in np.unique(parts[rows]).tolist():
+            own = rows[parts[rows] == part]
             lowest = own[program.end[own, 2] <= program.end[own, 2].min() + 1e-3]
             if part > 0 and poses.setdefault(part, pose) == pose and part not in middles:
                 points = workpiece_path(machine, program.end[lowest])

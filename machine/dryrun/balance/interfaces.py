@@ -167,9 +167,9 @@ def _run_in(deposited: Beads, first: Indices, mm3: Floats, spare_mm3: float) -> 
     missing in the nozzle and fills no room.
     """
     width_mm, height_mm = deposited.sizes[deposited.size[first]].T
-    told = width_mm * height_mm * lengths_of(deposited.segments(first))
-    lean = float(np.quantile(mm3 / np.maximum(told, 1e-9), LEAN))
-    beyond = np.maximum(mm3 - RICH * lean * told, 0.0).cumsum()
+    nominal_mm3 = width_mm * height_mm * lengths_of(deposited.segments(first))
+    lean = float(np.quantile(mm3 / np.maximum(nominal_mm3, 1e-9), LEAN))
+    beyond = np.maximum(mm3 - RICH * lean * nominal_mm3, 0.0).cumsum()
     return np.diff(np.minimum(beyond, spare_mm3), prepend=0.0)
 
 
