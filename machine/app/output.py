@@ -43,6 +43,8 @@ def check_outputs(outputs: Outputs) -> None:
     """The same for all files and the folder that a command was asked for."""
     if outputs.folder is not None:
         check_folder(outputs.folder)
+    if STDOUT in (outputs.gcode, outputs.json) and getattr(sys.stdout, "name", "") == os.devnull:  # see machine.app.start
+        raise OutputError("output -: standard output is closed")
     streams = (None if file == STDOUT else file for file in (outputs.gcode, outputs.json))
     files = (outputs.png, outputs.sheet, outputs.front, outputs.record, outputs.html, outputs.svg, outputs.plan)
     for file in (*files, *streams):

@@ -3,15 +3,14 @@
 import gc
 import os
 import sys
-from io import StringIO
 
 SELDOM = (100_000, 20, 50)  # what is allocated between two looks for garbage in circles, of which there is little
-NOWHERE = StringIO()  # in place of streams that whoever started the program has closed
 
 
 def main() -> int:
     """Load the command line and run it; returns the exit code."""
-    sys.stdout, sys.stderr = sys.stdout or NOWHERE, sys.stderr or NOWHERE
+    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115 - for as long as the program runs
+    sys.stdout, sys.stderr = (stream or open(os.devnull, "w", encoding="utf-8") for stream in (sys.stdout, sys.stderr))  # noqa: SIM115
     gc.set_threshold(*SELDOM)
     os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # what is hardly written to takes no memory
     try:

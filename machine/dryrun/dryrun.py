@@ -58,11 +58,6 @@ class DryRun:
         return float(self.times_s.sum()) + self.dwell_s
 
     @property
-    def segments_mm(self) -> Floats:
-        """(m, 2, 3) deposited segments, workpiece frame, worked out anew."""
-        return self.deposited.segments()
-
-    @property
     def segment_row(self) -> NDArray[np.int64]:
         """(m,) the rows of the segments in program, which hold line, part, layer and type."""
         return self.deposited.rows

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, highest_first, lay_bead
 from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
-from machine.reader.parsed import Indices32, ParsedProgram, pieces, pose_runs
+from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces, pose_runs
 from mdp.head import Head, head_of
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, no_nrt
@@ -27,6 +27,7 @@ EVEN = 1e-6
 ROUGH = 0.5  # of half a bead: by how much earlier plastic, seen from another side, may seem to stand higher than it does
 INNER = 0.35  # of the bead's width: where what lies under it is looked for
 OWN = 3.0  # so many widths back along its path the plastic is the bead's own beginning
+FEW_TURNS = 16  # of the table; segments of a program with more are held in memory, 48 bytes a bead
 MOST_TURNED = 100_000_000  # segments turned into the frames of all runs together
 FREE_END = 0.5  # of a span: so far a bead that is held at one end only may reach
 
@@ -70,36 +71,47 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     if not len(deposited.rows):
         return contacts
     strokes, moves, head = strokes_of(program), moves_of(program, deposited, profile), head_of(machine)
-    begins: list[int] = []
-    ups, turned = np.zeros((0, 3)), 0
+    begins, ups, turned = list[int](), list[Floats](), 0
+    many_turns = np.count_nonzero(program.kind == MoveKind.ROTATE) > FEW_TURNS
+    segments = deposited.segments() if many_turns else None  # computed once for all runs; else for each, which saves memory
     process = profile.process
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
     for rows, pose in pose_runs(program):
         before, after = (int(at) for at in np.searchsorted(deposited.rows, (rows[0], rows[-1] + 1)))
-        begins, ups = [*begins, before], np.vstack([ups, rotation(machine, pose)[2]])
+        begins.append(before)
+        ups.append(rotation(machine, pose)[2])
         turned += before
         if turned > MOST_TURNED:
             return contacts._replace(untested_row=int(rows[0]))
         if after:
-            field = _field(deposited, (before, after), pose, (ups, begins), machine)
+            field = _field(deposited, segments, (before, after), pose, (np.array(ups), np.array(begins)), machine)
             about = Surroundings(field, head, int(rows[0]), before, gap, _plate(machine, pose))
             _replay_run(rows, moves, strokes, about, contacts, np.zeros((len(rows), 2)))
             del field, about  # before there is another one
     return contacts
 
 
-def _field(deposited: Beads, laid: tuple[int, int], pose: Pose, directions: tuple[Floats, list[int]], machine: Machine) -> Field:
-    """The field of a run at one pose with all earlier plastic in it. laid: how many beads are before the run and after it.
-    directions: those in which runs print, and the bead with which each begins.
+def _field(
+    deposited: Beads,
+    segments: Floats | None,
+    laid: tuple[int, int],
+    pose: Pose,
+    directions: tuple[Floats, NDArray[np.int64]],
+    machine: Machine,
+) -> Field:
+    """The field of a run at one pose with all earlier plastic in it. segments: of all beads, None where they are computed here.
+    laid: the number of beads before the run and after it. directions: those in which runs print, and the bead with which each
+    begins.
     """
     before, after = laid
     turn, moved, extent = rotation(machine, pose), shift(machine, pose), np.array([[np.inf] * 2, [-np.inf] * 2])
     for some in pieces(after):
-        _widen(extent, deposited.segments(some), turn, moved)
+        _widen(extent, deposited.segments(some) if segments is None else segments[some], turn, moved)
     field = empty_field(extent[0] - 3.0, extent[1] + 3.0)
     for some in pieces(before):
         run_of = np.searchsorted(directions[1], np.arange(some.start, some.stop), side="right") - 1
-        mine = (deposited.segments(some), deposited.rows[some], deposited.sizes, deposited.size[some])
+        own = deposited.segments(some) if segments is None else segments[some]
+        mine = (own, deposited.rows[some], deposited.sizes, deposited.size[some])
         _lay_turned(*mine, directions[0][run_of], turn, moved, field)
     return highest_first(field)
 

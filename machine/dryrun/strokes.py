@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.kinematics.table import workpiece_segments
+from machine.kinematics.table import goes_on, workpiece_segments
 from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
@@ -156,11 +156,9 @@ def _along(start: Floats, end: Floats, extruded: NDArray[np.bool_]) -> tuple[Ind
     """path and way of Strokes."""
     path, way, paths, way_mm = np.empty(len(start), np.int32), np.empty(len(start)), 0, 0.0
     for row in range(len(start)):
-        goes_on = row > 0 and extruded[row] and extruded[row - 1]
-        for axis in range(5):
-            goes_on = goes_on and start[row, axis] == end[row - 1, axis]
+        same_path = extruded[row] and extruded[row - 1] and goes_on(start, end, row)
         x, y, z = end[row, 0] - start[row, 0], end[row, 1] - start[row, 1], end[row, 2] - start[row, 2]
-        paths += not goes_on
+        paths += not same_path
         way_mm += np.sqrt(x * x + y * y + z * z)
         path[row], way[row] = paths, way_mm
     return path, way

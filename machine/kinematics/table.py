@@ -63,16 +63,22 @@ def _segments(start: Floats, end: Floats, rows: Indices, chain: Floats) -> Float
     out, angles = np.empty((len(rows), 2, 3)), table(2, 3)
     for k in range(len(rows)):
         row = rows[k]
-        goes_on = k > 0 and row == rows[k - 1] + 1
-        for axis in range(5):
-            goes_on = goes_on and start[row, axis] == end[row - 1, axis]
-        if goes_on:
+        if k > 0 and row == rows[k - 1] + 1 and goes_on(start, end, row):
             for axis in range(3):
                 out[k, 0, axis] = out[k - 1, 1, axis]
         else:
             out[k, 0, 0], out[k, 0, 1], out[k, 0, 2] = _place(start[row], chain, angles, k == 0)
         out[k, 1, 0], out[k, 1, 1], out[k, 1, 2] = _place(end[row], chain, angles, False)
     return out
+
+
+@no_nrt
+def goes_on(start: Floats, end: Floats, row: int) -> bool:
+    """Whether a row begins where the one before it has ended, on all five axes."""
+    same = row > 0
+    for axis in range(5):
+        same = same and start[row, axis] == end[row - 1, axis]
+    return same
 
 
 @no_nrt

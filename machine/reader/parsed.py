@@ -183,20 +183,17 @@ class ParsedProgram:
 
 
 def pieces(count: int) -> Iterator[slice]:
-    """So many rows some at a time, where what is worked out of each takes many times what comes of it."""
+    """Slices that cover `count` rows, AT_ONCE at most in each, for work whose temporaries are far larger than its result."""
     return (slice(begin, min(begin + AT_ONCE, count)) for begin in range(0, count, AT_ONCE))
 
 
 def pose_runs(program: ParsedProgram) -> Iterator[tuple[Indices, Pose]]:
     """The rows of straight moves between two turns of the table, and the pose of all of them."""
-    turns = [np.zeros(1, dtype=np.int64)]
+    turns, before = [np.zeros(1, dtype=np.int64)], program.start[:1, 3:]
     for some in pieces(len(program.line)):
-        before = (
-            program.end[max(some.start - 1, 0) : some.stop - 1, 3:]
-            if some.start
-            else np.vstack([program.start[:1, 3:], program.end[: some.stop - 1, 3:]])
-        )
-        turns.append(some.start + np.flatnonzero((program.end[some, 3:] != before).any(axis=1)))
+        poses = np.concatenate([before, program.end[some, 3:]])
+        turns.append(some.start + np.flatnonzero((poses[1:] != poses[:-1]).any(axis=1)))
+        before = poses[-1:]
     for begin, end in pairwise([*np.concatenate(turns).tolist(), len(program.line)]):
         rows = begin + np.flatnonzero(program.kind[begin:end] != MoveKind.ROTATE)
         if len(rows):

@@ -128,7 +128,8 @@ class Plate:
     def stance_bounds(self, rotations: Floats) -> tuple[Floats, Floats]:
         """(k,) upper bounds of the touching area, mm2, and (k,) of the lean, degrees, of the model turned by (k, 3, 3) rotations.
 
-        The base lies within the hull's sections at the same heights, and these take a tenth of the time.
+        The base lies within the hull's sections at the same heights, and these take a tenth of the time. Rounding may lower
+        a bound by 1e-5.
         """
         hull, rotations = convex_hull(self.mesh.vertices), np.ascontiguousarray(rotations)
         corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm])

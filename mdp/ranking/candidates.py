@@ -127,7 +127,7 @@ class ScoredCandidates:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
     not known yet. direction is a row of Bounds.directions; above_mm2: what is risky above the plane printed straight up;
     residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; hopeless_mm2: what of the first two no cut
-    can save, 0 where that was not asked for. first, columns: (k,) the first plane along each direction, in steps of step_mm, and
+    can save, 0 unless requested. first, columns: (k,) the first plane along each direction, in steps of step_mm, and
     the number of all planes along it."""
 
     remainder: Remainder
@@ -254,7 +254,7 @@ def refusals(
     scored: ScoredCandidates, limits: Bounds, search: Search, *, least_gain_mm2: float, is_weak: Callable[[Plane], bool]
 ) -> dict[Reason, int]:
     """How many of all planes of a solid each reason takes, to report why nothing can be cut. scored: at least those of its
-    candidates that gain least_gain_mm2; is_weak: asked for those that nothing else forbids."""
+    candidates that gain least_gain_mm2; is_weak: called only for planes that pass every other check."""
     direction = np.repeat(np.arange(len(scored.columns), dtype=np.int32), scored.columns)
     begins = np.concatenate([[0], np.cumsum(scored.columns)])
     offset_mm = (np.arange(begins[-1]) + np.repeat(scored.first - begins[:-1], scored.columns)) * np.float64(scored.step_mm)

@@ -140,7 +140,7 @@ def _cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
         for s in range(many + 1):
             if s < many and not SNAP < shares[s] < 1.0 - SNAP:
                 continue
-            # Asked of every piece: where a line leaves the area exactly at one of its points, no step crosses an edge.
+            # Tested for every piece: where a line leaves the area exactly at one of its points, no step crosses an edge.
             middle = 0.5 * (since + shares[s])
             is_within = within(area, step.x0 + middle * (step.x1 - step.x0), step.y0 + middle * (step.y1 - step.y0))
             for axis in range(columns):

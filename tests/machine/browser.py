@@ -21,7 +21,7 @@ FLAGS = [
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),  # WebGL2 without a graphics card
 ]
 PATIENCE_S = 150.0  # on a busy machine its start alone has taken 50 s
-NAVIGATED = "Inspected target navigated or closed"  # what the browser answers where the page it was asked of is left
+NAVIGATED = "Inspected target navigated or closed"  # the browser's answer when its page is left during a query
 
 
 class Browser:

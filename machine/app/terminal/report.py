@@ -183,8 +183,8 @@ def agreement_line(agreed: "Agreement") -> str:
     """How the plastic agrees with the model."""
     sentence = (
         f"the beads fill {100 * agreed.filled:.1f} % of the model; of their length {100 * agreed.outside:.2f} % lie outside it "
-        f"by more than half a line ({agreed.farthest_mm:.2f} mm at the worst), {100 * agreed.unsupported:.2f} % hang in air "
-        f"and {100 * agreed.reported:.2f} % are marked overhang or bridge and do"
+        f"by more than half a line ({agreed.farthest_mm:.2f} mm at the worst), {100 * agreed.unsupported:.2f} % hang in air, "
+        f"and {100 * agreed.reported:.2f} % do so where the file marks an overhang or a bridge"
     )
     return "\n".join(wrap(sentence, WIDEST, subsequent_indent="  ")) + "\n"
 

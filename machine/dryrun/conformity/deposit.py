@@ -40,10 +40,10 @@ def inside_share(run: DryRun, mesh: Mesh, tolerance_mm: float) -> Share:
     greatest distance of a midpoint outside the model, looked for up to four tolerances and at least 1 mm.
     """
     own = np.flatnonzero([name not in AROUND for name in run.segment_type])
-    middles, lengths, which = _pieces(run.segments_mm[own])
+    middles, lengths, which = _pieces(run.deposited.segments(own))
     outside = outside_mm(middles, mesh, max(4.0 * tolerance_mm, 1.0))
     within = outside <= tolerance_mm
-    marked = np.zeros(len(run.segments_mm), dtype=np.bool_)
+    marked = np.zeros(len(run.segment_row), dtype=np.bool_)
     marked[own[which[~within]]] = True
     return Share(float(lengths[within].sum()), float(lengths.sum()), float(outside.max(initial=0.0)), marked)
 

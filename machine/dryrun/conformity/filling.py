@@ -41,9 +41,9 @@ class Fill:
 def filled_share(run: DryRun, mesh: Mesh, profile: Profile, points: int = POINTS) -> Fill:
     """How much of the closed model, in the workpiece frame, the beads of its own fill (support and skirt aside)."""
     places = lattice(mesh, points)
-    own = np.array([name not in AROUND for name in run.segment_type], dtype=np.bool_)
-    ups = printing_directions(run, profile)
-    hit = in_beads(places, run.segments_mm[own], ups[own], run.deposited.width_mm[own], run.deposited.height_mm[own])
+    own = np.flatnonzero([name not in AROUND for name in run.segment_type])
+    width_mm, height_mm = run.deposited.sizes[run.deposited.size[own]].T
+    hit = in_beads(places, run.deposited.segments(own), printing_directions(run, profile)[own], width_mm, height_mm)
     return Fill(int(hit.sum()), len(places))
 
 

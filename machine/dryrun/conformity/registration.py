@@ -48,15 +48,16 @@ class Shift:
 def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
     """The shift of every part with enough outer walls against the closed model in the workpiece frame."""
     outer = run.program.rows_of_types(*WALLS)[run.segment_row]
-    walls = np.flatnonzero(outer & (run.deposited.length_mm > LEAST_MM))
+    walls = np.flatnonzero(outer)
+    walls = walls[run.deposited.lengths(walls) > LEAST_MM]
     part = run.program.part[run.segment_row]
     chosen = [_evenly(walls[part[walls] == index]) for index in np.unique(part[walls])]
     if not chosen:
         return []
     pieces = np.concatenate(chosen)
     ups = printing_directions(run, profile)[pieces]
-    width, height = run.deposited.width_mm[pieces], run.deposited.height_mm[pieces]
-    points = run.segments_mm[pieces].mean(axis=1) - 0.5 * height[:, None] * ups
+    width, height = run.deposited.sizes[run.deposited.size[pieces]].T
+    points = run.deposited.segments(pieces).mean(axis=1) - 0.5 * height[:, None] * ups
     distance, face = nearest_faces(points, mesh, NEAR_MM)
     normals = mesh.normals[face]
     lateral = np.sqrt(np.maximum(0.0, 1.0 - (normals * ups).sum(axis=1) ** 2))

@@ -362,9 +362,23 @@ def _wait_for(process: "subprocess.Popen[str]", word: str) -> None:
     pytest.fail(f"{word!r} was never said")
 
 
-def test_a_closed_output_ends_no_command() -> None:
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("profiles list >&-", (0, "")),
+        ("profiles list <&-", (0, "")),
+        ("export demo:tree -o - >&-", (1, "tiltprint: output -: standard output is closed\n")),
+    ],
+)
+def test_closed_streams_end_no_command_unless_it_writes_to_them(words: str, expected: tuple[int, str]) -> None:
     start = f"{sys.executable} -c 'from machine.app.start import main; raise SystemExit(main())'"
-    done = subprocess.run(
-        ["sh", "-c", f"{start} profiles list >&-"], stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3]
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    command = ["sh", "-c", f"{start} {words}"]
+    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3])
+    assert (done.returncode, done.stderr) == expected
+
+
+def test_the_console_of_a_closed_input_ends_at_once() -> None:
+    start = f"{sys.executable} -c 'from machine.app.start import main; raise SystemExit(main())'"
+    command = ["sh", "-c", f"{start} console --port sim <&-"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=Path(__file__).parents[3])
+    assert (done.returncode, "a bug in tiltprint" in done.stderr) == (0, False)

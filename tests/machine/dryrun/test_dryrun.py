@@ -8,8 +8,11 @@ from hypothesis import strategies as st
 
 from machine.dryrun import DryRun, dry_run, summary
 from machine.planning.timing import move_times
+from machine.reader import parsed
 from profiles.errors import GcodeError
 from profiles.profile import load
+from tests.machine.dryrun.bent import bent
+from tests.machine.dryrun.planted import FAULTS
 from tests.machine.hand import printed, text, whole
 
 PROFILE = load()
@@ -201,7 +204,7 @@ def test_the_plastic_lies_where_the_slicer_put_it(machine: str) -> None:
                     np.column_stack([path.points, np.full(len(path.points), layer.z_mm + part.base.offset_mm)]) @ part.rotation
                 )
                 wanted.append(np.stack([points[:-1], points[1:]], axis=1))
-    assert run.segments_mm == pytest.approx(np.concatenate(wanted), abs=2e-3)
+    assert run.deposited.segments() == pytest.approx(np.concatenate(wanted), abs=2e-3)
     oozed_mm3 = profile.material.prime_extra_mm * pi * 1.75**2 / 4
     assert run.segment_mm3.sum() == pytest.approx(sum(piece.volume_mm3 for piece in sliced) + oozed_mm3, rel=1e-5)
 
@@ -238,3 +241,17 @@ def test_an_empty_text_makes_an_empty_run() -> None:
 def test_a_place_that_no_printer_reaches_is_refused_with_its_line(line: str) -> None:
     with pytest.raises(GcodeError, match=r"line 2: [XYZ] comes to .* mm: no printer reaches beyond 10000"):
         dry_run(["G1 X1 F600", line], load())
+
+
+@pytest.mark.parametrize("rows_at_once", [7, 1000])
+def test_rows_are_judged_alike_however_many_are_judged_at_once(rows_at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    profile, _, lines = bent("generic_ac")
+    faults = [fault.edit(list(lines)) for fault in FAULTS if fault.name in ("a layer missing", "no fans")]
+    programs = [lines, *faults, [line for line in lines if not line.startswith((";WIDTH", ";HEIGHT"))]]
+    whole = [dry_run(program, profile) for program in programs]
+    monkeypatch.setattr(parsed, "AT_ONCE", rows_at_once)
+    for program, expected in zip(programs, whole, strict=True):
+        run = dry_run(program, profile)
+        assert (run.findings, summary(run)) == (expected.findings, summary(expected))
+        assert np.array_equal(run.deposited.width_mm, expected.deposited.width_mm)
+        assert all(np.array_equal(own, other) for own, other in zip(run.contacts, expected.contacts, strict=True))

@@ -139,3 +139,17 @@ def test_bases_are_the_sections_that_manifold3d_cuts(seed: int) -> None:
     footing = footing_of(ring, turn)
     assert footing.touching_share * shadow_mm2 == pytest.approx(touching_mm2, abs=1e-6)
     assert footing.base_share * shadow_mm2 == pytest.approx(max(touching_mm2, base_mm2), abs=1e-6)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6))
+def test_the_hull_bounds_what_touches_and_how_far_a_model_may_lean(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    plate = Plate.under(mesh_of(rod(20.0, 6.0) + rod(4.0, 40.0).translate((12.0, 0.0, 0.0))), load())
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] if rng.random() < 0.8 else UPRIGHT
+    turn = turn * np.sign(np.linalg.det(turn))
+    footing, shadow_mm2 = plate.footing(turn), 0.5 * np.abs(plate.mesh.normals @ turn[2]) @ plate.mesh.areas_mm2
+    touching_mm2, lean_deg = plate.stance_bounds(turn[None])
+    assert footing.touching_share * shadow_mm2 <= touching_mm2[0] + 1e-4
+    assert footing.lean_deg <= lean_deg[0] + 1e-4
+    assert touching_mm2[0] < 1.1 * shadow_mm2

@@ -48,7 +48,7 @@ def test_the_simulated_printer_lays_the_plastic_where_the_model_is(machine: str,
         record = printer.record
     segments, volumes = record.deposited(profile.material.diameter_mm)
     assert volumes.sum() == pytest.approx(program.run.segment_mm3.sum(), rel=1e-3)
-    assert np.abs(segments - program.run.segments_mm).max() < 2e-3
+    assert np.abs(segments - program.run.deposited.segments()).max() < 2e-3
     assert program.decomposition is not None
     assert (len(program.decomposition.parts) == 1) == (Path(model).name in WHOLE)
     assert inside_share(program.run, program.decomposition.mesh, profile.process.line_width_mm).share >= 0.99

@@ -37,7 +37,7 @@ def in_arms(profile: Profile) -> Decomposition:
 def printed_middle(profile: Profile) -> np.ndarray:
     run = build(in_arms(profile), profile).run
     own = [name not in ("Custom", "Skirt/Brim") for name in run.segment_type]
-    ends = run.segments_mm[own].reshape(-1, 3)
+    ends = run.deposited.segments(own).reshape(-1, 3)
     middle: np.ndarray = 0.5 * (ends.min(axis=0) + ends.max(axis=0))[:2]
     return middle
 
