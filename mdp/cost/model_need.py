@@ -10,6 +10,7 @@ from mdp.overhang import Mask, facing_down, risky_upright
 from mdp.plane import Plane
 from mdp.support_need.need import ModelPieces, SupportNeed, needs_support
 from mdp.support_need.patches import CARRIES_ITSELF, UNSUPPORTABLE
+from mdp.sweep.crossing import areas_above
 from mdp.zone import UNMARKED, Marked
 from profiles.profile import Profile
 
@@ -87,8 +88,5 @@ def excess_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane, cut: Mask) -> floa
     times = np.where(classes == UNSUPPORTABLE, pieces.need.weight, 1.0) * counts
     risky = facing_down(mesh, plane.normal, pieces.need.process.self_supporting_angle_deg)
     chosen = np.flatnonzero(cut & risky & (classes != CARRIES_ITSELF) & (times != 1.0))
-    low, middle, high = np.sort(plane.heights_mm(mesh.vertices)[mesh.faces[chosen]], axis=1).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        lower, upper = low * low / ((middle - low) * (high - low)), high * high / ((high - middle) * (high - low))
-    share = np.where(middle > 0.0, 1.0 - np.where(low < 0.0, lower, 0.0), np.where(high > 0.0, upper, 0.0))
-    return float((mesh.areas_mm2[chosen] * share * (times[chosen] - 1.0)).sum())
+    above_mm2 = areas_above(mesh.faces[chosen], plane.heights_mm(mesh.vertices), mesh.areas_mm2[chosen])
+    return float((above_mm2 * (times[chosen] - 1.0)).sum())

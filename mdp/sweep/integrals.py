@@ -14,11 +14,11 @@ from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask
 from mdp.support_need.patches import NEEDS_SUPPORT, Classes
+from mdp.sweep.crossing import THIRD, moment_above, share_above, slopes
 from mdp.sweep.facets import Indices, Rows
 
 BLOCK = 128
 AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
-THIRD = 1.0 / 3.0
 KINDS = 8  # of faces, see _select; the first is none
 
 
@@ -135,26 +135,10 @@ def find_ramps(block: Block) -> None:
     low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
     column, crossed = block.column, block.crossed
     for k in range(len(low)):
-        extent = high[k] - low[k]
-        lower, upper = (middle[k] - low[k]) * extent, (high[k] - middle[k]) * extent
-        rise[k] = 1.0 / lower if lower > 0.0 else 0.0
-        fall[k] = 1.0 / upper if upper > 0.0 else 0.0
+        rise[k], fall[k] = slopes(low[k], middle[k], high[k])
         first = max(np.ceil(low[k]), 0.0)
         column[k] = np.int32(first)
         crossed[k] = np.int32(max(np.ceil(high[k]), 0.0)) - np.int32(first)
-
-
-@no_nrt
-def share_above(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
-    """Share of a face above an offset that it crosses."""
-    return 1.0 - (c - low) * (c - low) * rise if c < middle else (high - c) * (high - c) * fall
-
-
-@no_nrt
-def moment_above(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
-    """First moment about an offset of the share of a face above it."""
-    mean, up, down = (low + middle + high) * THIRD, c - low, high - c
-    return mean - c + up * up * rise * up * THIRD if c < middle else down * down * fall * down * THIRD
 
 
 @no_nrt
@@ -251,13 +235,12 @@ def _pick(chosen: Ints, surface: Overhangs, picked: Indices, weight: Floats) -> 
 
 
 @no_nrt
-def _cover(ahead: float, block: Block, area: Floats) -> None:
-    """Weighted share of each face above the column that lies `ahead` columns after its first."""
-    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
+def share_columns(ahead: float, block: Block, share: Floats) -> None:
+    """Share of each face above the column that lies `ahead` columns after its first."""
+    low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
     for k in range(len(low)):
         c = max(np.ceil(low[k]), 0.0) + ahead
-        inside = weight[k] if c < high[k] else 0.0
-        area[k] = inside * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
+        share[k] = share_above(c, low[k], middle[k], high[k], rise[k], fall[k]) if c < high[k] else 0.0
 
 
 @no_nrt
@@ -267,9 +250,9 @@ def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> N
     for k in range(len(low)):
         b, which = np.uint32(column[k]), 2 * np.uint32(kind[k])
         integrals[b, which] += weight[k]
-        integrals[b, which + 1] += shares[0, k]
-        integrals[b + 1, which + 1] += shares[1, k]
-        integrals[b + 2, which + 1] += shares[2, k]
+        integrals[b, which + 1] += weight[k] * shares[0, k]
+        integrals[b + 1, which + 1] += weight[k] * shares[1, k]
+        integrals[b + 2, which + 1] += weight[k] * shares[2, k]
         for ahead in range(AHEAD, crossed[k]):
             c = float(b) + ahead
             integrals[b + ahead, which + 1] += weight[k] * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
@@ -295,7 +278,7 @@ def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scr
         sort_heights(picked[0, :size], picked[1, :size], picked[2, :size], grid.heights, block)
         find_ramps(block)
         for ahead in range(AHEAD):
-            _cover(float(ahead), block, shares[ahead, :size])
+            share_columns(float(ahead), block, shares[ahead, :size])
         _add_areas(kind[begin:end], block, shares, integrals)
     whole = floats(KINDS, 0.0)
     for column in range(n - 1, -1, -1):

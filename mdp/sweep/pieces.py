@@ -18,8 +18,9 @@ from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
 from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE
 from mdp.sweep.components import Topology, anchor_of, before
-from mdp.sweep.integrals import OffsetGrid, column_over, moment_above, share_above
-from mdp.sweep.rims import chord_at, weigh_chord
+from mdp.sweep.crossing import chord_at, moment_above, share_above, slopes
+from mdp.sweep.integrals import OffsetGrid, column_over
+from mdp.sweep.rims import weigh_chord
 from mdp.sweep.sweep import Scars
 from mdp.topology.union_find import root
 
@@ -240,9 +241,7 @@ def _forget_crossing(pieces: Pieces) -> None:
 def _add_share(pieces: Pieces, piece: int, f: int, c: float, heights: tuple[float, float, float]) -> None:
     """Add the share of a face above c to its piece. heights: of its corners, the lowest first."""
     lowest, middle, highest = heights
-    extent = highest - lowest
-    lower, upper = (middle - lowest) * extent, (highest - middle) * extent
-    rise, fall = 1.0 / lower if lower > 0.0 else 0.0, 1.0 / upper if upper > 0.0 else 0.0
+    rise, fall = slopes(lowest, middle, highest)
     crossing, weights = pieces.crossing, pieces.weights
     share = share_above(c, lowest, middle, highest, rise, fall)
     for which in range(AREAS):

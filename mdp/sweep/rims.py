@@ -14,8 +14,9 @@ from mdp.kernels.arrays import dot, floats, int_table, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
+from mdp.sweep.crossing import chord_at, share_above, slopes
 from mdp.sweep.facets import Indices
-from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, cut_block, find_ramps, share_above, sort_heights
+from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, cut_block, find_ramps, share_columns, sort_heights
 
 COT_30 = 3.0**0.5
 FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is so thin that it is reported
@@ -64,12 +65,6 @@ def _weigh_rims(cosines: Floats, areas: Floats, weights: Floats, feather: float,
 
 
 @no_nrt
-def chord_at(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
-    """Length of a face's chord at an offset that it crosses, of its longest chord times its extent."""
-    return (c - low) * rise if c < middle else (high - c) * fall
-
-
-@no_nrt
 def _measure_chords(ahead: float, block: Block, length: Floats) -> None:
     """Weighted chord of each face at the column that lies `ahead` columns after its first."""
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
@@ -96,15 +91,6 @@ def _add_rims(block: Block, lengths: Floats, rim: Floats) -> None:
 def _weigh_stairs(cosines: Floats, areas: Floats, out: Floats) -> None:
     for k in range(len(out)):
         out[k] = areas[k] * step_share(cosines[k])
-
-
-@no_nrt
-def _share_columns(ahead: float, block: Block, share: Floats) -> None:
-    """Share of each face above the column that lies `ahead` columns after its first."""
-    low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
-    for k in range(len(low)):
-        c = max(np.ceil(low[k]), 0.0) + ahead
-        share[k] = share_above(c, low[k], middle[k], high[k], rise[k], fall[k]) if c < high[k] else 0.0
 
 
 @no_nrt
@@ -148,7 +134,7 @@ def integrate_scars(surface: Rims, grid: OffsetGrid, out: ScarsAbove) -> None:
         if counted:
             _weigh_stairs(cosines[:size], surface.stair_areas_mm2[begin:end], along[:size])
             for ahead in range(AHEAD):
-                _share_columns(float(ahead), block, shares[ahead, :size])
+                share_columns(float(ahead), block, shares[ahead, :size])
             _add_stairs(block, shares, surface.stairs_up_mm2[begin:end], along, stairs)
     up_mm2, along_mm2 = 0.0, 0.0
     for column in range(n - 1, -1, -1):
@@ -186,8 +172,7 @@ def measure_rim(faces: Ints, heights: Floats, cosines: Floats, areas: Floats, we
         if weights[f] <= 0.0 or low >= -ROUNDING_MM or high <= ROUNDING_MM:
             continue
         middle = max(min(p, q), min(max(p, q), r))
-        share = -low / (middle - low) if middle > 0.0 else high / (high - middle)
-        chord = 2.0 * areas[f] * share / (high - low)
+        chord = 2.0 * areas[f] * chord_at(0.0, low, middle, high, *slopes(low, middle, high))
         length += chord * weigh_chord(cosines[f], 0.0)
         weighted += chord * weights[f] * weigh_chord(cosines[f], feather)
         if abs(cosines[f]) > FEATHER_COSINE:
