@@ -98,11 +98,13 @@ def resume(
 ) -> int:
     """Go on with a print after a power cut, a crash or a pulled plug."""
     from machine.app.commands.resume import list_resumable, resume
+    from machine.link.journal import read_journal
     from profiles.errors import JournalError
 
     if journal is None:
         return list_resumable()
     if port is None:
+        read_journal(journal)  # one that cannot be read is told first
         raise JournalError(f"journal {journal}: at which port is the printer? --port PORT is expected")
     named = None if machine is None else options.machine_profile(machine)
     printing = PrintRequest(port, baud, 0.0, log, further, options.page_port(watch, watch_port), not no_browser)
