@@ -37,11 +37,11 @@ def findings(program: ParsedProgram, deposited: Beads, machine: Machine) -> list
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
     """Moves with the table at rest, one group for every pose between turns: two directions settle almost every move."""
     problems: list[Finding] = []
-    tried = ~_rises_from_home(program)
-    for rows, pose in pose_runs(program):
+    tried = ~_rises_from_home(program) & (program.kind != MoveKind.ROTATE)
+    for run, pose in pose_runs(program):
         if len(problems) >= MOST:
-            return [*problems, cut_short(program, int(rows[0]), "straight moves")]
-        for body, solid, close in _close(program, rows[tried[rows]], pose, machine):
+            return [*problems, cut_short(program, run.start, "straight moves")]
+        for body, solid, close in _close(program, run, tried[run], pose, machine):
             problems += _body(program, close, pose, body, solid, machine)
     return problems
 
@@ -58,13 +58,15 @@ def _rises_from_home(program: ParsedProgram) -> NDArray[np.bool_]:
     return rises
 
 
-def _close(program: ParsedProgram, run: Indices, pose: Pose, machine: Machine) -> Iterator[tuple[Body, Solid, Indices]]:
-    """The bodies and the solids that two directions do not part in one pose, and during which moves."""
+def _close(
+    program: ParsedProgram, run: slice, is_tried: NDArray[np.bool_], pose: Pose, machine: Machine
+) -> Iterator[tuple[Body, Solid, Indices]]:
+    """The bodies and the solids that two directions do not part in one pose, and during which moves of those that are tried."""
     tried = np.array([rotation(machine, pose) @ UP, UP])
     meetings = [(body, solid, solid[1](tried)) for solid in solids(machine, pose) for body in bodies(machine)]
     close: list[list[NDArray[np.int64]]] = [[] for _ in meetings]
-    for some in pieces(len(run)):
-        rows = run[some]
+    for some in pieces(len(is_tried)):
+        rows = run.start + some.start + np.flatnonzero(is_tried[some])
         least = swept(program.start[rows, :3], program.end[rows, :3], tried)
         nearest = least.min(axis=1, initial=np.inf)[:, None]
         for (body, _, reach), own in zip(meetings, close, strict=True):

@@ -28,6 +28,8 @@ ROUGH = 0.5  # of half a bead: by how much earlier plastic, seen from another si
 INNER = 0.35  # of the bead's width: where what lies under it is looked for
 OWN = 3.0  # so many widths back along its path the plastic is the bead's own beginning
 FEW_TURNS = 16  # of the table; segments of a program with more are held in memory, 48 bytes a bead
+FARTHEST = 3.0  # heights below a bead, besides half its width and a gap, plastic does not carry it (_under), with some to spare
+ROTATE = int(MoveKind.ROTATE)
 MOST_TURNED = 100_000_000  # segments turned into the frames of all runs together
 FREE_END = 0.5  # of a span: so far a bead that is held at one end only may reach
 
@@ -76,17 +78,20 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     segments = deposited.segments() if many_turns else None  # computed once for all runs; else for each, which saves memory
     process = profile.process
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
-    for rows, pose in pose_runs(program):
-        before, after = (int(at) for at in np.searchsorted(deposited.rows, (rows[0], rows[-1] + 1)))
+    width_mm, height_mm = deposited.sizes.max(axis=0)
+    below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # what is lower under all moves of a run is not met
+    for run, pose in pose_runs(program):
+        before, after = (int(at) for at in np.searchsorted(deposited.rows, (run.start, run.stop)))
         begins.append(before)
         ups.append(rotation(machine, pose)[2])
         turned += before
         if turned > MOST_TURNED:
-            return contacts._replace(untested_row=int(rows[0]))
+            return contacts._replace(untested_row=run.start)
         if after:
-            field = _field(deposited, segments, (before, after), pose, (np.array(ups), np.array(begins)), machine)
-            about = Surroundings(field, head, int(rows[0]), before, gap, _plate(machine, pose))
-            _replay_run(rows, moves, strokes, about, contacts, np.zeros((len(rows), 2)))
+            least_mm = min(float(side[run, 2].min()) for side in (program.start, program.end)) - below_mm
+            field = _field(deposited, segments, (before, after), (pose, least_mm), (np.array(ups), np.array(begins)), machine)
+            about = Surroundings(field, head, run.start, before, gap, _plate(machine, pose))
+            _replay_run(moves, strokes, about, contacts, np.zeros((run.stop - run.start, 2)))
             del field, about  # before there is another one
     return contacts
 
@@ -95,35 +100,36 @@ def _field(
     deposited: Beads,
     segments: Floats | None,
     laid: tuple[int, int],
-    pose: Pose,
+    place: tuple[Pose, float],
     directions: tuple[Floats, NDArray[np.int64]],
     machine: Machine,
 ) -> Field:
-    """The field of a run at one pose with all earlier plastic in it. segments: of all beads, None where they are computed here.
-    laid: the number of beads before the run and after it. directions: those in which runs print, and the bead with which each
-    begins.
+    """The field of a run at one pose with all earlier plastic in it that the run may meet. segments: of all beads, None where
+    they are computed here. laid: the number of beads before the run and after it. place: its pose, and the height up to which
+    plastic is left out. directions: those in which runs print, and the bead with which each begins.
     """
-    before, after = laid
-    turn, moved, extent = rotation(machine, pose), shift(machine, pose), np.array([[np.inf] * 2, [-np.inf] * 2])
+    (before, after), (pose, least_mm) = laid, place
+    turn = np.column_stack([rotation(machine, pose), shift(machine, pose)])
+    extent = np.array([[np.inf] * 2, [-np.inf] * 2])
     for some in pieces(after):
-        _widen(extent, deposited.segments(some) if segments is None else segments[some], turn, moved)
+        _widen(extent, deposited.segments(some) if segments is None else segments[some], turn)
     field = empty_field(extent[0] - 3.0, extent[1] + 3.0)
     for some in pieces(before):
         run_of = np.searchsorted(directions[1], np.arange(some.start, some.stop), side="right") - 1
         own = deposited.segments(some) if segments is None else segments[some]
         mine = (own, deposited.rows[some], deposited.sizes, deposited.size[some])
-        _lay_turned(*mine, directions[0][run_of], turn, moved, field)
+        _lay_turned(*mine, directions[0][run_of], turn, least_mm, field)
     return highest_first(field)
 
 
 @kernel
-def _widen(extent: Floats, segments: Floats, turn: Floats, moved: Floats) -> None:
-    """Widens (2, 2) least and greatest X Y to the ends of segments, turned and moved."""
+def _widen(extent: Floats, segments: Floats, turn: Floats) -> None:
+    """Widens (2, 2) least and greatest X Y to the ends of segments, turned and moved by (3, 4)."""
     for i in range(len(segments)):
         for side in range(2):
             x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
             for k in range(2):
-                place = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + moved[k]
+                place = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + turn[k, 3]
                 extent[0, k] = min(extent[0, k], place)
                 extent[1, k] = max(extent[1, k], place)
 
@@ -145,13 +151,20 @@ def _lay_turned(
     size: Indices32,
     ups: Floats,
     turn: Floats,
-    moved: Floats,
+    least_mm: float,
     field: Field,
 ) -> None:
-    """Lay (m,) beads into a field, turned and moved; ups: (m, 3) directions in which they were printed."""
+    """Lay (m,) beads into a field, turned and moved by (3, 4), but for those that stay below a height; ups: (m, 3) directions in
+    which they were printed.
+    """
     ends, middle = table(2, 3), floats(3, 0.0)
     for i in range(len(rows)):
-        up, width, height = ups[i], sizes[size[i], 0], sizes[size[i], 1]
+        up, width, height, highest = ups[i], sizes[size[i], 0], sizes[size[i], 1], -np.inf
+        for side in range(2):
+            x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
+            highest = max(highest, x * turn[2, 0] + y * turn[2, 1] + z * turn[2, 2] + turn[2, 3])
+        if highest + 0.5 * width + height < least_mm:
+            continue
         for k in range(3):
             middle[k] = 0.5 * height * (up[0] * turn[k, 0] + up[1] * turn[k, 1] + up[2] * turn[k, 2])
         along = up[0] * turn[2, 0] + up[1] * turn[2, 1] + up[2] * turn[2, 2]
@@ -159,7 +172,7 @@ def _lay_turned(
         for side in range(2):
             x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
             for k in range(3):
-                ends[side, k] = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + moved[k] - middle[k]
+                ends[side, k] = x * turn[k, 0] + y * turn[k, 1] + z * turn[k, 2] + turn[k, 3] - middle[k]
             ends[side, 2] += 0.5 * abs(along) * height + 0.5 * across * width
         half = min(0.5 * width, 0.5 * width * along * along + 0.5 * height * across)
         lay_bead(ends[0], ends[1], half, rows[i], field)
@@ -245,33 +258,32 @@ def _free_mm(most: float, held: float) -> float:
 
 
 @no_nrt
-def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: Floats, contacts: Contacts) -> None:
-    """Ends a stretch of beads with nothing under them; stretch: the places in rows of its first and last row, and how much longer
-    it is than it may span. pending: (n, 2) of each place what hangs in air there, and what only has a neighbour.
+def _settle(stretch: tuple[int, int, float], begin: int, pending: Floats, contacts: Contacts) -> None:
+    """Ends a stretch of beads with nothing under them; stretch: its first and last row, and how much longer it is than it may
+    span. pending: (n, 2) of each row from `begin` on what hangs in air there, and what only has a neighbour.
     """
     first, last, over_mm = stretch
-    for at in range(first, last + 1):
+    for row in range(first, last + 1):
         for k in range(2):
-            mm = pending[at, k]
+            mm = pending[row - begin, k]
             if mm == 0.0:  # what is not written takes no memory
                 continue
-            pending[at, k] = 0.0
+            pending[row - begin, k] = 0.0
             if over_mm > 0.0:
                 if k == 0:
-                    contacts.air_mm[rows[at]] += mm
+                    contacts.air_mm[row] += mm
                 else:
-                    contacts.beside_mm[rows[at]] += mm
+                    contacts.beside_mm[row] += mm
 
 
 @kernel
-def _replay_run(
-    rows: NDArray[np.int64], moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats
-) -> None:
-    """Try each row of a run against the field, then lay it; pending: (n, 2) zeros."""
-    first, open_mm, most, held = 0, 0.0, 0.0, FREE_END
-    bead = about.first_bead
-    for at in range(len(rows)):
-        row = rows[at]
+def _replay_run(moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats) -> None:
+    """Try each row of a run against the field, then lay it; pending: (n, 2) zeros, one for each."""
+    begin, bead = about.first, about.first_bead
+    first, open_mm, most, held = begin, 0.0, 0.0, FREE_END
+    for row in range(begin, begin + len(pending)):
+        if moves.kind[row] == ROTATE:
+            continue
         a, b = moves.start[row], moves.end[row]
         extruded = bead < len(moves.rows) and moves.rows[bead] == row
         slack = moves.sizes[moves.size[bead], 0] if extruded else LEVEL_SLACK_MM if moves.low[row] else SLACK_MM
@@ -285,9 +297,9 @@ def _replay_run(
             continue
         size = (0.5 * moves.sizes[moves.size[bead], 0], moves.sizes[moves.size[bead], 1])
         bead += 1
-        if at and strokes.path[row] != strokes.path[rows[at - 1]]:
-            _settle((first, at, open_mm - _free_mm(most, held)), rows, pending, contacts)
-            first, open_mm, held = at, 0.0, FREE_END
+        if row > begin and strokes.path[row] != strokes.path[row - 1]:
+            _settle((first, row, open_mm - _free_mm(most, held)), begin, pending, contacts)
+            first, open_mm, held = row, 0.0, FREE_END
         dx, dy = b[0] - a[0], b[1] - a[1]
         across = np.sqrt(dx * dx + dy * dy)
         length = np.sqrt(across * across + (b[2] - a[2]) ** 2)
@@ -303,12 +315,12 @@ def _replay_run(
                 if support in (0, 3):
                     span = moves.spans[moves.remark[row]]
                     most = span if open_mm == 0.0 else min(most, span)
-                    pending[at, support // 3] += length / count
+                    pending[row - begin, support // 3] += length / count
                     open_mm += length / count
                 else:
-                    _settle((first, at, open_mm - held * most), rows, pending, contacts)
-                    first, open_mm, held = at, 0.0, 1.0
+                    _settle((first, row, open_mm - held * most), begin, pending, contacts)
+                    first, open_mm, held = row, 0.0, 1.0
                     if support == 2:
                         contacts.overlapping_mm[row] += length / count
         lay_bead(a, b, size[0], row, about.field)
-    _settle((first, len(rows) - 1, open_mm - _free_mm(most, held)), rows, pending, contacts)
+    _settle((first, begin + len(pending) - 1, open_mm - _free_mm(most, held)), begin, pending, contacts)

@@ -81,8 +81,8 @@ class Strokes(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """(n, 5) start and end of each row; (n,) whether it lies below the bead that was just laid, and whether it leads to or from a
-    turn of the table, its remarks. spans: of each of those, how far beads may span over what is sparse below them.
+    """(n, 5) start and end of each row; (n,) its MoveKind, whether it lies below the bead that was just laid, whether it leads to
+    or from a turn of the table, its remarks. spans: of each of those, how far beads may span over what is sparse below them.
 
     rows, sizes, size: of the beads. Apart from Strokes, which the innermost functions take: each array more there slows
     all of it down.
@@ -90,6 +90,7 @@ class Moves(NamedTuple):
 
     start: Floats
     end: Floats
+    kind: NDArray[np.int8]
     low: NDArray[np.bool_]
     crossing: NDArray[np.bool_]
     remark: Indices32
@@ -172,7 +173,7 @@ def moves_of(program: ParsedProgram, deposited: Beads, profile: Profile) -> Move
     low[_below_last_bead(program, others[across > ACROSS_MM], deposited.rows)] = True
     crossing[_ways_to_turns(program, others[across > WAY_MM], deposited.rows)] = True
     spans, beads = _spans(program, profile), (deposited.rows, deposited.sizes, deposited.size)
-    return Moves(program.start, program.end, low, crossing, program.remark, spans, *beads)
+    return Moves(program.start, program.end, program.kind, low, crossing, program.remark, spans, *beads)
 
 
 def _spans(program: ParsedProgram, profile: Profile) -> Floats:

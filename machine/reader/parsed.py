@@ -187,17 +187,17 @@ def pieces(count: int) -> Iterator[slice]:
     return (slice(begin, min(begin + AT_ONCE, count)) for begin in range(0, count, AT_ONCE))
 
 
-def pose_runs(program: ParsedProgram) -> Iterator[tuple[Indices, Pose]]:
-    """The rows of straight moves between two turns of the table, and the pose of all of them."""
+def pose_runs(program: ParsedProgram) -> Iterator[tuple[slice, Pose]]:
+    """The rows from the first straight move after a turn of the table up to the next turn, and the pose of all of them."""
     turns, before = [np.zeros(1, dtype=np.int64)], program.start[:1, 3:]
     for some in pieces(len(program.line)):
         poses = np.concatenate([before, program.end[some, 3:]])
         turns.append(some.start + np.flatnonzero((poses[1:] != poses[:-1]).any(axis=1)))
         before = poses[-1:]
     for begin, end in pairwise([*np.concatenate(turns).tolist(), len(program.line)]):
-        rows = begin + np.flatnonzero(program.kind[begin:end] != MoveKind.ROTATE)
-        if len(rows):
-            yield rows, Pose(*program.end[rows[0], 3:].tolist())
+        straight = program.kind[begin:end] != MoveKind.ROTATE
+        if straight.any():
+            yield slice(begin + int(straight.argmax()), end), Pose(*program.end[begin, 3:].tolist())
 
 
 def temperatures(program: ParsedProgram, *codes: str) -> Floats:

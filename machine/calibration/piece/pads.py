@@ -77,8 +77,8 @@ def _laid(program: ParsedProgram, machine: Machine) -> tuple[dict[int, Pose], di
     poses: dict[int, Pose] = {}
     middles: dict[int, Floats] = {}
     parts = program.part
-    for straight, pose in pose_runs(program):
-        rows = straight[program.kind[straight] == MoveKind.EXTRUDE]
+    for run, pose in pose_runs(program):
+        rows = run.start + np.flatnonzero(program.kind[run] == MoveKind.EXTRUDE)
         for part in np.unique(parts[rows]).tolist():
             own = rows[parts[rows] == part]
             lowest = own[program.end[own, 2] <= program.end[own, 2].min() + 1e-3]

@@ -61,7 +61,7 @@ def printing_directions(run: DryRun, profile: Profile) -> Floats:
     """(m, 3) printing direction of each segment, workpiece frame."""
     ups = np.zeros((len(run.segment_row), 3))
     for rows, pose in pose_runs(run.program):
-        first, last = np.searchsorted(run.segment_row, (rows[0], rows[-1] + 1))
+        first, last = np.searchsorted(run.segment_row, (rows.start, rows.stop))
         ups[first:last] = rotation(profile.machine, pose)[2]
     return ups
 
