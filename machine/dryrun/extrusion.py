@@ -6,6 +6,7 @@ its own files' filament within 0.3 %); where a file tells none, that of other be
 
 from collections.abc import Iterator
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, Severity, at_row, by_part
 from machine.dryrun.strokes import Beads
 from machine.reader.parsed import MoveKind, ParsedProgram, pieces
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -41,24 +42,45 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     length = deposited.length_mm
     yield from _fast(program, deposited.rows, length)
     counted &= length > 0
-    del length
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
-        mine = np.flatnonzero(counted & (sized == known))
-        if not len(mine):
-            continue
-        rows, long = deposited.rows[mine], deposited.lengths(mine)
-        del mine
-        pushed = program.e_mm[rows]
+        mine = counted & (sized == known)
+        if mine.any():
+            area_mm2 = _area(program, deposited.rows[mine], profile) if known else np.ones(len(remarks.part))
+            beads = Counted(program, deposited.rows, length, mine, area_mm2, profile.material.diameter_mm)
+            whole_file = _whole_file(beads, profile) if known else []
+            yield from whole_file or (_odd(beads) if known else ())
+            yield from _layers(beads, spare, most)
+
+
+class Counted(NamedTuple):
+    """The beads that are held against each other, which of (m,) rows they are, and how long all of these are. area_mm2: (k,) that
+    the remarks of a program ask for; diameter_mm: of the filament.
+    """
+
+    program: ParsedProgram
+    rows: NDArray[np.int64]
+    length_mm: Floats
+    mine: NDArray[np.bool_]
+    area_mm2: Floats
+    diameter_mm: float
+
+    def plastic(self, which: Indices) -> tuple[Floats, Floats]:
+        """What (j,) of the m beads push, mm3, and what they need."""
+        rows = self.rows[which]
+        pushed = self.program.e_mm[rows]
         pushed *= pi
-        pushed *= profile.material.diameter_mm**2
+        pushed *= self.diameter_mm**2
         pushed /= 4.0
-        needed = _area(program, rows, profile) if known else np.ones(len(rows))
-        needed *= long
-        if known:
-            whole_file = _whole_file(program, rows, (pushed, needed), profile)
-            yield from whole_file or _odd(program, rows, long, pushed / needed)
-        yield from _layers(program, rows, (pushed, needed, long), spare, most)
+        needed = self.area_mm2[self.program.remark[rows]]
+        needed *= self.length_mm[which]
+        return pushed, needed
+
+    def some(self) -> Iterator[tuple[Indices, Floats, Floats]]:
+        """All that are held against each other, a few at a time: which of the m, and their plastic."""
+        for some in pieces(len(self.mine)):
+            which = some.start + np.flatnonzero(self.mine[some])
+            yield which, *self.plastic(which)
 
 
 def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
@@ -86,7 +108,9 @@ def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Pro
 
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:
-    """(m,) cross-section that the told width and height need, with the factors of the profile and of its parts."""
+    """(k,) cross-section that the told width and height of each remark need, with the factors of the profile and of its parts;
+    rows: of beads, the lowest layer of which lies on the plate.
+    """
     remarks = program.remarks
     width, height = remarks.width_mm, remarks.height_mm
     area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
@@ -95,62 +119,70 @@ def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> 
     for part in np.unique(remarks.part[remarks.part > 1]):
         on_part = (remarks.part == part) & (remarks.layer == 1)
         factor[on_part] = profile.of_part(int(part)).process.interface_flow
-    needed: Floats = (area * factor * profile.material.flow)[program.remark[rows]]
+    needed: Floats = area * factor * profile.material.flow
     return needed
 
 
-def _whole_file(
-    program: ParsedProgram, rows: NDArray[np.int64], plastic: tuple[Floats, Floats], profile: Profile
-) -> list[Finding]:
-    """A file that pushes far more or less everywhere; plastic: (m,) pushed by each bead, and needed."""
-    share = float(plastic[0].sum() / max(plastic[1].sum(), 1e-9))
+def _whole_file(beads: Counted, profile: Profile) -> list[Finding]:
+    """A file that pushes far more or less everywhere."""
+    pushed, needed = np.sum([(pushed.sum(), needed.sum()) for _, pushed, needed in beads.some()], axis=0)
+    share = float(pushed / max(needed, 1e-9))
     if FILE_LEAST <= share <= FILE_MOST:
         return []
     message = (
         f"the file pushes {share:.2f} of the plastic that its own widths and heights need, {FILE_LEAST:g} to {FILE_MOST:g} "
         f"are allowed, with filament of {profile.material.diameter_mm:g} mm"
     )
-    return [at_row(program, int(rows[0]), "error", "extrusion", message)]
+    return [at_row(beads.program, int(beads.rows[beads.mine.argmax()]), "error", "extrusion", message)]
 
 
-def _odd(program: ParsedProgram, rows: NDArray[np.int64], length: Floats, share: Floats) -> Iterator[Finding]:
+def _odd(beads: Counted) -> Iterator[Finding]:
     """Single moves far from the cross-section told, in every part that has a good length of them."""
-    odd = (length > ROW_MM) & ((share < ROW_LEAST) | (share > ROW_MOST))
-    for mine in by_part(program, np.flatnonzero(odd), rows):
-        if length[mine].sum() < ODD_MM:
+    places, shares = [], []
+    for which, pushed, needed in beads.some():
+        share = pushed / needed
+        odd = (beads.length_mm[which] > ROW_MM) & ((share < ROW_LEAST) | (share > ROW_MOST))
+        places.append(which[odd])
+        shares.append(share[odd])
+    at, share = np.concatenate(places), np.concatenate(shares)
+    for mine in by_part(beads.program, np.arange(len(at)), beads.rows[at]):
+        if beads.length_mm[at[mine]].sum() < ODD_MM:
             continue
         worst = float(share[mine][np.abs(np.log(np.maximum(share[mine], 1e-6))).argmax()])
         message = (
             f"a move pushes {worst:.2f} of the plastic that its width and height need, {ROW_LEAST:g} to {ROW_MOST:g} are allowed "
             f"(moves: {len(mine)})"
         )
-        yield at_row(program, int(rows[mine[0]]), "error", "extrusion", message)
+        yield at_row(beads.program, int(beads.rows[at[mine[0]]]), "error", "extrusion", message)
 
 
-def _layers(
-    program: ParsedProgram, rows: NDArray[np.int64], plastic: tuple[Floats, Floats, Floats], spare: float, most: float
-) -> Iterator[Finding]:
+def _layers(beads: Counted, spare: float, most: float) -> Iterator[Finding]:
     """In every part the first layer that gets more or less than the file's layers do, kind by kind.
 
-    plastic: (m,) pushed by each bead, needed, and how long it is. spare: mm3 that a layer may get beyond its own, which come
-    out anyway after the table has turned. A warning where the file tells no widths.
+    spare: mm3 that a layer may get beyond its own, which come out anyway after the table has turned. A warning where the file
+    tells no widths.
     """
-    pushed, needed, length = plastic
+    program = beads.program
     severity: Severity = "error" if most == LAYER_MOST else "warning"
-    type_of, usual = program.type[rows], np.ones(len(program.types))
+    usual = np.ones(len(program.types))
     for kind in range(len(usual)):
-        if len(mine := np.flatnonzero(type_of == kind)):
-            usual[kind] = _weighted_median(pushed[mine] / needed[mine], needed[mine])
+        of_kind = (program.remarks.type == kind)[program.remark[beads.rows]]
+        if len(which := np.flatnonzero(beads.mine & of_kind)):
+            pushed, needed = beads.plastic(which)
+            pushed /= needed
+            usual[kind] = _weighted_median(pushed, needed)
     got, due, long = np.zeros((3, program.layer_key_count))
-    for some in pieces(len(rows)):
-        group = program.layer_keys(rows[some])
-        np.add.at(got, group, pushed[some])
-        np.add.at(due, group, needed[some] * usual[type_of[some]])
-        np.add.at(long, group, length[some])
+    for which, pushed, needed in beads.some():
+        rows = beads.rows[which]
+        group = program.layer_keys(rows)
+        np.add.at(got, group, pushed)
+        np.add.at(due, group, needed * usual[program.remarks.type[program.remark[rows]]])
+        np.add.at(long, group, beads.length_mm[which])
     share = got / np.maximum(due, 1e-12)
     bad = np.flatnonzero((long > LAYER_MM) & (np.abs(got - due) > spare) & ((share > most) | (share < 1.0 / most)))
     if not len(bad):
         return
+    rows = beads.rows[beads.mine]
     group = program.layer_keys(rows)
     for mine in by_part(program, np.flatnonzero(np.isin(group, bad)), rows):
         layers = np.unique(group[mine])
@@ -164,7 +196,8 @@ def _layers(
 
 def _weighted_median(values: Floats, weights: Floats) -> float:
     order = np.argsort(values)
-    sums = np.cumsum(weights[order])
+    sums = weights[order]
+    np.cumsum(sums, out=sums)
     return float(values[order[np.searchsorted(sums, 0.5 * sums[-1])]])
 
 

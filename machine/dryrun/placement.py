@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
-from machine.dryrun.strokes import CROSSING_MM, Beads
+from machine.dryrun.strokes import CROSSING_MM, Beads, lengths_of
 from machine.planning.fit import over_edge_mm
 from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats
@@ -31,7 +31,8 @@ ON_PLATE = 1.5  # heights of a bead: so low its top is where it lies on the plat
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> Iterator[Finding]:
     """Errors and warnings of code air, filled, contact and low-travel, one a part; not-tested where the table turns too often."""
     length = np.zeros(len(program.line))
-    length[deposited.rows] = deposited.length_mm
+    for some in pieces(len(deposited.rows)):
+        length[deposited.rows[some]] = lengths_of(deposited.segments(some))
     deep = "the head runs {value} mm deep into earlier plastic (moves: {count})"
     into = np.flatnonzero(contacts.depth_mm > 0.0)
     yield from per_part(program, into, contacts.depth_mm[into], deep, code="contact")
@@ -83,22 +84,26 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> Itera
 
 def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> tuple[float, int]:
     """The longest stretch of moves that follow each other and hang in air, and its first row."""
-    loose = mine & (hanging > HANGING_SHARE * length) & (length > 0)
-    group = np.cumsum(~loose)
-    stretches = np.bincount(group, weights=np.where(loose, hanging, 0.0))
+    rows = np.flatnonzero(mine & (hanging > 0.0))
+    rows = rows[(hanging[rows] > HANGING_SHARE * length[rows]) & (length[rows] > 0)]
+    group = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)
+    stretches = np.bincount(group, weights=hanging[rows], minlength=1)
     longest = int(stretches.argmax())
-    return float(stretches[longest]), int(np.argmax(loose & (group == longest)))
+    return float(stretches[longest]), int(rows[np.argmax(group == longest)]) if len(rows) else 0
 
 
 def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> Iterator[Finding]:
     """The first layer of every part in which a great share of the beads finds its room taken."""
     counted = ~program.rows_of_types(PURGE, IRONING) & (length > 0)
-    group = program.layer_keys()
-    overlapping = np.bincount(group[counted], weights=contacts.overlapping_mm[counted])
-    whole = np.bincount(group[counted], weights=length[counted])
+    overlapping, whole = np.zeros((2, program.layer_key_count))
+    for some in pieces(len(counted)):
+        rows = some.start + np.flatnonzero(counted[some])
+        np.add.at(overlapping, program.layer_keys(rows), contacts.overlapping_mm[rows])
+        np.add.at(whole, program.layer_keys(rows), length[rows])
     bad = np.flatnonzero((overlapping > LEAST_MM) & (overlapping > OVERLAPPING_SHARE * whole))
-    for rows in by_part(program, np.flatnonzero(counted & np.isin(group, bad) & (contacts.overlapping_mm > 0))):
-        groups = np.unique(group[rows])
+    filled = np.flatnonzero(counted & (contacts.overlapping_mm > 0))
+    for rows in by_part(program, filled[np.isin(program.layer_keys(filled), bad)]):
+        groups = np.unique(program.layer_keys(rows))
         message = f"{overlapping[groups].sum():.1f} mm are extruded where plastic already is (layers: {len(groups)})"
         yield at_row(program, int(rows[0]), "error", "filled", message)
 
