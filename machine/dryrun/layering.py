@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import Beads, lengths_of
-from machine.reader.parsed import Indices32, ParsedProgram, pieces
+from machine.reader.parsed import Indices32, ParsedProgram, Remarks, pieces
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from slicer.paths import ON_PLATE_MM, Kind
@@ -44,8 +44,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     What stands off by most of a layer may stand on support that ends as high as the part does there: the replay knows.
     """
     sized = (program.remarks.height_mm > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
-    which = np.flatnonzero(sized[deposited.rows])
-    rows = deposited.rows[which]
+    rows = deposited.rows[sized[deposited.rows]]
     part_of, ends = program.remarks.part, []
     for some in pieces(len(rows) - 1):
         mine = rows[some.start : some.stop + 1]
@@ -58,44 +57,50 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         part = program.part_and_layer(mine[0])[0] if len(mine) else 0
         if not len(mine) or part in seen:
             continue
-        remark = program.remark[mine]
-        layer, height_mm = program.remarks.layer[remark], program.remarks.height_mm[remark]
-        gap = _gaps(program.start, program.end, mine, layer, height_mm, support[mine])
-        in_air = ((contacts.air_mm[mine] + contacts.beside_mm[mine]) > 0.0) & ~loose[mine]
-        laid_mm = np.bincount(layer, weights=deposited.lengths(which[begin:end]))
-        hangs = (gap < SEEN_SHARE * height_mm) | in_air
-        high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * height_mm)) & (laid_mm > CRUMB_MM)[layer] & hangs)
-        if len(high):
+        gap = _gaps((program.start, program.end), mine, program.remark, program.remarks, support)
+        high = mine[gap > 0.0]
+        if not len(high):
+            continue
+        remark, gap = program.remark[high], gap[gap > 0.0]
+        in_air = ((contacts.air_mm[high] + contacts.beside_mm[high]) > 0.0) & ~loose[high]
+        layer, lengths_mm = program.remarks.layer, deposited.lengths(np.searchsorted(deposited.rows, mine))
+        laid_mm = np.bincount(layer[program.remark[mine]], weights=lengths_mm)
+        hangs = (gap < SEEN_SHARE * program.remarks.height_mm[remark]) | in_air
+        told = np.flatnonzero((laid_mm > CRUMB_MM)[layer[remark]] & hangs)
+        if len(told):
             seen.add(part)
-            row, layers = int(mine[high[0]]), len(np.unique(layer[high]))
+            row, layers = int(high[told[0]]), len(np.unique(layer[remark[told]]))
             message = (
-                f"layer {program.layer[row]} begins {gap[high[0]]:.2f} mm above all that lies below it: it should lie on it "
-                f"(layers: {layers})"
+                f"layer {layer[program.remark[row]]} begins {gap[told[0]]:.2f} mm above all that lies below it: it should lie on "
+                f"it (layers: {layers})"
             )
             problems.append(at_row(program, row, "error", "gap", message))
     return problems
 
 
 @kernel
-def _gaps(start: Floats, end: Floats, rows: Indices, layers: Indices32, height_mm: Floats, support: NDArray[np.bool_]) -> Floats:
-    """(m,) by how much the underside of each bead of a part lies above all of the layers before; support keeps its distance.
+def _gaps(ends: tuple[Floats, Floats], rows: Indices, remarks: Indices32, told: Remarks, support: NDArray[np.bool_]) -> Floats:
+    """(m,) by how much the underside of each bead of a part lies above all of the layers before, where it is too much, else 0;
+    support keeps its distance.
 
     What its own layer has laid does not count: support laid first would hide a layer that is raised with it.
     """
     gaps, last_mm, layer = np.empty(len(rows)), np.inf, -1
     highest = of_part = before = part_before = -np.inf
     for k in range(len(rows)):
-        a, b = start[rows[k], 2], end[rows[k], 2]
+        row = rows[k]
+        a, b, height_mm, its_layer = ends[0][row, 2], ends[1][row, 2], told.height_mm[remarks[row]], told.layer[remarks[row]]
         top = max(a, b)
         if k == 0 or top - last_mm < -NEW_OBJECT_MM:
             highest, of_part, before, part_before = -np.inf, -np.inf, np.inf, np.inf
-        elif layers[k] != layer:
+        elif its_layer != layer:
             before, part_before = highest, of_part
-        gap = min(a, b) - height_mm[k] - before
-        stands_off = (support[k] or part_before < before - SLACK_MM) and gap < STAND_OFF_MM
-        gaps[k], last_mm, layer = (0.0 if stands_off else gap), top, layers[k]
+        gap = min(a, b) - height_mm - before
+        stands_off = (support[row] or part_before < before - SLACK_MM) and gap < STAND_OFF_MM
+        lies = stands_off or gap <= max(SLACK_MM, SLACK_SHARE * height_mm)
+        gaps[k], last_mm, layer = (0.0 if lies else gap), top, its_layer
         highest = max(highest, top)
-        if not support[k]:
+        if not support[row]:
             of_part = max(of_part, top)
     return gaps
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, at_row
 from machine.gcode.lines import Lines
 from machine.gcode.settings import CONFIG_BEGIN, CONFIG_END, PartTotals, comment, flat
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -133,5 +133,6 @@ def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals
 
 def _extent(program: ParsedProgram, rows: NDArray[np.int64], axis: int) -> tuple[float, float]:
     """The least and the greatest position of an axis at the ends of some rows."""
-    ends = [side[rows, axis] for side in (program.start, program.end)]
-    return min(float(values.min()) for values in ends), max(float(values.max()) for values in ends)
+    sides = [side[:, axis] for side in (program.start, program.end)]
+    ends = [(side[rows[some]].min(), side[rows[some]].max()) for side in sides for some in pieces(len(rows))]
+    return float(np.min(ends)), float(np.max(ends))

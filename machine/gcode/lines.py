@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 AT_ONCE = 4096  # lines
 BYTES_AT_ONCE = 2**20
 NEWLINE = 10
+Starts = NDArray[np.signedinteger[Any]]
 
 
 class Lines(Sequence[str]):
     """The lines of a text without their ends; equal to any sequence of the same lines.
 
-    content: UTF-8 with a line end after every line; start: (n + 1,) where each line begins, and where the last one ends.
+    content: UTF-8 with a line end after every line; start: (n + 1,) where each line begins, and where the last one ends, in 32
+    bits as long as these do.
     """
 
-    def __init__(self, content: NDArray[np.uint8], start: NDArray[np.int64]) -> None:
+    def __init__(self, content: NDArray[np.uint8], start: Starts) -> None:
         self.content, self.start = content, start
 
     @classmethod
@@ -30,7 +32,7 @@ class Lines(Sequence[str]):
         while some := [_bytes(line) for line in islice(left, AT_ONCE)]:
             sizes.append(np.fromiter(map(len, some), dtype=np.int64, count=len(some)) + 1)
             content += b"\n".join((*some, b""))
-        return cls(np.frombuffer(content, dtype=np.uint8), np.cumsum(np.concatenate(sizes)))
+        return cls(np.frombuffer(content, dtype=np.uint8), np.cumsum(np.concatenate(sizes)).astype(_width(len(content))))
 
     @classmethod
     def of_text(cls, pieces: Iterable[str]) -> "Lines":
@@ -45,9 +47,10 @@ class Lines(Sequence[str]):
         """A whole text in UTF-8, whose lines end with a line feed; the bytes stay where they are."""
         if content and content[-1] != NEWLINE:
             content += b"\n"
-        text, ends = np.frombuffer(content, dtype=np.uint8), [np.zeros(1, dtype=np.int64)]
+        text, width = np.frombuffer(content, dtype=np.uint8), _width(len(content))
+        ends = [np.zeros(1, dtype=width)]
         for begin in range(0, len(text), BYTES_AT_ONCE):
-            ends.append(np.flatnonzero(text[begin : begin + BYTES_AT_ONCE] == NEWLINE) + begin + 1)
+            ends.append((np.flatnonzero(text[begin : begin + BYTES_AT_ONCE] == NEWLINE) + begin + 1).astype(width))
         return cls(text, np.concatenate(ends))
 
     def beginning_with(self, word: str) -> list[int]:
@@ -60,7 +63,8 @@ class Lines(Sequence[str]):
     def __add__(self, other: "Lines") -> "Lines":
         if not isinstance(other, Lines):
             return NotImplemented
-        starts = np.concatenate([self.start[:-1], self.start[-1] + other.start])
+        width = _width(len(self.content) + len(other.content))
+        starts = np.concatenate([self.start[:-1], len(self.content) + other.start.astype(width)])
         return Lines(np.concatenate([self.content, other.content]), starts)
 
     def __len__(self) -> int:
@@ -92,6 +96,11 @@ class Lines(Sequence[str]):
         return isinstance(other, Sequence) and len(self) == len(other) and all(a == b for a, b in zip(self, other, strict=True))
 
     __hash__ = None  # type: ignore[assignment]
+
+
+def _width(size: int) -> type[np.signedinteger[Any]]:
+    """The type of places in so many bytes."""
+    return np.int32 if size < 2**31 else np.int64
 
 
 def _bytes(text: str) -> bytes:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.gcode.lines import Lines
+from machine.gcode.lines import Lines, Starts
 from machine.gcode.modes import E_AXIS
 from machine.reader.state import REMARK_COLUMNS, Columns, Reader
 from mdp.kernels.kernel import kernel, no_nrt
@@ -34,7 +34,7 @@ class Text(NamedTuple):
     """Lines as bytes; line k is text[start[k]:start[k + 1]], with its end."""
 
     text: Bytes
-    start: NDArray[np.int64]
+    start: Starts
 
 
 def _text_of(*words: bytes) -> Text:

@@ -110,13 +110,13 @@ def findings(program: ParsedProgram, balances: Sequence[InterfaceBalance], profi
 
 def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Interface]:
     """The interface of every part that stands on others, in print order."""
-    part, layer = program.part[deposited.rows], program.layer[deposited.rows]
-    own = ~program.rows_of_types(*NO_PART)[deposited.rows] & (part > 0)
-    for index in np.unique(part[own])[1:].tolist():
-        mine = np.flatnonzero(own & (part == index))
-        first = mine[layer[mine] == layer[mine].min()]
+    (part, layer), remark = program.remarks[:2], program.remark[deposited.rows]
+    own = ~np.isin(program.remarks.type, [k for k, name in enumerate(program.types) if name in NO_PART]) & (part > 0)
+    for index in np.unique(part[remark[own[remark]]])[1:].tolist():
+        mine = np.flatnonzero((own & (part == index))[remark])
+        first = mine[layer[remark[mine]] == layer[remark[mine]].min()]
         turn = rotation(profile.machine, Pose(*program.end[deposited.rows[first[0]], 3:].tolist()))
-        earlier = np.flatnonzero(own & (part < index) & (deposited.rows < deposited.rows[first[0]]))
+        earlier = np.flatnonzero((own & (part < index))[remark[: first[0]]])
         yield _interface(program, deposited, (first, earlier), turn, profile)
 
 
