@@ -91,9 +91,9 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
         touching = ahead(_touching, program, deposited, profile)  # half of all work, on a core of its own
-        times_s = motion.times_s(program, machine)
         balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
         moving, of_program = _findings(text, program, deposited, balances, profile)
+        times_s = motion.times_s(program, machine)
         contacts, touches = touching.result()
         problems = dict.fromkeys([*moving, *touches, *of_program])
         known = sorted(problems, key=lambda finding: (finding.severity, finding.line))
