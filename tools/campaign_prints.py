@@ -19,8 +19,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from mdp.batch.isolation import CallError
 from mdp.batch.pool import Workers, connected
+from mdp.kernels.workers import CallError
 from tools.campaign_planted import plant_all, planted_table
 from tools.campaign_run import PRINTED, Limits, run_print, tiltprint
 from tools.campaign_runs import Run, all_runs

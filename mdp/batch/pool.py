@@ -1,10 +1,11 @@
 """Pool: many calls worked off at a time, in processes of this machine or on the workers of a dask scheduler.
 
-Either way a call runs in a process of its own (mdp.batch.isolation). A dask worker that is lost loses nothing: the scheduler
-hands what it had to others, and gives up what several were lost over.
+Either way a call runs in a process of its own, so that one that kills its process or takes too long harms no other. A dask worker
+that is lost loses nothing: the scheduler hands what it had to others, and gives up what several were lost over.
 """
 
 import logging
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -13,11 +14,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol, TypeVar
 
-from mdp.batch.isolation import CallError, Isolation
+from mdp.kernels.workers import CallError, KilledError, Worker
 from profiles.errors import BatchError
 
 REACHED_WITHIN_S = 10.0  # a scheduler that is there, also by a slow network
 POLL_S = 0.1  # Ctrl-C is answered within that
+IDLE_S = 60.0  # then a process gives its memory back
 CLOSED_WITHIN_S = 1.0  # a scheduler that is gone does not answer the goodbye either
 
 Key = TypeVar("Key")
@@ -96,6 +98,44 @@ class Queue:
             if not self._pool.is_there():
                 raise self._pool.lost() from None
             return CallError(f"its workers were lost ({type(error).__name__})")
+
+
+class Isolation:
+    """For every thread that calls a process of its own on one core, which stays for the next call; all end together."""
+
+    def __init__(self) -> None:
+        self._of_threads: dict[int, Worker] = {}
+        self._ended = False
+
+    def call(self, task: Callable[..., Any], arguments: tuple[Any, ...], retries: int = 0, limit_s: float | None = None) -> Any:
+        """What the task returns. task: of a module; retries: how often a call whose process was killed is tried again; limit_s:
+        after so many seconds a call is given up.
+
+        Raises CallError for what the task raises, too.
+        """
+        attempts = 0
+        while not self._ended:
+            try:
+                return self._own().call(task, *arguments, limit_s=limit_s)
+            except KilledError as error:
+                attempts += 1
+                if attempts > retries:
+                    raise KilledError(f"{error}, {attempts} times" if retries else str(error)) from None
+        raise KilledError("it was ended with all others")
+
+    def end(self) -> None:
+        """Kill all processes, whatever they do."""
+        self._ended = True
+        for worker in list(self._of_threads.values()):  # who adds one meanwhile looks then whether all have ended
+            worker.end()
+
+    def _own(self) -> Worker:
+        worker = self._of_threads.get(threading.get_ident())
+        if worker is None or not worker.ready:
+            worker = self._of_threads[threading.get_ident()] = Worker(one_core=True, idle_s=IDLE_S)
+            if self._ended:
+                worker.end()
+        return worker
 
 
 class _Cores:

@@ -1,28 +1,30 @@
 """Processes: pieces of work that hold the interpreter's lock, done side by side by copies of this process.
 
-A copy is forked, which takes milliseconds; systems without fork do one piece after the other. A copy has none of our threads nor
-those of a library, but the locks that they held: what runs in it calls no boolean of solids, which has threads of its own,
-and the compiler's lock is ours when a copy is made.
+A copy is forked, which takes milliseconds and copies nothing of what the pieces read; systems without fork do one piece after the
+other. A copy has none of our threads but the locks that they held, so none is made next to threads that are not known to be
+harmless: our own come to rest before, and where others run the pieces are done here. As for those of libraries, what runs in a
+copy calls no boolean of solids, which has threads of its own, and the compiler's lock is ours when a copy is made.
 """
 
 import gc
 import os
-import pickle
 import select
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import Thread
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 from numba.core.compiler_lock import global_compiler_lock
 
 from mdp.kernels import threads
+from mdp.kernels.workers import frame, read_frames
 
 LOOK_S = 0.2  # between two looks at the parent
 MOST_RUNS = 2048  # of pieces, whose numbers a pipe of one page holds: no system has smaller ones
-NUMBER, LENGTH = 2, 8  # bytes of a run's number, and of the length of an answer
+NUMBER = 2  # bytes of a run's number
 AHEAD = 64  # runs of results that are received before they are needed
 ROOM = 1 << 20  # bytes that a copy can answer before anybody reads, where the system allows it
 
@@ -46,7 +48,7 @@ def parallel_map(
     copies wait for it to receive results that no pipe holds. on_wait: called now and then while results are waited for.
     """
     cores = min(threads.THREADS, count)
-    if cores < 2 or count < fewest or _forked or not hasattr(os, "fork"):
+    if cores < 2 or count < fewest or _forked or not hasattr(os, "fork") or not threads.come_to_rest():
         yield from map(work, range(count))
         return
     size = -(-count // MOST_RUNS)
@@ -74,17 +76,6 @@ def parallel_map(
             yield from results(run) if done is None else done
 
 
-def end_with(parent: int) -> None:
-    """From now on end this process as soon as its parent is gone, whatever ended that: SIGKILL leaves it no time to say so."""
-    Thread(target=_watch, args=(parent,), daemon=True).start()
-
-
-def _watch(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(LOOK_S)
-    os._exit(1)
-
-
 @contextmanager
 def _numbers(count: int) -> Iterator[int]:
     """A pipe with the numbers of the runs: who reads one does that run."""
@@ -98,10 +89,10 @@ def _numbers(count: int) -> Iterator[int]:
 
 
 @contextmanager
-def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int) -> Iterator[set[int]]:
+def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int) -> Iterator[set[BinaryIO]]:
     """Copies of this process at work, and the pipes by which they answer; none of them is left."""
     global _forked  # one mark for the process
-    answers: list[int] = []
+    answers: list[BinaryIO] = []
     copies: list[int] = []
     parent, _forked = os.getpid(), True
     try:
@@ -110,7 +101,7 @@ def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int
                 answer, end = os.pipe()
             except OSError:  # too many open files: the copies that are there do the work
                 break
-            answers.append(answer)
+            answers.append(os.fdopen(answer, "rb", 0))  # what is held back there nobody waits for with select
             _widen(end)
             try:
                 with global_compiler_lock:  # held by another thread it would never be free in the copy
@@ -125,8 +116,8 @@ def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int
         yield set(answers)
     finally:
         _forked = False
-        for answer in answers:
-            os.close(answer)
+        for pipe in answers:
+            pipe.close()
         for copy in copies:
             os.kill(copy, signal.SIGKILL)  # one that has answered, or that nobody waits for
             os.waitpid(copy, 0)
@@ -145,16 +136,23 @@ def _answer(results: Callable[[int], Iterator[object]], numbers: int, end: int, 
     try:
         for ending in (signal.SIGINT, signal.SIGTERM):
             signal.signal(ending, signal.SIG_DFL)  # Ctrl-C reaches all: the parent speaks
-        end_with(parent)
+        Thread(target=_end_with, args=(parent,), daemon=True).start()
+        sys.stdout, sys.stderr = (os.fdopen(stream, "w", 1, closefd=False) for stream in (1, 2))  # no thread held their locks
         threads.use_threads(1)
         gc.freeze()  # a search for garbage would write on all memory, of which this copy would have its own then
         with open(end, "wb") as pipe:
             while (run := _next(numbers)) is not None:
-                text = pickle.dumps((run, _tried(results, run)), protocol=5)
-                pipe.write(len(text).to_bytes(LENGTH, "big") + text)
+                pipe.write(frame((run, _tried(results, run))))
                 pipe.flush()
     finally:
         os._exit(0)
+
+
+def _end_with(parent: int) -> None:
+    """End this process as soon as its parent is gone, whatever ended that: SIGKILL leaves it no time to say so."""
+    while os.getppid() == parent:
+        time.sleep(LOOK_S)
+    os._exit(1)
 
 
 def _next(numbers: int) -> int | None:
@@ -169,21 +167,11 @@ def _tried(results: Callable[[int], Iterator[Result]], run: int) -> list[Result]
     return None
 
 
-def _receive(answers: set[int], known: dict[int, list[Result] | None], wait_s: float) -> None:
+def _receive(answers: set[BinaryIO], known: dict[int, list[Result] | None], wait_s: float) -> None:
     """Take in what copies have answered until now; answers that have ended leave the set."""
     for answer in select.select(list(answers), [], [], wait_s)[0]:
-        length = _read(answer, LENGTH)
-        text = _read(answer, int.from_bytes(length, "big"))
-        if text:
-            run, done = pickle.loads(text)
-            known[run] = done
-        else:
+        done = next(read_frames(answer), None)
+        if done is None:
             answers.discard(answer)
-
-
-def _read(pipe: int, size: int) -> bytes:
-    """So many bytes, none where the pipe ends before."""
-    text = bytearray()
-    while len(text) < size and (more := os.read(pipe, size - len(text))):
-        text += more
-    return bytes(text) if len(text) == size else b""
+        else:
+            known[done[0]] = done[1]

@@ -5,15 +5,21 @@ themselves compile in half the time. What is worked out does not depend on their
 """
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import cache
 from typing import Any, TypeVar
+from weakref import WeakSet
 
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 LEAST_ROWS, SHARES = 4, 8  # rows a call, and calls for every core: handing a call over costs as much as a row
 
 Result = TypeVar("Result")
+
+POOLS = "ahead", "sweep"  # what their threads are called; work of the first runs in the second, too
+
+_pools: dict[tuple[str, int], ThreadPoolExecutor] = {}
+_harmless: WeakSet[threading.Thread] = WeakSet()
 
 
 def use_threads(count: int) -> None:
@@ -22,9 +28,8 @@ def use_threads(count: int) -> None:
     THREADS = count
 
 
-@cache
-def _pool(name: str, threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, thread_name_prefix=name)
+def _pool(name: str) -> ThreadPoolExecutor:
+    return _pools.setdefault((name, THREADS), ThreadPoolExecutor(THREADS, thread_name_prefix=name))
 
 
 def in_threads(kernel: Callable[..., None], count: int, *arguments: Any) -> None:
@@ -35,10 +40,32 @@ def in_threads(kernel: Callable[..., None], count: int, *arguments: Any) -> None
     if threads < 2:
         kernel(0, count, *arguments)
         return
-    for done in [_pool("sweep", THREADS).submit(kernel, begin, end, *arguments) for begin, end in spans]:
+    for done in [_pool("sweep").submit(kernel, begin, end, *arguments) for begin, end in spans]:
         done.result()
 
 
 def ahead(work: Callable[..., Result], *arguments: Any) -> Future[Result]:
     """Work that begins now, beside the caller's own; it may run kernels in threads, and no such work may wait for another."""
-    return _pool("ahead", THREADS).submit(work, *arguments)
+    return _pool("ahead").submit(work, *arguments)
+
+
+def harmless(thread: threading.Thread) -> threading.Thread:
+    """Note that a copy of this process may be made while a thread runs: it imports nothing, and holds no lock that a copy wants.
+    Most such threads wait for what comes through a pipe and hand it over."""
+    _harmless.add(thread)
+    return thread
+
+
+def come_to_rest() -> bool:
+    """Whether a copy of this process can be made here: by the main thread, where all others are harmless. Those of our own pools
+    do what they have to do and are gone then; others begin with the next work."""
+    others = {*threading.enumerate()} - {threading.main_thread(), *_harmless}
+    if threading.current_thread() is not threading.main_thread() or any(_pool_of(thread) not in POOLS for thread in others):
+        return False
+    while _pools:
+        _pools.pop(min(_pools)).shutdown()
+    return True
+
+
+def _pool_of(thread: threading.Thread) -> str:
+    return thread.name.rpartition("_")[0]

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
-from mdp.batch.isolation import CallError
 from mdp.batch.pool import Workers, connected
 from mdp.batch.progress import Progress
 from mdp.batch.rows import append_row, writing_alone
 from mdp.kernels.threads import THREADS
+from mdp.kernels.workers import CallError
 from mdp.learning import command
 from mdp.learning.collection.index import FAILED, INDEX, LOCK, Row, Search, read_index, unfinished, write_index
 from mdp.learning.collection.models import model_files, name_of

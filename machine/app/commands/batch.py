@@ -26,11 +26,11 @@ from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import say
 from machine.gcode.blocks import check_blocks
 from machine.quantities import duration
-from mdp.batch.isolation import CallError
 from mdp.batch.pool import connected
 from mdp.batch.progress import Progress
 from mdp.batch.rows import append_row, read_rows, write_rows, writing_alone
 from mdp.formats.readers import READERS
+from mdp.kernels.workers import CallError
 from mdp.ranking.ranker import ranker_named
 from profiles.errors import BatchError
 

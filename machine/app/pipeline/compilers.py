@@ -4,9 +4,6 @@ The command says early what it will need, in the order of need, and waits for a 
 cannot be had or fails, the work compiles by itself what is missing.
 """
 
-import atexit
-import subprocess
-import sys
 from collections import deque
 from collections.abc import Iterable
 from contextlib import nullcontext
@@ -14,7 +11,8 @@ from threading import Condition, Thread
 
 from machine.app.terminal.progress import Report, reporting, say
 from mdp.kernels.cache import is_cached, keep, trouble
-from mdp.kernels.threads import THREADS
+from mdp.kernels.threads import THREADS, harmless
+from mdp.kernels.workers import CallError, Worker
 from profiles.profile import Profile
 
 JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = (
@@ -25,8 +23,7 @@ JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = (
     ("draw",),
 )
 LOOK_S = 0.2
-KERNEL, DONE = "kernel", "done"  # what such a process answers
-COMPILE = "import sys; sys.path[:] = {path!r}; from machine.app.pipeline.precompile import main; main()"
+COMPILE = "machine.app.pipeline.precompile:compile_bundle"
 
 
 class Compilers:
@@ -50,7 +47,7 @@ class Compilers:
             start = min(len(self._waiting), THREADS - self._working)
             self._working += start
         for _ in range(start):
-            Thread(target=self._work, daemon=True).start()
+            harmless(Thread(target=self._work, daemon=True)).start()
 
     def wait_for(self, bundles: Iterable[str], report: Report | None = None) -> None:
         """Return when the bundles are compiled, or cannot be in a process of their own; report: where progress is shown."""
@@ -73,7 +70,7 @@ class Compilers:
         """In a thread: hand bundles to a process of our own until there are none."""
         try:
             self._hand_over()
-        except OSError:  # no process can be had, or it has ended
+        except (CallError, OSError):  # no process can be had, or it has ended
             pass
         finally:
             with self._changed:
@@ -81,44 +78,23 @@ class Compilers:
                 self._changed.notify_all()
 
     def _hand_over(self) -> None:
-        pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
-        process = subprocess.Popen(command(), stdin=pipe, stdout=pipe, stderr=nowhere, text=True)
-        atexit.register(process.kill)
+        worker = Worker(one_core=True)
         try:
-            assert process.stdin is not None
-            assert process.stdout is not None
-            going_on = True
-            while going_on and (bundle := self._next()) is not None:
-                process.stdin.write(f"{bundle}\n")
-                process.stdin.flush()
-                going_on = self._follow(bundle, process.stdout)
+            while (bundle := self._next()) is not None:
+                for done, _ in worker.ask(COMPILE, bundle):
+                    with self._changed:
+                        if done:
+                            keep(bundle)
+                            self._done.add(bundle)
+                        else:
+                            self._kernels += 1
+                        self._changed.notify_all()
         finally:
-            process.kill()
-            process.wait()
-            atexit.unregister(process.kill)
+            worker.end()
 
     def _next(self) -> str | None:
         with self._changed:
             return self._waiting.popleft() if self._waiting else None
-
-    def _follow(self, bundle: str, answers: Iterable[str]) -> bool:
-        """Follow what a process says of a bundle; False where it ends before it is done."""
-        for answer in answers:
-            with self._changed:
-                if answer.strip() == KERNEL:
-                    self._kernels += 1
-                elif answer.strip() == f"{DONE} {bundle}":
-                    keep(bundle)
-                    self._done.add(bundle)
-                self._changed.notify_all()
-            if bundle in self._done:
-                return True
-        return False
-
-
-def command() -> list[str]:
-    """The command of such a process. It imports from where we do: by `-m` it would run what lies in the working folder."""
-    return [sys.executable, "-c", COMPILE.format(path=sys.path)]
 
 
 def bundles_to_build(profile: Profile) -> tuple[str, ...]:

@@ -1,23 +1,19 @@
 """Precompile: what the kernels are compiled with that a first run needs: tiny models, in bundles that processes share.
 
 A bundle does what the command does later, so that it compiles exactly the kernels that will be called; later runs find them
-cached. `main` is what one of those processes does (`machine.app.pipeline.compilers`): it is told the bundles to compile, line by
-line, and answers with a line for every kernel and one for every bundle done.
+cached. The processes are those of `machine.app.pipeline.compilers`.
 """
 
 import gc
 import os
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from queue import Queue
-from threading import Thread
+from functools import cache
 
 import manifold3d as m3
 import numpy as np
 
 from machine.app.pictures.raster import draw
-from machine.app.pipeline.compilers import DONE, KERNEL
 from machine.app.pipeline.pricing import pricing
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import dry_run
@@ -32,6 +28,7 @@ from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.kernels.cache import trouble
 from mdp.kernels.kernel import on_compiled
+from mdp.kernels.workers import tell
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
@@ -169,37 +166,24 @@ def _two_parts(profile: Profile) -> Decomposition:
     return Decomposition("warm", mesh_of(solid), tuple(parts), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
 
 
-def _read_orders(orders: "Queue[str]") -> None:
-    """Pass on what is to be compiled; whoever asked is gone when nothing more can be read."""
-    try:
-        for line in sys.stdin:
-            orders.put(line.strip())
-    finally:
-        os._exit(0)
-
-
-def _answer(text: str) -> None:
-    sys.stdout.write(f"{text}\n")
-    sys.stdout.flush()
+@cache
+def _prepare() -> None:
+    """What a process does before its first bundle."""
+    gc.freeze()
+    gc.set_threshold(NO_COLLECTION)
+    on_compiled(_tell_kernel)
 
 
 def _tell_kernel() -> None:
-    """Tell that a kernel is compiled; what is not cached is of no use to the one who asks."""
+    """Tell that a kernel is compiled; one that is not cached is of no use to the one who asks."""
     if trouble():
-        os._exit(0)
-    _answer(KERNEL)
+        os._exit(1)
+    tell("a kernel")
 
 
-def main() -> None:
-    """Compile the bundles that standard input names, until it ends."""
-    gc.freeze()
-    gc.set_threshold(NO_COLLECTION)
-    orders: Queue[str] = Queue()
-    Thread(target=_read_orders, args=(orders,), daemon=True).start()
-    on_compiled(_tell_kernel)
-    while True:
-        bundle = orders.get()
-        BUNDLES[bundle]()
-        if trouble():
-            return
-        _answer(f"{DONE} {bundle}")
+def compile_bundle(name: str) -> None:
+    """In such a process: compile a bundle; each kernel is told. Raises OSError where nothing that is compiled can be kept."""
+    _prepare()
+    BUNDLES[name]()
+    if trouble():
+        raise OSError(trouble())

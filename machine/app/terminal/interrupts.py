@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
+from mdp.kernels.threads import harmless
+
 HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
 ALL: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM, *HANGUP)
 AGAIN_S = 0.1
@@ -150,7 +152,7 @@ def _overheard(act: Callable[[int], None]) -> Iterator[None]:
                 act(number)
 
     wakeup = signal.set_wakeup_fd(noted.fileno(), warn_on_full_buffer=False)
-    thread = threading.Thread(target=serve, name="signals", daemon=True)
+    thread = harmless(threading.Thread(target=serve, name="signals", daemon=True))
     thread.start()
     try:
         yield
@@ -173,10 +175,7 @@ def end_at_once() -> None:
 
 
 def leave(code: int) -> None:
-    """End this process without waiting for its threads and the processes that help it, which have nothing to do any more."""
-    processes = sys.modules.get("multiprocessing.process")
-    for helper in processes.active_children() if processes is not None else ():
-        helper.kill()
+    """End this process without waiting for its threads, which have nothing to do any more; those that help it end with it."""
     atexit._run_exitfuncs()
     with suppress(OSError, ValueError):
         sys.stdout.flush()

@@ -2,12 +2,14 @@
 
 import os
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import monotonic
 from typing import Protocol
 
 from machine.app.terminal.plain import plain_line, put
+from mdp.kernels.threads import harmless
 
 PLAIN_EVERY_S = 5.0
 PLAIN_AGAIN_S = 60.0  # what has not changed is said again: still alive
@@ -44,8 +46,11 @@ def reporting() -> Iterator[Report]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    before = {*threading.enumerate()}
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        for drawing in {*threading.enumerate()} - before:
+            harmless(drawing)
         task = progress.add_task("", total=None)
 
         def show(text: str, share: float | None = None) -> None:

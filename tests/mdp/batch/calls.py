@@ -6,9 +6,18 @@ import time
 from pathlib import Path
 from typing import Any
 
+from mdp.kernels.workers import tell
+
 
 def greet(name: str) -> str:
     return f"hello {name}"
+
+
+def squares(count: int) -> str:
+    """Tell the first squares."""
+    for number in range(count):
+        tell(number * number)
+    return "all"
 
 
 def process() -> int:

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from mdp.batch import pool
-from mdp.batch.isolation import CallError
 from mdp.batch.pool import Workers, connected
+from mdp.kernels.workers import CallError
 from profiles.errors import BatchError
 from tests.mdp.batch.calls import begin, die, greet, process, refuse, sleep
 

@@ -4,6 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -111,13 +114,78 @@ def test_one_core_forks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert list(parallel_map(pid, 2)) == [HERE, HERE]
 
 
+def test_next_to_a_thread_that_is_not_known_to_be_harmless_nothing_is_forked() -> None:
+    over = threading.Event()
+    other = threading.Thread(target=over.wait)
+    other.start()
+    assert set(parallel_map(pid, 9)) == {HERE}
+    threads.harmless(other)
+    assert set(parallel_map(pid, 9, helps=False)) != {HERE}
+    over.set()
+    other.join()
+    assert set(parallel_map(pid, 9, helps=False)) != {HERE}
+
+
+def test_a_thread_that_is_not_the_main_one_forks_nothing() -> None:
+    with ThreadPoolExecutor(1) as executor:
+        assert executor.submit(lambda: set(parallel_map(pid, 9))).result() == {HERE}
+    assert threads.ahead(lambda: set(parallel_map(pid, 9))).result() == {HERE}
+
+
+def test_our_own_threads_have_done_what_they_had_to_do_and_are_gone_when_a_copy_is_made() -> None:
+    finished: list[int] = []
+    slow = threads.ahead(lambda: (time.sleep(0.3), threads.in_threads(lambda begin, end: finished.append(begin), 12)))
+    alive = set(parallel_map(lambda number: (len(finished), threading.active_count()), 3, helps=False))
+    assert slow.done()
+    assert alive == {(3, 2)}  # a copy has the thread that looks whether its parent is there
+    assert threads.ahead(pow, 2, 5).result() == 32  # others begin with the next work
+
+
+def test_a_copy_says_what_it_says_although_a_thread_held_the_stream_when_it_was_made() -> None:
+    done = subprocess.run([sys.executable, "-c", HOLDING], capture_output=True, text=True, timeout=60.0, check=True)
+    assert sorted(done.stderr.split()) == ["0", "1"]
+
+
+HOLDING = """
+import sys, threading
+from mdp.kernels import threads
+from mdp.kernels.processes import parallel_map
+
+class Console:
+    def __init__(self):
+        self.lock = threading.RLock()
+
+    def write(self, text):
+        with self.lock:
+            sys.__stderr__.write(text)
+
+    def flush(self):
+        sys.__stderr__.flush()
+
+sys.stderr, held, over = Console(), threading.Event(), threading.Event()
+
+def hold():
+    with sys.stderr.lock:
+        held.set()
+        over.wait()
+
+threads.use_threads(2)
+threads.harmless(threading.Thread(target=hold)).start()
+held.wait()
+list(parallel_map(lambda number: print(number, file=sys.stderr), 2, helps=False))
+over.set()
+"""
+
+
 def test_neither_processes_nor_pipes_are_left() -> None:
     folder = Path("/proc/self")
     if not folder.is_dir():
         pytest.skip("only Linux tells what a process has open")
 
-    def held() -> tuple[list[str], list[str]]:
-        return os.listdir(folder / "fd"), [task.joinpath("children").read_text() for task in folder.joinpath("task").iterdir()]
+    def held() -> tuple[list[str], str]:
+        return os.listdir(folder / "fd"), "".join(
+            task.joinpath("children").read_text() for task in folder.joinpath("task").iterdir()
+        )
 
     before = held()
     list(parallel_map(square, 5))

@@ -19,8 +19,8 @@ from machine.app.workbench.printing.at_server import follow_on_server, print_on_
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import FollowOrder, HandOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.printing.reporter import StateReporter
-from machine.app.workbench.work.worker import listen, read_frames, take_pipes
 from machine.network.address import is_server_address
+from mdp.kernels.workers import listen, read_frames, take_pipes
 from profiles.errors import UserError
 
 
@@ -58,7 +58,3 @@ def carry_out(order: Order, person: AtPage, checks: Checks) -> State:
         return {"end": "failed", "sentence": "ended at once: whether the heaters are off is not known, look at the printer"}
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file; the stream has left the printer safe
         return {"end": "failed", "sentence": bug_in_words(error, sys.argv)}
-
-
-if __name__ == "__main__":
-    main()

@@ -4,7 +4,7 @@ from threading import Event, Lock, Thread
 from typing import Any, BinaryIO
 
 from machine.app.workbench.printing.order import State
-from machine.app.workbench.work.worker import frame
+from mdp.kernels.workers import frame
 
 LAST_WORD_S = 5.0  # a server that stands still is not waited for any longer
 

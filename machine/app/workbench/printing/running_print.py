@@ -3,7 +3,6 @@
 import asyncio
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from time import time
 
 from machine.app.crash import bug_in_words
@@ -11,13 +10,13 @@ from machine.app.printer.rescue import cancel_on_server, rescue
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.at_page import BEGIN, LEAVE
 from machine.app.workbench.printing.order import FollowOrder, HandOrder, Order, PrintOrder, ResumeOrder, State, first_state
-from machine.app.workbench.work.processes import Process, end_process, start_process
-from machine.app.workbench.work.worker import frame, read_frame
+from machine.app.workbench.work.heard import heard
 from machine.link.pending_commands import Command
 from machine.network.gcode_upload import server_name
+from mdp.kernels.workers import Interpreter
 from profiles.errors import PrinterError, UserError
 
-COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
+MAIN = "from machine.app.workbench.printing.process import main; main()"
 EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
 LEAVE_S = 5.0  # so long a print that is not to go on has to let go of its port
 DIED = "the process that printed has ended before the print was done"
@@ -30,7 +29,7 @@ class RunningPrint:
     def __init__(self, number: int, order: Order, holder: str, changed: Callable[[], None]) -> None:
         self.number, self.holder, self.state = number, holder, first_state(order)
         self._order, self._changed = order, changed
-        self._process: Process | None = None
+        self._process: Interpreter | None = None
         self._late: asyncio.Task[None] | None = None
         self._begun = isinstance(order, FollowOrder)  # by somebody else
         self._emergency = self._given_up = self._cancelled = False
@@ -56,19 +55,15 @@ class RunningPrint:
 
     async def run(self) -> None:
         """Have it printed by a process of its own, to the end."""
-        self._process = process = await start_process(COMMAND)
-        self.say(self._order)
+        self._process = process = Interpreter(MAIN)
+        await asyncio.to_thread(process.say, self._order)
         if self._given_up or self._emergency:
             self._kill()
-        assert process.stdout is not None
         ended = lost = False
-        with suppress(asyncio.IncompleteReadError, ConnectionError):
-            while True:
-                state: State = await read_frame(process.stdout)
-                ended = state["phase"] == "over"
-                lost = ended and self._has_lost_an_order(state)
-                self._become(**state | ({"phase": "leaving"} if lost else {}))
-        await process.wait()
+        async for state in heard(process.hear()):
+            ended = state["phase"] == "over"
+            lost = ended and self._has_lost_an_order(state)
+            self._become(**state | ({"phase": "leaving"} if lost else {}))
         if lost:
             await self._order_anew()
         elif not ended:
@@ -76,9 +71,8 @@ class RunningPrint:
 
     def say(self, value: object) -> None:
         """Something to the process; what it does not hear any more is not missed."""
-        process = self._process
-        if process is not None and process.stdin is not None and process.returncode is None:
-            process.stdin.write(frame(value))
+        if self._process is not None:
+            self._process.say(value)
 
     def begin(self) -> None:
         """A person agrees to what was found; said twice, as by a double click, it is one word. Raises PrinterError as long as
@@ -93,8 +87,6 @@ class RunningPrint:
     async def fail(self, error: Exception) -> None:
         """A fault of this program: nobody hears the print's process any more, so it ends, and the printer is made safe."""
         self._kill()
-        if self._process is not None:
-            await self._process.wait()
         await self._end_without_process()
         self._become(sentence=f"{bug_in_words(error, sys.argv)}; {self.state['sentence']}")
 
@@ -140,7 +132,8 @@ class RunningPrint:
             asyncio.get_running_loop().call_later(EMERGENCY_S, self._kill)
 
     def _kill(self) -> None:
-        end_process(self._process)
+        if self._process is not None:
+            self._process.end()
 
     def _has_lost_an_order(self, ended: State) -> bool:
         """Whether the following of a print on a server has ended before it took what it was told last."""

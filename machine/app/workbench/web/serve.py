@@ -24,7 +24,6 @@ from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.server import Served, application, lan_application
 from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.uploads import Uploads
-from machine.app.workbench.work.processes import hear_the_ends
 from machine.app.workbench.work.received import files_in, tidy_left
 from machine.app.workbench.work.worker_pool import WorkerPools
 
@@ -125,9 +124,8 @@ async def _serve(
         prints.close()
         with suppress(TimeoutError):  # what hangs there ends with the program, and no file is deleted that is still read
             async with asyncio.timeout(KEEP_S):
-                for trouble in await sessions.run(_close(workbench)):
+                for trouble in await sessions.run(workbench.close_all()):
                     say(trouble)
-        await hear_the_ends(GRACE_S)
         await sessions.end(GRACE_S)
 
 
@@ -148,13 +146,6 @@ def _server(app: ASGIApp, lan: Lan | None = None) -> Server:
         ssl_keyfile=certificate.key if certificate else None,
     )
     return Server(settings)
-
-
-async def _close(workbench: Workbench) -> list[str]:
-    """End all benches, each with its last change kept; a sentence for each of which it is not."""
-    not_kept = await workbench.close_all()
-    await hear_the_ends(GRACE_S)
-    return not_kept
 
 
 def keep_stops_quick() -> None:

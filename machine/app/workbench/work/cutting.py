@@ -14,10 +14,10 @@ from machine.app.pipeline.given_plan import lies_freely
 from machine.app.pipeline.pricing import pricing
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
-from machine.app.workbench.work.processes import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import standing_still
 from mdp.joint import is_sound
+from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text

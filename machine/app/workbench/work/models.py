@@ -10,8 +10,8 @@ from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.work.processes import Tell
 from mdp.directions.orientation import in_words, resting_facets, side_in_words
+from mdp.kernels.workers import Tell
 from mdp.read import SizeError, read_mesh
 from mdp.search.orient import distinct_orientations
 from profiles.errors import MeshError

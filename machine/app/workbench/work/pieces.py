@@ -10,13 +10,13 @@ from machine.app.pictures.png import png_bytes
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench, write_zip
-from machine.app.workbench.work.processes import Tell
 from machine.planning.fit import check_parts
 from machine.view.encoding import pack
 from machine.view.parts import page_colours
 from machine.view.scene import solids, surfaces
 from mdp.decomposition import Decomposition, Part
 from mdp.joint import joints_of
+from mdp.kernels.workers import Tell
 from profiles.errors import MoveError
 from profiles.profile import Profile
 

@@ -11,7 +11,6 @@ from machine.app.pipeline.given_plan import as_turned
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
-from machine.app.workbench.work.processes import Tell
 from machine.app.workbench.work.walls import walls
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
@@ -19,6 +18,7 @@ from machine.planning.arrange import standing_at
 from machine.program import Alternative
 from machine.view.page import print_page, with_comparison
 from mdp.decomposition import Decomposition
+from mdp.kernels.workers import Tell
 from profiles.profile import Profile
 from slicer.parts import SlicingProgress
 

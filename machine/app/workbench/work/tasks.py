@@ -1,9 +1,11 @@
 """Tasks: the long work of the workbench by name, each a function that a process of its own runs; the values go there and back
 pickled."""
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
+from machine.app.crash import bug_in_words
 from machine.app.workbench.bench.marks import mark, unmark
 from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, measure_plan, price_row
 from machine.app.workbench.work.models import mark_faces, rank_resting, read_model, rest_facets
@@ -11,6 +13,8 @@ from machine.app.workbench.work.pieces import draw_pieces, make_pictures
 from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
 from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, nearest, try_cuts
+from mdp.kernels.workers import tell
+from profiles.errors import UserError
 
 TASKS: dict[str, Callable[..., Any]] = {
     task.__name__: task
@@ -37,3 +41,17 @@ TASKS: dict[str, Callable[..., Any]] = {
         nearest,
     )
 } | {"mark": lambda tell, *given: mark(*given), "unmark": lambda tell, *given: unmark(*given)}
+
+
+def load() -> None:
+    """In a worker: nothing but that all tasks are loaded then."""
+
+
+def do(task: str, *given: Any) -> tuple[Any, str]:
+    """In a worker: what a task gives, and the sentence of why there is nothing, "" where there is; a bug gets a log file."""
+    try:
+        return TASKS[task](tell, *given), ""
+    except UserError as error:
+        return None, str(error)
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence, and the workbench goes on
+        return None, bug_in_words(error, sys.argv)

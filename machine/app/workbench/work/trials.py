@@ -12,8 +12,8 @@ from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.work.cutting import turned_mesh
-from machine.app.workbench.work.processes import Tell
 from mdp.cut import convex_hull
+from mdp.kernels.workers import Tell
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from mdp.search.trial import Trial, Trials

@@ -5,27 +5,17 @@ that is cancelled is stopped at once by ending its process.
 """
 
 import asyncio
-import sys
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from collections.abc import AsyncIterator
+from contextlib import aclosing, asynccontextmanager, suppress
 from typing import Any
+from weakref import WeakKeyDictionary
 
-from machine.app.workbench.work.processes import Process, end_process, start_process
-from machine.app.workbench.work.worker import DONE, TELLS, frame, read_frame
+from machine.app.workbench.work.heard import heard
+from mdp.kernels.workers import KilledError, Tell, Worker
 from profiles.errors import UserError
 
 REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
-COMMAND = (sys.executable, "-m", "machine.app.workbench.work.worker")
-
-
-@dataclass(eq=False)
-class Worker:
-    """A process, the tasks that it was taken for last, None when it is ended, and what will end it when it has rested."""
-
-    process: Process
-    tasks: "TaskQueue | None"
-    end: asyncio.TimerHandle | None = None
+DO, LOAD = "machine.app.workbench.work.tasks:do", "machine.app.workbench.work.tasks:load"
 
 
 class WorkerPool:
@@ -34,73 +24,54 @@ class WorkerPool:
     def __init__(self, most: int) -> None:
         self.most = most
         self._places = asyncio.Semaphore(most)
-        self._starting = 0
         self._busy: list[Worker] = []
         self._idle: list[Worker] = []  # the one that has rested longest first
+        self._had_by: WeakKeyDictionary[Worker, TaskQueue] = WeakKeyDictionary()  # the tasks that each was taken for last
 
     @property
     def full(self) -> bool:
         """Whether a further task has to wait for another one's end."""
         return self._places.locked()
 
-    async def warm(self, tasks: "TaskQueue") -> None:
-        """Start a process for these tasks before it is needed, if there may be one more."""
-        if self._may_start:
-            async with self.worker(tasks):
-                pass
+    @property
+    def may_start(self) -> bool:
+        """Whether there may be one more process."""
+        return len(self._idle) + len(self._busy) < self.most
 
     @asynccontextmanager
-    async def worker(self, tasks: "TaskQueue") -> AsyncIterator[Process]:
+    async def worker(self, tasks: "TaskQueue") -> AsyncIterator[Worker]:
         """A process for one of these tasks, in the order in which they are asked for. Whoever leaves with an error ends it."""
         async with self._places:
             tasks.check_open()
-            worker = await self._take(tasks)
+            worker = self._take(tasks)
             self._busy.append(worker)
             try:
-                tasks.check_open()
-                yield worker.process
+                yield worker
             except BaseException:
-                end_process(worker.process)
+                worker.end()
                 raise
             else:
-                if worker.tasks is not None:
-                    worker.end = asyncio.get_running_loop().call_later(REST_AFTER_S, self._end, worker)
-                    self._idle.append(worker)
+                self._idle.append(worker)
             finally:
                 self._busy.remove(worker)
 
     def end(self, tasks: "TaskQueue | None" = None) -> None:
         """End the processes that work for these tasks, or may hold what was worked out for them; None: all."""
         for worker in (*self._busy, *self._idle):
-            if tasks is None or worker.tasks is tasks:
-                self._end(worker)
+            if tasks is None or self._had_by[worker] is tasks:
+                worker.end()
 
-    @property
-    def _may_start(self) -> bool:
-        return len(self._idle) + len(self._busy) + self._starting < self.most
-
-    async def _take(self, tasks: "TaskQueue") -> Worker:
+    def _take(self, tasks: "TaskQueue") -> Worker:
         """The process that these tasks had last, else a new one, else the one that has rested longest."""
-        self._idle = [worker for worker in self._idle if worker.process.returncode is None]
-        own = [worker for worker in self._idle if worker.tasks is tasks]
-        if not own and self._may_start:
-            self._starting += 1
-            try:
-                return Worker(await start_process(COMMAND), tasks)
-            finally:
-                self._starting -= 1
-        worker = (own or self._idle)[0]
-        self._idle.remove(worker)
-        if worker.end is not None:
-            worker.end.cancel()
-        worker.tasks = tasks
-        return worker
-
-    def _end(self, worker: Worker) -> None:
-        worker.tasks = None
-        end_process(worker.process)
-        if worker in self._idle:
+        self._idle = [worker for worker in self._idle if worker.ready]
+        own = [worker for worker in self._idle if self._had_by[worker] is tasks]
+        if own or not self.may_start:
+            worker = (own or self._idle)[0]
             self._idle.remove(worker)
+        else:
+            worker = Worker(idle_s=REST_AFTER_S)
+        self._had_by[worker] = tasks
+        return worker
 
 
 class WorkerPools:
@@ -125,19 +96,21 @@ class TaskQueue:
         self._closed = False
 
     async def warm(self) -> None:
-        """Start a process before it is needed."""
+        """Start a process before it is needed, if there may be one more."""
         async with self._lock:
-            await self.pool.warm(self)
+            if self.pool.may_start:
+                with suppress(KilledError):  # whoever asks the next one is told
+                    await self._ask(LOAD)
 
-    async def run(self, task: str, *given: Any, tell: Callable[[Any], None] = lambda value: None) -> Any:
+    async def run(self, task: str, *given: Any, tell: Tell = lambda value: None) -> Any:
         """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
         try:
-            async with self._lock, self.pool.worker(self) as process:
-                kind, value = await _answer(process, (task, given), tell)
-        except (asyncio.IncompleteReadError, ConnectionError):
+            async with self._lock:
+                value, trouble = await self._ask(DO, task, *given, tell=tell)
+        except KilledError:
             raise UserError("the process that did this work has ended before it was done: try it again") from None
-        if kind != DONE:
-            raise UserError(value)
+        if trouble:
+            raise UserError(trouble)
         return value
 
     def check_open(self) -> None:
@@ -150,15 +123,9 @@ class TaskQueue:
         self._closed = True
         self.pool.end(self)
 
-
-async def _answer(process: Process, asked: Any, tell: Callable[[Any], None]) -> tuple[str, Any]:
-    """The last word of a process to what it is asked; what it tells meanwhile is passed on."""
-    assert process.stdin is not None
-    assert process.stdout is not None
-    process.stdin.write(frame(asked))
-    await process.stdin.drain()
-    while True:
-        kind, value = await read_frame(process.stdout)
-        if kind != TELLS:
-            return kind, value
-        tell(value)
+    async def _ask(self, task: str, *given: Any, tell: Tell = lambda value: None) -> Any:
+        async with self.pool.worker(self) as worker, aclosing(heard(worker.ask(task, *given))) as answers:
+            async for done, value in answers:
+                if not done:
+                    tell(value)
+            return value

@@ -12,8 +12,8 @@ from machine.app.workbench.bench.bench import Bench, History, Step, with_model
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.work import worker_pool
 from machine.app.workbench.work.cutting import SearchWay
-from machine.app.workbench.work.processes import Process, hear_the_ends, start_process
 from machine.app.workbench.work.worker_pool import TaskQueue, WorkerPool, WorkerPools
+from mdp.kernels.workers import Worker
 from mdp.model_file import locate
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
@@ -33,12 +33,16 @@ class Started:
     """The processes that a pool starts, in order."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.processes: list[Process] = []
-        monkeypatch.setattr(worker_pool, "start_process", self._start)
+        self.processes: list[Worker] = []
+        monkeypatch.setattr(worker_pool, "Worker", self._start)
 
-    async def _start(self, command: tuple[str, ...]) -> Process:
-        self.processes.append(await start_process(command))
+    def _start(self, **given: float) -> Worker:
+        self.processes.append(Worker(**given))  # type: ignore[arg-type]
         return self.processes[-1]
+
+    async def gone(self, place: int) -> None:
+        """Wait until one of them is gone."""
+        await asyncio.to_thread(self.processes[place].process.wait, 30.0)
 
 
 def run(work: Coroutine[Any, Any, Any], *pools: WorkerPool) -> Any:
@@ -50,7 +54,6 @@ def run(work: Coroutine[Any, Any, Any], *pools: WorkerPool) -> Any:
         finally:
             for pool in pools:
                 pool.end()
-            await hear_the_ends(30.0)
 
     return asyncio.run(whole())
 
@@ -108,11 +111,27 @@ def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_
         waiting.cancel()
         searching.cancel()
         await asyncio.wait((searching, waiting))
-        await asyncio.wait_for(started.processes[0].wait(), 30.0)
+        await started.gone(0)
         return await ranking
 
     assert run(work(), pool) == pytest.approx(10.0)
     assert len(started.processes) == 2
+
+
+def test_a_task_that_is_cancelled_in_any_of_its_first_moments_leaves_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    started, pool = Started(monkeypatch), WorkerPool(1)
+
+    async def work() -> None:
+        for moment in range(8):
+            ranking = asyncio.create_task(rank(TaskQueue(pool)))
+            for _ in range(moment):
+                await asyncio.sleep(0)
+            ranking.cancel()
+            await asyncio.wait([ranking])
+
+    asyncio.run(work())
+    assert len(started.processes) > 4
+    assert not any(is_there(process.process.pid) for process in started.processes)
 
 
 def test_a_process_that_rests_goes_and_the_next_task_starts_another(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,10 +142,10 @@ def test_a_process_that_rests_goes_and_the_next_task_starts_another(monkeypatch:
         tasks = TaskQueue(pool)
         for _ in range(2):
             assert await rank(tasks) == pytest.approx(10.0)
-            await asyncio.wait_for(started.processes[-1].wait(), 30.0)
+            await started.gone(-1)
 
     run(work(), pool)
-    assert not any(is_there(process.pid) for process in started.processes)
+    assert not any(is_there(process.process.pid) for process in started.processes)
     assert len(started.processes) == 2
 
 
@@ -142,7 +161,7 @@ def test_a_bench_gets_the_process_that_it_had_and_its_end_is_that_of_this_proces
             async with pool.worker(tasks) as process:
                 assert process is started.processes[[first, second].index(tasks)]
         first.close()
-        await asyncio.wait_for(started.processes[0].wait(), 30.0)
+        await started.gone(0)
         assert await rank(second) == pytest.approx(10.0)
         with pytest.raises(UserError, match="this bench is closed: nothing is worked out for it any more"):
             await rank(first)

@@ -4,7 +4,7 @@ import asyncio
 import os
 import re
 import signal
-import sys
+import subprocess
 import tempfile
 import threading
 import time
@@ -32,7 +32,6 @@ from machine.app.workbench.printing.order import FollowOrder, Order, PrintOrder,
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
-from machine.app.workbench.work.worker import LENGTH, frame, listen
 from machine.dryrun.timeline import UnknownTimeline
 from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
@@ -41,6 +40,7 @@ from machine.link.protocol.events import Temperature
 from machine.network import follow
 from machine.network.credentials import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
+from mdp.kernels.workers import frame, listen
 from profiles.errors import PrinterError
 from profiles.profile import Profile, load
 from tests.machine.link.failing_disk import keep_notes_in
@@ -92,36 +92,43 @@ def heats(current: RunningPrint) -> bool:
     return bool(current.state["progress"]["nozzle_target_c"] == 210.0)
 
 
-def kill(prints: Prints, current: RunningPrint) -> None:
+def process_of(current: RunningPrint) -> "subprocess.Popen[bytes]":
     assert current._process is not None
-    os.kill(current._process.pid, signal.SIGKILL)
+    return current._process.process
+
+
+def kill(prints: Prints, current: RunningPrint) -> None:
+    os.kill(process_of(current).pid, signal.SIGKILL)
 
 
 def hang_up(prints: Prints, current: RunningPrint) -> None:
-    assert current._process is not None
-    assert current._process.stdin is not None
-    current._process.stdin.close()
+    pipe = process_of(current).stdin
+    assert pipe is not None
+    pipe.close()
 
 
 def break_off(prints: Prints, current: RunningPrint) -> None:
     """The server dies in the middle of a frame."""
-    assert current._process is not None
-    assert current._process.stdin is not None
-    current._process.stdin.write(frame((Command.PAUSE,))[:-1])
-    current._process.stdin.close()
+    pipe = process_of(current).stdin
+    assert pipe is not None
+    pipe.write(frame((Command.PAUSE,))[:-1])
+    pipe.close()
 
 
-def cannot_be_heard(prints: Prints, current: RunningPrint) -> None:
-    """A fault of the program: what the process says cannot be read."""
-    assert current._process is not None
-    assert current._process.stdout is not None
-    current._process.stdout.feed_data(LENGTH.pack(1) + b"?")
+def cannot_be_told(prints: Prints, current: RunningPrint) -> None:
+    """A fault of the program in the midst of what the process says."""
+    tell = current._changed
+
+    def fail() -> None:
+        current._changed = tell
+        raise ValueError("a state that nobody understands")
+
+    current._changed = fail
 
 
 def freeze(prints: Prints, current: RunningPrint) -> None:
     """Its process does nothing any more, also not what it is told; then a person presses the emergency stop."""
-    assert current._process is not None
-    os.kill(current._process.pid, signal.SIGSTOP)
+    os.kill(process_of(current).pid, signal.SIGSTOP)
     prints.stop_at_once(None)
 
 
@@ -133,7 +140,7 @@ DIED = "the process that printed has ended before the print was done"
     (freeze, f"{DIED}; emergency stop: the printer has halted"),
     (hang_up, "the print was stopped"),
     (break_off, "the print was stopped"),
-    (cannot_be_heard, f"a bug in tiltprint: .*; {DIED}; the printer reports its heaters off"),
+    (cannot_be_told, f"a bug in tiltprint: .*; {DIED}; the printer reports its heaters off"),
 ])  # fmt: skip
 def test_whoever_dies_the_heaters_go_off(
     end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
@@ -202,17 +209,16 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
 
 # A print's process that is left and does nothing any more of what it hears.
 LEAVES = """
-import pickle, struct, sys, time
-length = struct.Struct(sys.argv[1])
+import sys, time
+from mdp.kernels.workers import frame, read_frames
 progress = {"state": "printing", "heat_s": time.time()}
 message = {"phase": "printing", "server": True, "progress": progress, "end": "left", "sentence": "it goes on"}
 message["stop_given"] = False
 for phase in ("printing", "over"):
-    text = pickle.dumps(message | {"phase": phase})
-    sys.stdout.buffer.write(length.pack(len(text)) + text)
+    sys.stdout.buffer.write(frame(message | {"phase": phase}))
     sys.stdout.flush()
-    for heard in range(2 if sys.argv[2] == phase else 0):
-        sys.stdin.buffer.read(*length.unpack(sys.stdin.buffer.read(length.size)))
+    for _ in zip(range(2 if phase == WAITS_FOR else 0), read_frames(sys.stdin.buffer)):
+        pass
 """
 
 
@@ -231,7 +237,7 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
-    monkeypatch.setattr(running_print, "COMMAND", (sys.executable, "-c", LEAVES, LENGTH.format, waits_for.replace("over", "")))
+    monkeypatch.setattr(running_print, "MAIN", f"WAITS_FOR = {waits_for.replace('over', '')!r}\n{LEAVES}")
 
     async def run(address: str) -> dict[str, Any]:
         prints = Prints()

@@ -1,0 +1,232 @@
+"""Workers: fresh interpreters that do one call after another for this process, and how two processes speak through pipes.
+
+What goes through a pipe is a pickle with its length before it. A worker tells what it likes while it works, and answers with what
+the call returns or with what it raised, in words. It leads a session of its own: Ctrl-C at the terminal does not reach it, and
+one signal ends it with all that it has started. It ends by itself when nobody can ask it any more, whatever ended those who
+could, or when it was asked nothing for long.
+
+multiprocessing, concurrent.futures and pebble have no such worker: theirs run the main module of this process again, stay in its
+session, tell nothing meanwhile, and go on with what they do when this process is killed.
+"""
+
+import os
+import pickle
+import signal
+import struct
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pkgutil import resolve_name
+from queue import Empty, SimpleQueue
+from threading import Thread, Timer
+from time import monotonic
+from typing import Any, BinaryIO, NoReturn
+
+from mdp.kernels import threads
+
+Tell = Callable[[Any], None]  # what long work calls to say something to the one who asked for it
+Task = Callable[..., Any] | str  # a function of a module, or "module:function" where who asks need not import it
+
+LENGTH = struct.Struct("<Q")
+TELLS, DONE, FAILED = "tells", "done", "failed"
+SPARE_S = 1.0  # so much longer than we would ask it a worker waits
+ONE_CORE = {"OPENBLAS_NUM_THREADS": "1"}  # numpy's library for products would take all cores
+OOM_SCORE = "/proc/self/oom_score_adj", "500"  # where memory ends, Linux kills a worker and not the one that asks
+
+
+class CallError(Exception):
+    """A call without a result; str() says why."""
+
+
+class KilledError(CallError):
+    """The process of a call ended under it, which need not happen again."""
+
+
+def frame(value: Any) -> bytes:
+    """A value as it goes through a pipe."""
+    content = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
+    return LENGTH.pack(len(content)) + content
+
+
+def read_frames(pipe: BinaryIO) -> Iterator[Any]:
+    """The values that come through a pipe, until it ends; a frame that is cut off is its end, too. Raises what pickle raises for
+    a frame that is whole but cannot be read."""
+    while head := _read(pipe, LENGTH.size):
+        content = _read(pipe, *LENGTH.unpack(head))
+        if not content:
+            return
+        yield pickle.loads(content)
+
+
+def _read(pipe: BinaryIO, size: int) -> bytearray:
+    """So many bytes, none where the pipe ends before."""
+    content = bytearray()
+    while len(content) < size:
+        more = pipe.read(size - len(content))
+        if not more:
+            return bytearray()
+        content += more
+    return content
+
+
+def listen(pipe: BinaryIO, take: Callable[[Any], None], end: Callable[[], None]) -> None:
+    """Hand each value that comes through a pipe to take(); call end() when no more can come, however the other side has ended.
+
+    Nobody can speak to this process any more then, so end() is called after a frame that cannot be read, too.
+    """
+    try:
+        for value in read_frames(pipe):
+            take(value)
+    except OSError:
+        pass
+    finally:
+        end()
+
+
+class Interpreter:
+    """A fresh interpreter that imports from where this one does and runs some code; we speak with it through its pipes."""
+
+    def __init__(self, code: str, environment: dict[str, str] | None = None) -> None:
+        command = [sys.executable, "-c", f"import sys; sys.path[:] = {sys.path!r}\n{code}"]
+        pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
+        self.process = subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, stderr=nowhere, env=os.environ | (environment or {}), start_new_session=True
+        )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self._in, self._out = self.process.stdin, self.process.stdout
+
+    def say(self, value: Any) -> None:
+        """Something to the process; what it does not hear any more is not missed."""
+        with suppress(OSError, ValueError):  # it has ended, or we have ended it
+            self._in.write(frame(value))
+            self._in.flush()
+
+    def hear(self) -> Iterator[Any]:
+        """What it says, until it ends."""
+        yield from read_frames(self._out)  # type: ignore[arg-type]
+        self.process.wait()
+
+    def end(self) -> None:
+        """Kill it with all that it has started; it is gone then."""
+        if self.process.poll() is None:
+            with suppress(ProcessLookupError, PermissionError):
+                if hasattr(os, "killpg"):
+                    os.killpg(self.process.pid, signal.SIGKILL)
+                else:
+                    self.process.kill()
+            self.process.wait()
+        with suppress(OSError):
+            self._in.close()
+
+
+class Worker(Interpreter):
+    """A process that does calls, one at a time. one_core: whether it is one of many on its machine; idle_s: without a call, after
+    which it gives its memory back."""
+
+    def __init__(self, *, one_core: bool = False, idle_s: float = 60.0) -> None:
+        code = f"from mdp.kernels.workers import serve; serve({one_core}, {idle_s + SPARE_S})"
+        super().__init__(code, ONE_CORE if one_core else None)
+        self._idle_s, self._rests_since_s = idle_s, monotonic()
+
+    @property
+    def ready(self) -> bool:
+        """Whether it can be asked; one that has rested for long ends, and another one has to be started in its place."""
+        return self.process.poll() is None and monotonic() - self._rests_since_s < self._idle_s
+
+    def ask(self, task: Task, *given: Any) -> Iterator[tuple[bool, Any]]:
+        """(False, what a call tells) as it comes, and at last (True, what it returns). Raises CallError as call()."""
+        self.say(pickle.dumps((task, given), pickle.HIGHEST_PROTOCOL))
+        for kind, value in self.hear():
+            if kind == TELLS:
+                yield False, value
+                continue
+            self._rests_since_s = monotonic()
+            if kind == FAILED:
+                raise CallError(value)
+            yield True, value
+            return
+        code = self.process.wait()
+        raise KilledError(f"its process was ended by {_signal_name(-code)}" if code < 0 else "its process ended")
+
+    def call(self, task: Task, *given: Any, limit_s: float | None = None) -> Any:
+        """What a call returns. limit_s: after so many seconds it is given up, and the worker ended.
+
+        Raises CallError for what the call raises, too; KilledError when the worker ends meanwhile.
+        """
+        timer, began_s = Timer(limit_s or 0.0, self.end), monotonic()
+        timer.daemon = True
+        if limit_s is not None:
+            timer.start()
+        try:
+            return next(value for done, value in self.ask(task, *given) if done)
+        except KilledError:
+            if limit_s is not None and monotonic() - began_s >= limit_s:
+                raise CallError(f"it took longer than {limit_s:g} s") from None
+            raise
+        finally:
+            timer.cancel()
+            if limit_s is not None:
+                timer.join()  # it may be ending the worker, which must not be asked again then
+
+
+def _signal_name(number: int) -> str:
+    return signal.Signals(number).name if number in signal.valid_signals() else f"signal {number}"
+
+
+def take_pipes() -> tuple[BinaryIO, BinaryIO]:
+    """This process's pipes from and to the one that asks; what work prints does not reach them."""
+    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    with open(os.devnull, "r+b") as nowhere:
+        os.dup2(nowhere.fileno(), 0)
+        os.dup2(nowhere.fileno(), 1)
+    return asked, answers
+
+
+_answers: list[BinaryIO] = []  # of this process, where it is a worker
+
+
+def tell(value: Any) -> None:
+    """In a worker: say something to the one who waits for the call under way."""
+    _send(frame((TELLS, value)))
+
+
+def _send(message: bytes) -> None:
+    _answers[0].write(message)
+    _answers[0].flush()
+
+
+def serve(one_core: bool, idle_s: float) -> None:
+    """In a worker: do what is asked until nobody can ask any more, or nobody does for so long."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asks decides
+    asked, answers = take_pipes()
+    _answers.append(answers)
+    with suppress(OSError), open(OOM_SCORE[0], "w") as score:
+        score.write(OOM_SCORE[1])
+    if one_core:
+        threads.use_threads(1)
+    calls: SimpleQueue[bytes] = SimpleQueue()
+    threads.harmless(Thread(target=listen, args=(asked, calls.put, _end_all), daemon=True)).start()
+    while True:
+        try:
+            call = calls.get(timeout=idle_s)
+        except Empty:
+            _end_all()
+        _send(_result(call))
+
+
+def _result(call: bytes) -> bytes:
+    try:
+        task, given = pickle.loads(call)
+        work = resolve_name(task) if isinstance(task, str) else task
+        return frame((DONE, work(*given)))
+    except Exception as error:  # noqa: BLE001 - it is told to who asked
+        return frame((FAILED, f"{type(error).__name__}: {error}"))
+
+
+def _end_all() -> NoReturn:
+    """End this process and all that it has started."""
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)  # it leads a group of its own
+    os._exit(1)

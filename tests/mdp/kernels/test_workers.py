@@ -1,0 +1,86 @@
+"""Workers: what a call tells and gives, and that a process ends with the one that asks, wherever that has died."""
+
+import os
+import pickle
+import signal
+import time
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from mdp.kernels.workers import LENGTH, CallError, Interpreter, KilledError, Worker, frame, listen
+from tests.mdp.batch.calls import greet, process, sleep, squares
+from tests.mdp.batch.test_isolation import until_gone
+
+WHOLE, LATER = ("load_kernels", ()), ("slice_bench", (Path("here"), "a file"))
+
+
+def heard(content: bytes) -> list[object]:
+    """What comes through a pipe that ends after some bytes, and then the end."""
+    told: list[object] = []
+    listen(BytesIO(content), told.append, lambda: told.append("the end"))
+    return told
+
+
+def test_a_pipe_that_ends_at_any_byte_of_a_frame_is_at_its_end() -> None:
+    for sent in range(len(frame(LATER))):
+        assert heard(frame(WHOLE) + frame(LATER)[:sent]) == [WHOLE, "the end"]
+    assert heard(frame(WHOLE) + frame(LATER)) == [WHOLE, LATER, "the end"]
+
+
+@pytest.mark.parametrize("content", [b"rubbish", pickle.dumps(1)[:-1], b"cno_such_module\nthing\n."])
+def test_a_frame_that_cannot_be_read_is_the_end_for_nobody_speaks_to_the_process_any_more(content: bytes) -> None:
+    told: list[object] = []
+    with pytest.raises((pickle.UnpicklingError, EOFError, ImportError)):
+        listen(BytesIO(LENGTH.pack(len(content)) + content + frame(WHOLE)), told.append, lambda: told.append("the end"))
+    assert told == ["the end"]
+
+
+def test_a_worker_whose_asker_dies_in_the_middle_of_a_call_s_frame_ends_at_once() -> None:
+    call = frame(pickle.dumps((greet, ("world",))))
+    workers = [Worker() for _ in range(4)]
+    for worker, sent in zip(workers, (0, LENGTH.size, LENGTH.size + 1, len(call) - 1), strict=True):
+        worker.process.communicate(call[:sent], timeout=20.0)
+        assert worker.process.returncode == -signal.SIGKILL
+
+
+def test_what_a_call_tells_comes_before_what_it_returns() -> None:
+    worker = Worker()
+    assert list(worker.ask(squares, 3)) == [(False, 0), (False, 1), (False, 4), (True, "all")]
+    assert list(worker.ask("tests.mdp.batch.calls:greet", "world")) == [(True, "hello world")]
+    worker.end()
+
+
+def test_a_worker_that_is_ended_is_gone_and_its_call_without_a_result(tmp_path: Path) -> None:
+    worker = Worker()
+    with pytest.raises(CallError, match=r"^it took longer than 2 s$"):
+        worker.call(sleep, tmp_path / "begun", limit_s=2.0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(worker.process.pid, 0)
+    assert not worker.ready
+    with pytest.raises(KilledError, match=r"^its process was ended by SIGKILL$"):
+        worker.call(process)
+
+
+def test_what_a_process_has_started_ends_with_it() -> None:
+    started = Interpreter("import os, time; from mdp.kernels.workers import frame; copy = os.fork()\n"
+                          "if copy: os.write(1, frame(copy))\ntime.sleep(60)")  # fmt: skip
+    copy = next(started.hear())
+    started.end()
+    until_gone(copy)
+
+
+def test_a_worker_that_was_asked_nothing_for_long_is_not_asked_again_and_ends() -> None:
+    worker = Worker(idle_s=0.2)
+    assert worker.call(greet, "world") == "hello world"
+    assert worker.ready
+    time.sleep(0.2)
+    assert not worker.ready
+    assert worker.process.wait(timeout=20.0) == -signal.SIGKILL
+
+
+def test_what_lies_in_the_working_folder_is_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "queue.py").write_text("raise ValueError")
+    monkeypatch.chdir(tmp_path)
+    assert Worker().call(greet, "world") == "hello world"
