@@ -1,1 +1,1 @@
-"""Kernels: functions compiled by numba, the arrays they need, where they are cached, and threads that run them."""
+"""Kernels: functions compiled by numba, the arrays they need, where they are cached; threads and processes that run them."""

@@ -36,7 +36,7 @@ class WorkerPool:
     @property
     def may_start(self) -> bool:
         """Whether there may be one more process."""
-        return len(self._idle) + len(self._busy) < self.most
+        return len(self._busy) + sum(worker.ready for worker in self._idle) < self.most
 
     @asynccontextmanager
     async def worker(self, tasks: "TaskQueue") -> AsyncIterator[Worker]:
