@@ -16,7 +16,7 @@ LEAST_ROWS, SHARES = 4, 8  # rows a call, and calls for every core: handing a ca
 
 Result = TypeVar("Result")
 
-POOLS = "ahead", "sweep"  # what their threads are called; work of the first runs in the second, too
+POOLS = "ahead", "sweep"  # what their threads are called
 
 _pools: dict[tuple[str, int], ThreadPoolExecutor] = {}
 _harmless: WeakSet[threading.Thread] = WeakSet()
@@ -63,7 +63,7 @@ def come_to_rest() -> bool:
     if threading.current_thread() is not threading.main_thread() or any(_pool_of(thread) not in POOLS for thread in others):
         return False
     while _pools:
-        _pools.pop(min(_pools)).shutdown()
+        _pools.pop(min(_pools)).shutdown()  # those for work ahead first, which shares out rows
     return True
 
 

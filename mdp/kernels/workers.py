@@ -21,7 +21,7 @@ from pkgutil import resolve_name
 from queue import Empty, SimpleQueue
 from threading import Thread, Timer
 from time import monotonic
-from typing import Any, BinaryIO, NoReturn
+from typing import IO, Any, BinaryIO, NoReturn
 
 from mdp.kernels import threads
 
@@ -49,7 +49,7 @@ def frame(value: Any) -> bytes:
     return LENGTH.pack(len(content)) + content
 
 
-def read_frames(pipe: BinaryIO) -> Iterator[Any]:
+def read_frames(pipe: IO[bytes]) -> Iterator[Any]:
     """The values that come through a pipe, until it ends; a frame that is cut off is its end, too. Raises what pickle raises for
     a frame that is whole but cannot be read."""
     while head := _read(pipe, LENGTH.size):
@@ -59,7 +59,7 @@ def read_frames(pipe: BinaryIO) -> Iterator[Any]:
         yield pickle.loads(content)
 
 
-def _read(pipe: BinaryIO, size: int) -> bytearray:
+def _read(pipe: IO[bytes], size: int) -> bytearray:
     """So many bytes, none where the pipe ends before."""
     content = bytearray()
     while len(content) < size:
@@ -70,7 +70,7 @@ def _read(pipe: BinaryIO, size: int) -> bytearray:
     return content
 
 
-def listen(pipe: BinaryIO, take: Callable[[Any], None], end: Callable[[], None]) -> None:
+def listen(pipe: IO[bytes], take: Callable[[Any], None], end: Callable[[], None]) -> None:
     """Hand each value that comes through a pipe to take(); call end() when no more can come, however the other side has ended.
 
     Nobody can speak to this process any more then, so end() is called after a frame that cannot be read, too.
@@ -105,7 +105,7 @@ class Interpreter:
 
     def hear(self) -> Iterator[Any]:
         """What it says, until it ends."""
-        yield from read_frames(self._out)  # type: ignore[arg-type]
+        yield from read_frames(self._out)
         self.process.wait()
 
     def end(self) -> None:

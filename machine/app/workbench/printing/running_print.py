@@ -55,8 +55,9 @@ class RunningPrint:
 
     async def run(self) -> None:
         """Have it printed by a process of its own, to the end."""
-        self._process = process = Interpreter(MAIN)
-        await asyncio.to_thread(process.say, self._order)
+        process = Interpreter(MAIN)
+        await asyncio.to_thread(process.say, self._order)  # a long one is read when the process has loaded what it needs
+        self._process = process  # and is told more from now on
         if self._given_up or self._emergency:
             self._kill()
         ended = lost = False

@@ -1,9 +1,12 @@
 """Progress of long work: lines in a log, one live line on a terminal."""
 
+import threading
+
 import pytest
 
 from machine.app.terminal import progress
 from machine.app.terminal.progress import PLAIN_AGAIN_S, PLAIN_EVERY_S, PlainLines
+from mdp.kernels import threads
 from tests.machine.person import Person
 
 
@@ -26,3 +29,13 @@ def test_on_a_terminal_the_work_under_way_is_one_live_line_that_goes_away() -> N
         assert person.end() == 0
     lines = 2 if "compiling the kernels" in person.raw else 1
     assert person.raw.count("\x1b[?25l") == person.raw.count("\x1b[?25h") == lines
+
+
+def test_the_thread_that_draws_a_live_line_does_not_keep_work_from_being_shared_out_to_copies(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(progress, "is_terminal", lambda: True)
+    alone = threading.active_count()
+    with progress.reporting():
+        assert threading.active_count() == alone + 1
+        assert threads.come_to_rest()
