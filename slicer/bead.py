@@ -21,6 +21,9 @@ INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin
 EVEN_MM = 0.03  # widths that differ by less are one
 
 
+NARROWEST = 0.6  # diameters of the nozzle
+
+
 @kernel
 def mean_width_mm(course: Floats) -> float:
     """Mean width of a bead along its course (n, 3) of x, y and width."""
@@ -93,6 +96,11 @@ def spacing_mm(width_mm: float, height_mm: float) -> float:
 def width_for_mm(spacing: float, height_mm: float) -> float:
     """Width of the bead that fills a strip of that width between two others: the inverse of spacing_mm."""
     return spacing + height_mm * ROUND_SIDES
+
+
+def least_width_mm(nozzle_mm: float, height_mm: float) -> float:
+    """Width of the narrowest bead."""
+    return max(NARROWEST * nozzle_mm, height_mm)
 
 
 def bulge_flow(width_mm: float, height_mm: float, free_sides: int, most_mm: float) -> float:

@@ -15,15 +15,20 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
+from profiles.machine import Table
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import first_layer_process
+from slicer.bead import (
+    first_layer_process,
+    least_width_mm,
+)
 from slicer.fill.region import shell_layers
 from slicer.geometry.polygons import (
     CLOSING_MM,
     Polygons,
     area_mm2,
     clean,
+    close_loop,
     closing,
     contours,
     half_plane,
@@ -32,19 +37,22 @@ from slicer.geometry.polygons import (
     opening,
     union,
 )
+from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights, pedestal_layers
 from slicer.interface.base_plane import limb_planes, plane_in_frame_of
 from slicer.interface.interface import joints, near_parts, plastic_below, sections_of
 from slicer.interface.interlock import Pins, cut_grooves, cut_pins, grooves, plan_pins
 from slicer.sections import Sections
 from slicer.strokes.vase import vase_profile
-from slicer.walls.brim import plate_outline
-from slicer.walls.layer_walls import without_hairs
+from slicer.walls.counts import FEATURE
 from slicer.zones import no_seam_segments, no_support_areas
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
 TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
 BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base plane
+
+
+HAIR_MM = 0.04  # nobody can tell whether a piece only so much thicker than the thinnest gets a line all along
 
 
 def section_part(
@@ -110,6 +118,26 @@ def section_part(
         pedestal_layers=pedestal,
         too_thin=too_thin,
     )
+
+
+def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_mm: float) -> Polygons:
+    """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
+    least_mm = FEATURE * least_width_mm(nozzle_mm, height_mm)
+    pieces = [] if section.is_empty() else islands(section)
+    solid = [piece for piece in pieces if not _is_hair(piece, least_mm + HAIR_MM)]
+    return section if len(solid) == len(pieces) else Polygons.compose(solid) if solid else Polygons()
+
+
+def _is_hair(piece: Polygons, least_mm: float) -> bool:
+    around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
+    return bool(2.0 * piece.area() < least_mm * around_mm and offset(piece, -0.5 * least_mm).is_empty())
+
+
+def plate_outline(table: Table) -> Polygons:
+    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
+    if table.size_mm is not None:
+        return Polygons.square(table.size_mm, True)
+    return Polygons.circle(table.radius_mm, 180)
 
 
 def _model_around(

@@ -25,9 +25,8 @@ from slicer.strokes.overhanging import strengthen_overhangs
 from slicer.support.beads import pedestal_beads, support_beads
 from slicer.support.support import Supports
 from slicer.walls.brim import brim
-from slicer.walls.gap import gaps
-from slicer.walls.variable.variable import Wall
-from slicer.walls.walls import Walls, wall_beads
+from slicer.walls.variable import Wall
+from slicer.walls.walls import Walls, gaps, wall_beads
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes

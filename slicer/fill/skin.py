@@ -15,11 +15,11 @@ from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, larger, offset, opening, strips
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
-from slicer.walls.gap import LEAST_GAP, gaps
+from slicer.walls.walls import LEAST_GAP, gaps
 
 JOIN = 4.0  # spacings along the border: line ends nearer than this are joined
 EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
-RANK = 2  # behind gaps (slicer.walls.gap), before infill
+RANK = 2  # behind gaps (slicer.walls.walls), before infill
 FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
 # Of 2,250 skins of bracket, tree, figure and the bunny (as they stand, default process, commit 5c72b83f) 90 of 100 ask for 0.82
 # to 1.06. What asks for less or more are specks whose lines hardly fit.

@@ -18,9 +18,7 @@ from slicer.interface.base_plane import limb_planes, plane_in_frame_of
 from slicer.paths import Kind
 from slicer.sections import Sections
 from slicer.strokes.split import cut_line
-from slicer.walls.gap import gaps
-from slicer.walls.layer_walls import layer_walls
-from slicer.walls.walls import Walls, wall_rank, walls
+from slicer.walls.walls import Walls, gaps, layer_walls, wall_rank, walls
 
 REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cut overlaps it by this
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none

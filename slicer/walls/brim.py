@@ -3,7 +3,6 @@
 from math import ceil
 
 from mdp.cost.footing import tips_over
-from profiles.machine import Table
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
 from slicer.geometry.polygons import Polygons, area_mm2, contours, offset, offset_round
@@ -46,10 +45,3 @@ def _outside(polygons: Polygons) -> Polygons:
     """Without holes."""
     outer = [loop for loop in contours(polygons) if area_mm2(loop) > 0]
     return Polygons(outer) if outer else Polygons()
-
-
-def plate_outline(table: Table) -> Polygons:
-    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
-    if table.size_mm is not None:
-        return Polygons.square(table.size_mm, True)
-    return Polygons.circle(table.radius_mm, 180)

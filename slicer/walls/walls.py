@@ -1,23 +1,37 @@
-"""Walls: closed beads that follow the outline of a section, all of one width where they have room.
+"""Walls: closed beads that follow the outline of a section, as wide as the place where it is narrow, and what fills gaps.
 
-The outermost bead runs half its width inside the section, the next ones a bead spacing further in. Where less than two beads fit,
-no wall turns round.
+The outermost bead runs half its width inside the section, the next ones a bead spacing further in. An island that is nowhere
+narrower than its walls want gets walls of one width, which the variable ones would be too. Where less than two beads fit, no wall
+turns round.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, bulge_flow, mean_width_mm, outer_wall_width_mm, spacing_mm, varying
-from slicer.geometry.polygons import Polygons, contours, offset, opening
-from slicer.geometry.polyline import PATH_RESOLUTION_MM
+from slicer.bead import Bead, bulge_flow, least_width_mm, mean_width_mm, outer_wall_width_mm, spacing_mm, varying
+from slicer.geometry.polygons import Polygons, contours, islands, offset, offset_round, opening, strips
+from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm, simplify
 from slicer.paths import Kind
-from slicer.walls.variable.variable import Wall
+from slicer.walls.counts import ROOM, SPLIT, Rule
+from slicer.walls.variable import Wall, variable_walls
 
+WIDEST = 2.0  # diameters of the nozzle
+NARROW = 0.1  # of the line width: what walls leave that is narrower than that is a corner
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner
 LEAST_REST = 0.12  # of the line width: narrower places without a core behind them are corners, which walls run into
 LEAST_REST_MM2 = 1e-3  # smaller areas are rounding
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
+RANK = 1  # behind walls, which have 0 and less
+LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
+MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie beside each other
+ROUNDS = 50  # beads round a place at most: as many as walls
+SHORTEST = 0.25  # of the line width: what is shorter is no bead
+MOST_WIDER = 1.3  # times as wide as its place is a bead, at most, to make up for the tips of the place that it does not reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +46,45 @@ class Walls:
     inside: Polygons
     narrow: Polygons
     varying: tuple[Wall, ...] = ()
+
+
+def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:
+    """Up to `count` walls of a section, of varying width where islands are narrow; 0: one where no line of a fill has room."""
+    rule = bead_rule(count, process, height_mm, nozzle_mm)
+    thick: list[Polygons] = []
+    narrow: list[Polygons] = []
+    for island in islands(section):
+        (thick if _is_thick(island, rule) else narrow).append(island)
+    even = walls(Polygons.compose(thick), count, process, height_mm)
+    if not narrow:
+        return even
+    varying = tuple(variable_walls(narrow, rule))
+    inside = _enclosed(Polygons.compose(narrow), varying, rule)
+    return Walls(even.loops, even.inside + inside, even.narrow, varying)
+
+
+def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) -> Rule:
+    """The rule of so many walls of a process in layers of that height."""
+    outer, inner = outer_wall_width_mm(process), process.line_width_mm
+    taken = inner - spacing_mm(inner, height_mm)
+    least = least_width_mm(nozzle_mm, height_mm)
+    most = max(WIDEST * nozzle_mm, outer, inner)
+    return Rule(count, outer - taken, inner - taken, taken, least, most)
+
+
+def _is_thick(island: Polygons, rule: Rule) -> bool:
+    """Whether all walls and more than a bead between them fit everywhere."""
+    deep = _wall_mm(rule) + 0.5 * ROOM * rule.inner
+    core = offset(island, -deep)
+    if core.is_empty():
+        return False
+    rest = island - offset(core, deep + SLACK_MM)
+    return bool(rest.is_empty() or offset(rest, -0.5 * NARROW * rule.inner).is_empty())
+
+
+def _wall_mm(rule: Rule) -> float:
+    """How deep all walls reach."""
+    return 0.5 * rule.round + rule.outer + (rule.walls - 1) * rule.inner if rule.walls else 0.0
 
 
 def walls(section: Polygons, count: int, process: Process, height_mm: float) -> Walls:
@@ -65,6 +118,16 @@ def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, b
     return line ^ offset(core, behind_mm + SLACK_MM)
 
 
+def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polygons:
+    """What the walls leave inside, where it has room for more than one bead."""
+    inside = offset_round(section, -_wall_mm(rule)).simplify(PATH_RESOLUTION_MM)
+    middle = [wall.course for wall in varying if wall.level == rule.walls]
+    if middle:
+        reach_mm = [0.25 * (course[1:, 2] + course[:-1, 2]) for course in middle]
+        inside = inside - strips([course[:, :2] for course in middle], np.concatenate(reach_mm))
+    return inside if inside.is_empty() else opening(inside, 0.5 * rule.inner)
+
+
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
     """The walls as beads; all ranks are at most 0, so that walls come before gaps, skin and infill.
 
@@ -75,18 +138,34 @@ def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
     for level, loops in enumerate(walled.loops):
         kind, width, flow = (Kind.INNER_WALL, process.line_width_mm, 1.0) if level else (Kind.OUTER_WALL, outer, outer_flow)
         beads += [Bead(kind, loop, width, wall_rank(level, process), flow) for loop in loops]
-    return beads + [_varying_bead(wall, process, height_mm) for wall in walled.varying]
-
-
-def _varying_bead(wall: Wall, process: Process, height_mm: float) -> Bead:
-    """A wall of varying width as a bead; one that fills a place from side to side bulges on both."""
-    kind = Kind.INNER_WALL if wall.level else Kind.OUTER_WALL
-    width = mean_width_mm(wall.course)
-    flow = bulge_flow(width, height_mm, wall.free, process.outer_bulge * process.line_width_mm)
-    rank = wall_rank(wall.level, process)
-    return Bead(kind, wall.points, width, rank, flow, line=not wall.closed, course=varying(wall.course))
+    for wall in walled.varying:  # one that fills a place from side to side bulges on both
+        kind, width = Kind.INNER_WALL if wall.level else Kind.OUTER_WALL, mean_width_mm(wall.course)
+        flow = bulge_flow(width, height_mm, wall.free, process.outer_bulge * process.line_width_mm)
+        rank, course = wall_rank(wall.level, process), varying(wall.course)
+        beads.append(Bead(kind, wall.points, width, rank, flow, line=not wall.closed, course=course))
+    return beads
 
 
 def wall_rank(level: int, process: Process) -> int:
     """Rank of a wall counted from outside."""
     return -level if process.wall_order == "inner-first" else level - process.walls
+
+
+def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> list[Bead]:
+    """Beads that fill places between other beads, which cover their round sides, with their area times height of plastic.
+
+    They are as wide as the place. What is narrower than LEAST_GAP of a line stays empty.
+    """
+    spacing, widest_mm = spacing_mm(line_width_mm, height_mm), MOST_WIDTH * line_width_mm
+    rule = Rule(ROUNDS, MOST_WIDTH / SPLIT * spacing, spacing, 0.0, LEAST_GAP * line_width_mm, spacing_mm(widest_mm, height_mm))
+    filled = [place for place in places if not place.is_empty()]
+    beads: list[Bead] = []
+    for piece, there in groupby(variable_walls(filled, rule), key=lambda wall: wall.piece):
+        courses = [wall.course for wall in there if length_mm(wall.course) > SHORTEST * line_width_mm]
+        covered_mm2 = sum(mean_width_mm(course) * length_mm(course) for course in courses)
+        wider = min(filled[piece].area() / covered_mm2, MOST_WIDER) if courses else 1.0
+        for course in courses:
+            course[:, 2] = np.minimum(wider * course[:, 2] + line_width_mm - spacing, widest_mm)
+            points = simplify(np.ascontiguousarray(course[:, :2]))
+            beads.append(Bead(Kind.GAP, points, mean_width_mm(course), RANK, course=varying(course)))
+    return beads

@@ -15,7 +15,7 @@ from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, bead_area_mm2
 from slicer.strokes.pieces import in_pieces
 from slicer.strokes.strokes import strokes_of
-from slicer.walls.gap import LEAST_GAP, MOST_WIDER, gaps
+from slicer.walls.walls import LEAST_GAP, MOST_WIDER, gaps
 from tests.slicer.hand import as_shapely, rows_of
 
 WIDTH, HEIGHT = 0.45, 0.2

@@ -20,13 +20,11 @@ from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.strokes.pieces import in_pieces
 from slicer.strokes.strokes import strokes_of
-from slicer.walls.layer_walls import bead_rule, layer_walls
-from slicer.walls.variable.counts import count_beads
-from slicer.walls.variable.loops import lay_loops
-from slicer.walls.variable.rule import FEATURE
-from slicer.walls.variable.skeleton import skeleton_of
-from slicer.walls.variable.variable import STEP, Wall, variable_walls
-from slicer.walls.walls import wall_beads
+from slicer.walls.counts import FEATURE, count_beads
+from slicer.walls.loops import lay_loops
+from slicer.walls.skeleton import skeleton_of
+from slicer.walls.variable import STEP, Wall, variable_walls
+from slicer.walls.walls import bead_rule, layer_walls, wall_beads
 from tests.shapes import from_manifold
 from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, rows_of, volume_mm3, whole
 
@@ -262,5 +260,5 @@ def test_a_wall_whose_points_fall_on_each_other_is_left_out(monkeypatch: pytest.
 
     fin, rule = Polygons.square((8.0, 0.5)), bead_rule(2, profile().process, 0.2, 0.4)
     assert [wall.closed for wall in variable_walls([fin], rule)] == [False]
-    monkeypatch.setattr("slicer.walls.variable.variable._clipped", fallen)
+    monkeypatch.setattr("slicer.walls.variable._clipped", fallen)
     assert variable_walls([fin], rule) == []
