@@ -12,9 +12,8 @@ from profiles.process import Process
 from slicer.bead import WALLS, Bead, first_layer_process, interface_process, simplify_bead, with_line_width
 from slicer.fill.bridge import Bridge, bridge_area, bridge_beads, find_bridges, infill_bridge_area
 from slicer.fill.infill import infill_beads, pattern_density
-from slicer.fill.ironing import ironed_areas, ironing_beads
 from slicer.fill.region import Region, regions
-from slicer.fill.skin import SolidLines, angle_of_layer_deg, skin_lines
+from slicer.fill.skin import SolidLines, ironed_areas, ironing_beads, skin_lines
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, of_contours, offset, opening, union
 from slicer.interface.cut_faces import cover, cut_walls, model_sections
@@ -158,7 +157,8 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     shell, heights = shells.layers[layer], shells.sections.heights
     process, region, height_mm = shell.process, shell.region, float(heights.height_mm[layer])
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
-    lines = SolidLines(angle_of_layer_deg(process.infill_angle_deg, layer), width, height_mm, overlap)
+    angle_deg = process.infill_angle_deg + 90.0 * (layer % 2)  # neighbouring layers cross at right angles
+    lines = SolidLines(angle_deg, width, height_mm, overlap)
     beads = wall_beads(shell.walls, process, height_mm)
     for bridge in shell.bridges:
         area = bridge_area(bridge, shell.walls.inside, width)

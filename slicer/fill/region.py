@@ -75,97 +75,11 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
     return [region_of(inside, hollow[i], cover, i, on_plastic, process) for i, inside in enumerate(insides)]
 
 
-def region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process) -> Region:
-    """The region of one layer; uncut: what would be sparse there if the model were in one piece."""
-    empty = Polygons()
-    if inside.is_empty():
-        return Region(empty, empty, empty, empty, empty)
-    solid = on_plastic and layer < solid_bottom_layers(process)
-    sparse = empty if solid else _beside_cuts(inside, uncut, cover, layer, process)
-    next_section = cover.section(layer + 1) if shell_layers(process)[0] else inside
-    return _region(inside, sparse, uncut, next_section, process)
-
-
-def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process) -> list[Polygons]:
-    """The sparse places without those under walls which begin on them: a pocket's on its floor, a pillar's on its plate.
-
-    The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill.
-    """
-    width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
-    footings = [
-        opening((area ^ section) - inside, 0.5 * BESIDE * width_mm) if not area.is_empty() else area
-        for area, section, inside in zip(sparse, cover.sections[1:], cover.insides[1:], strict=False)
-    ]
-    left = list(sparse)
-    for i, area in enumerate(sparse):
-        begun = [footing for footing in footings[i : i + deep] if not footing.is_empty()]
-        if begun and not area.is_empty():
-            left[i] = _large(opening(area - offset(union(begun), ANCHOR * width_mm), width_mm), process)
-    return left
-
-
-def solid_bottom_layers(process: Process) -> int:
-    """Solid layers of a part on plastic: grooves are filled by skin, and pins hang on it."""
-    return max(process.interface_bottom_layers, 0 if process.interlock == "none" else 1)
-
-
-def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:
-    """What is sparse of a part where the uncut model is, without the skin under later parts."""
-    width_mm, reach = process.line_width_mm, process.interface_top_layers
-    near = [area for area in cover.later[max(layer - reach, 0) : layer + reach + 1] if not area.is_empty()]
-    if uncut.is_empty() or (not near and inside is cover.insides[layer]):
-        return uncut
-    left = uncut ^ inside
-    if not near:
-        return left
-    skin = opening(union(near) ^ inside, 0.5 * THIN * width_mm)
-    left = opening(left if skin.is_empty() else left - offset(skin, 0.5 * width_mm), width_mm)
-    return larger(left, FEW_MM2 * width_mm**2)
-
-
 def shell_layers(process: Process) -> tuple[int, int]:
     """Solid layers under and over a surface: as many as asked for, more where layers are thin; 0 stays 0."""
     counts = (process.top_layers, process.top_thickness_mm), (process.bottom_layers, process.bottom_thickness_mm)
     top, bottom = (max(count, ceil(mm / process.layer_height_mm - 1e-6)) if count else 0 for count, mm in counts)
     return top, bottom
-
-
-def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
-    """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
-    if process.infill_density >= 1.0 or inside.is_empty():
-        return Polygons()
-    width_mm = process.line_width_mm
-    covered = inside ^ above ^ below
-    sparse = inside
-    if inside.area() - covered.area() > 1e-6:
-        skin = opening(inside - covered, 0.25 * width_mm)
-        sparse = inside if skin.is_empty() else opening(inside - offset(skin, width_mm), width_mm)
-    return _large(sparse, process)
-
-
-def _large(sparse: Polygons, process: Process) -> Polygons:
-    """The sparse pieces that are worth leaving sparse; without infill all are."""
-    return larger(sparse, process.solid_below_mm2) if process.infill_density > 0.0 else sparse
-
-
-def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, process: Process) -> Region:
-    """Splits what is not sparse into top skin and the rest.
-
-    The lines of a top go on under the walls around it and as far as its anchor: a frame of its own there would be all line ends.
-    """
-    empty, width_mm = Polygons(), process.line_width_mm
-    if sparse.is_empty():
-        solid = inside
-    elif abs(sparse.area() - inside.area()) < 1e-6:
-        return Region(empty, empty, empty, sparse, uncut)
-    else:
-        solid = inside - sparse
-    bare = solid - next_section
-    bare = bare if bare.is_empty() else opening(bare, width_mm)
-    if bare.is_empty():
-        return Region(bare, bare, solid, sparse, uncut)
-    under = opening(solid - offset(bare, (process.walls + ANCHOR) * width_mm), width_mm)
-    return Region(bare, solid - under, under, sparse, uncut)
 
 
 def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
@@ -192,3 +106,77 @@ def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
             same_block = i // count == end // count
             common.append((forward[end] if i % count == 0 else backward[i]) if same_block else backward[i] ^ forward[end])
     return common
+
+
+def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
+    """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
+    if process.infill_density >= 1.0 or inside.is_empty():
+        return Polygons()
+    width_mm = process.line_width_mm
+    covered = inside ^ above ^ below
+    sparse = inside
+    if inside.area() - covered.area() > 1e-6:
+        skin = opening(inside - covered, 0.25 * width_mm)
+        sparse = inside if skin.is_empty() else opening(inside - offset(skin, width_mm), width_mm)
+    return _large(sparse, process)
+
+
+def _large(sparse: Polygons, process: Process) -> Polygons:
+    """The sparse pieces that are worth leaving sparse; without infill all are."""
+    return larger(sparse, process.solid_below_mm2) if process.infill_density > 0.0 else sparse
+
+
+def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process) -> list[Polygons]:
+    """The sparse places without those under walls which begin on them: a pocket's on its floor, a pillar's on its plate.
+
+    The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill.
+    """
+    width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
+    footings = [
+        opening((area ^ section) - inside, 0.5 * BESIDE * width_mm) if not area.is_empty() else area
+        for area, section, inside in zip(sparse, cover.sections[1:], cover.insides[1:], strict=False)
+    ]
+    left = list(sparse)
+    for i, area in enumerate(sparse):
+        begun = [footing for footing in footings[i : i + deep] if not footing.is_empty()]
+        if begun and not area.is_empty():
+            left[i] = _large(opening(area - offset(union(begun), ANCHOR * width_mm), width_mm), process)
+    return left
+
+
+def region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process) -> Region:
+    """The region of one layer; uncut: what would be sparse there if the model were in one piece."""
+    empty, width_mm = Polygons(), process.line_width_mm
+    if inside.is_empty():
+        return Region(empty, empty, empty, empty, empty)
+    wholly = on_plastic and layer < solid_bottom_layers(process)
+    sparse = empty if wholly else _beside_cuts(inside, uncut, cover, layer, process)
+    if not sparse.is_empty() and abs(sparse.area() - inside.area()) < 1e-6:
+        return Region(empty, empty, empty, sparse, uncut)
+    solid = inside if sparse.is_empty() else inside - sparse
+    bare = solid - (cover.section(layer + 1) if shell_layers(process)[0] else inside)
+    bare = bare if bare.is_empty() else opening(bare, width_mm)
+    if bare.is_empty():
+        return Region(bare, bare, solid, sparse, uncut)
+    # A top's lines go on under the walls around it and as far as its anchor: a frame of its own there would be all line ends.
+    under = opening(solid - offset(bare, (process.walls + ANCHOR) * width_mm), width_mm)
+    return Region(bare, solid - under, under, sparse, uncut)
+
+
+def solid_bottom_layers(process: Process) -> int:
+    """Solid layers of a part on plastic: grooves are filled by skin, and pins hang on it."""
+    return max(process.interface_bottom_layers, 0 if process.interlock == "none" else 1)
+
+
+def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:
+    """What is sparse of a part where the uncut model is, without the skin under later parts."""
+    width_mm, reach = process.line_width_mm, process.interface_top_layers
+    near = [area for area in cover.later[max(layer - reach, 0) : layer + reach + 1] if not area.is_empty()]
+    if uncut.is_empty() or (not near and inside is cover.insides[layer]):
+        return uncut
+    left = uncut ^ inside
+    if not near:
+        return left
+    skin = opening(union(near) ^ inside, 0.5 * THIN * width_mm)
+    left = opening(left if skin.is_empty() else left - offset(skin, 0.5 * width_mm), width_mm)
+    return larger(left, FEW_MM2 * width_mm**2)

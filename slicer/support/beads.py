@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import OUTSIDE, Bead, spacing_mm
-from slicer.fill.pattern import zigzag_lines
+from slicer.fill.lines import zigzag_lines
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset, opening
 from slicer.paths import Kind

@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import Bead
-from slicer.fill.infill import GYROID_LENGTH, PATTERNS, gyroid, honeycomb, infill_beads, pattern_density, side_mm
-from slicer.fill.pattern import PatternLayer, clip_pattern
+from slicer.fill.infill import GYROID_LENGTH, gyroid, honeycomb, infill_beads, pattern_density, side_mm
+from slicer.fill.lines import clip_pattern
 from slicer.geometry.clip import rotation_2d
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, offset
@@ -19,7 +19,8 @@ from slicer.geometry.polyline import length_mm
 from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, ring, square
 from tests.slicer.hand import as_shapely, distances_mm, profile
 
-PATTERN_NAMES = sorted([*PATTERNS, "concentric"])
+PATTERNS = ("cubic", "grid", "gyroid", "honeycomb", "rectilinear", "triangles")
+PATTERN_NAMES = ("concentric", *PATTERNS)
 
 
 def filled(
@@ -59,7 +60,7 @@ def test_infill_stays_inside_and_reaches_into_the_wall_by_the_overlap(pattern: s
     assert nearest > 0.5 * (WIDTH - HEIGHT * (1 - np.pi / 4)) - OVERLAP * WIDTH - 1e-3
 
 
-@pytest.mark.parametrize("pattern", sorted(PATTERNS))
+@pytest.mark.parametrize("pattern", PATTERNS)
 def test_infill_is_chained_into_few_long_paths(pattern: str) -> None:
     single = filled(square(), pattern, 0.2, anchor=0, joint=0)
     chained = filled(square(), pattern, 0.2)
@@ -88,7 +89,7 @@ def test_grid_lines_lie_on_each_other_in_all_layers() -> None:
 @pytest.mark.parametrize("height", [0.4, 3.0, 7.7, 12.1])
 def test_gyroid_lines_lie_on_the_minimal_surface(height: float) -> None:
     unit = GYROID_LENGTH * 0.4 / 0.2 / (2 * np.pi)
-    turned_deg, draw = gyroid(PatternLayer(0, height, 0.0, 0.4, 0.2))
+    turned_deg, draw = gyroid(height, 0.0, 0.4, 0.2)
     x, y = (draw((-20, -20, 20, 20))[0] @ rotation_2d(turned_deg).T / unit).T
     z = height / unit
     assert np.abs(np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)).max() < 1e-9
@@ -108,7 +109,7 @@ def test_cubic_lines_lie_on_planes_at_right_angles() -> None:
 
 
 def test_honeycomb_cells_are_regular_hexagons_of_the_density() -> None:
-    points, starts = honeycomb(PatternLayer(0, 0.0, 0.0, 0.4, 0.1))[1]((0, 0, 40, 40))
+    points, starts = honeycomb(0, 0.0, 0.4, 0.1)[1]((0, 0, 40, 40))
     line = points[: starts[1]]
     steps = np.diff(line, axis=0)
     flat, slanted = steps[0::2], steps[1::2]
@@ -127,7 +128,7 @@ def test_clipping_agrees_with_shapely(points: list[tuple[float, float]], angle: 
     hull = m3.CrossSection.hull_points(np.array(points))
     assume(hull.area() > 1.0)
     area = hull - Polygons.circle(4.0, 20).translate((3, 1)) - Polygons.square((30, 1.5)).rotate(33)
-    turned_deg, draw = gyroid(PatternLayer(0, 1.7, angle, 0.4, 0.4 / apart))
+    turned_deg, draw = gyroid(1.7, angle, 0.4, 0.4 / apart)
     pieces = clip_pattern(index_edges(area), turned_deg, draw)
     clipped_mm = sum(length_mm(pieces.points[a:b]) for a, b in pairwise(pieces.starts))
     drawn, starts = draw((-60, -60, 60, 60))

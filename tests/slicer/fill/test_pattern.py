@@ -7,7 +7,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from slicer.fill.pattern import zigzag_lines
+from slicer.fill.lines import zigzag_lines
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from tests.slicer.fill.areas import STARS

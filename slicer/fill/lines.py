@@ -1,0 +1,309 @@
+"""Lines: open lines over a box in a frame turned by an angle, clipped to an area, and joined along its border or to zigzags.
+
+Ends that follow each other on the border are joined by rising distance, unless that would close a ring or the distance
+is beyond a limit; an end left alone gets a short run along the border, towards the side with more room.
+"""
+
+from collections.abc import Callable
+from math import ceil
+
+import numpy as np
+
+from mdp.kernels.arrays import flags, floats, longs, table
+from mdp.kernels.kernel import helper, kernel, no_nrt
+from mdp.kernels.sorting import argsort
+from mdp.mesh import Floats
+from slicer.geometry.clip import NO_PIECES, Indices, Pieces, clip_lines, rotation_2d
+from slicer.geometry.edge_index import EdgeIndex, free, index_edges
+from slicer.geometry.polygons import Polygons
+from slicer.geometry.segments import Segment
+
+Box = tuple[float, float, float, float]
+Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
+Draw = Callable[[Box], Lines]  # for a box x0 y0 x1 y1
+LinePattern = tuple[float, Draw]  # the angle of the frame, deg, in which it is drawn
+MARGIN_MM = 0.1  # lines begin and end this far outside the box
+TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
+
+
+def clip_pattern(border: EdgeIndex, angle_deg: float, draw: Draw) -> Pieces:
+    """What of a pattern, drawn in a frame turned by an angle, lies inside a border, in the border's own frame."""
+    if not len(border.edges):
+        return NO_PIECES
+    turn = rotation_2d(angle_deg)
+    corners = border.edges[:, :2] @ turn
+    (x0, y0), (x1, y1) = corners.min(axis=0) - MARGIN_MM, corners.max(axis=0) + MARGIN_MM
+    points, starts = draw((x0, y0, x1, y1))
+    return clip_lines(points @ turn.T, starts, border)
+
+
+def parallel_lines(angle_deg: float, apart_mm: float, shift_mm: float = 0.0) -> LinePattern:
+    """Straight lines at an angle, on a grid that is the same in every layer but for a shift across the lines."""
+
+    def draw(box: Box) -> Lines:
+        return horizontal_lines((grid_numbers(box[1] - shift_mm, box[3] - shift_mm, apart_mm) + 0.5) * apart_mm + shift_mm, box)
+
+    return angle_deg, draw
+
+
+def grid_numbers(low: float, high: float, apart_mm: float) -> Floats:
+    """Whole numbers k for which (k + 1/2) apart lies between low and high: a grid that is the same in every layer."""
+    return np.arange(ceil(low / apart_mm - 0.5), ceil(high / apart_mm - 0.5), dtype=np.float64)
+
+
+def horizontal_lines(heights: Floats, box: Box) -> Lines:
+    """Horizontal lines across a box."""
+    points = np.empty((len(heights), 2, 2))
+    points[:, 0, 0], points[:, 1, 0] = box[0], box[2]
+    points[:, :, 1] = heights[:, None]
+    return points.reshape(-1, 2), 2 * np.arange(len(heights))
+
+
+def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: float, reach_mm: float) -> list[Floats]:
+    """Lines (n, 2) on the grid of parallel_lines that end on the border of an area.
+
+    Ends of neighbouring lines nearer than reach_mm are joined unless the fence lies between them.
+    """
+    pieces = clip_pattern(index_edges(area), *parallel_lines(angle_deg, apart_mm))
+    if not len(pieces.ends):
+        return []
+    number = np.rint((pieces.points[::2] @ rotation_2d(angle_deg))[:, 1] / apart_mm - 0.5)
+    following = np.column_stack([np.searchsorted(number, number + 1.0, side) for side in ("left", "right")])
+    points, starts = _join(pieces.points.reshape(-1, 4), following, index_edges(fence), reach_mm)
+    return np.split(points, starts[1:])
+
+
+@kernel
+def _join(lines: Floats, following: Indices, fence: EdgeIndex, reach_mm: float) -> tuple[Floats, Indices]:
+    """Lines (n, 4) joined end to end where one of the next row begins within reach and no edge of the fence lies between.
+
+    following: (n, 2) first of the next row's lines, and first after them. Returns points (n, 2) and the start of each polyline.
+    """
+    points, starts, used = table(2 * len(lines), 2), longs(len(lines), 0), flags(len(lines))
+    n = count = 0
+    for seed in range(len(lines)):
+        if used[seed]:
+            continue
+        starts[count] = n
+        count += 1
+        at, end = seed, 2  # the column at which a line is left
+        while at >= 0:
+            used[at] = True
+            for axis in range(2):
+                points[n, axis], points[n + 1, axis] = lines[at, 2 - end + axis], lines[at, end + axis]
+            x, y = points[n + 1, 0], points[n + 1, 1]
+            n += 2
+            best, best_end, nearest = -1, 0, reach_mm
+            for k in range(following[at, 0], following[at, 1]):
+                for begin in range(0, 0 if used[k] else 4, 2):
+                    to_x, to_y = lines[k, begin], lines[k, begin + 1]
+                    distance = np.hypot(to_x - x, to_y - y)
+                    if distance < nearest and free(fence, Segment(x, y, to_x, to_y)):
+                        best, best_end, nearest = k, 2 - begin, distance
+            at, end = best, best_end
+    return points[:n], starts[:count]
+
+
+def anchor_lines(
+    pieces: Pieces, border: EdgeIndex, most_mm: float, hook_mm: float = 0.0, apart_mm: float = 0.0, group: Indices | None = None
+) -> list[Floats]:
+    """Pieces as long lines (n, 2): joined where ends are at most most_mm apart along the border, else with hooks.
+
+    hook_mm: length of a hook, less where it would not keep apart_mm from the next end or hook; group: (k,) only pieces of one
+    group are joined.
+    """
+    if not len(pieces.ends):
+        return []
+    own = np.zeros(len(pieces.ends), np.int64) if group is None else group
+    out = np.empty((len(pieces.points) + 2 * len(border.edges) + 4 * len(pieces.ends) + 8, 2))
+    starts = np.empty(len(pieces.ends), np.int64)
+    n, count = _lay_lines(pieces, border, own, (most_mm, hook_mm, apart_mm), out, starts)
+    return np.split(out[:n].copy(), starts[1:count])
+
+
+@kernel
+def _lay_lines(
+    pieces: Pieces, border: EdgeIndex, group: Indices, limits_mm: tuple[float, float, float], out: Floats, starts: Indices
+) -> tuple[int, int]:
+    """Fills in the lines and where each begins; returns the number of points and of lines. limits_mm: as anchor_lines."""
+    most_mm, hook_mm, apart_mm = limits_mm
+    way = _way(border.edges)
+    along_border = _ways_along_border(pieces, border.edges, way)
+    after, gap = _next_ends(along_border, pieces.ends, border, way)
+    partner, sense = _join_ends(after, gap, group, most_mm)
+    runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, hook_mm, apart_mm))
+    done = flags(len(pieces.ends))
+    n = count = 0
+    for seed in range(len(pieces.ends)):
+        if done[seed]:
+            continue
+        end = 2 * seed
+        while partner[end] >= 0:
+            end = partner[end] ^ 1
+        starts[count] = n
+        count += 1
+        if runs[end] != 0.0:
+            since = (pieces.ends[end // 2, end % 2], along_border[end])
+            first, n = n, _append_run(out, n, since, runs[end], border, way)
+            _reverse(out, first, n)
+        while True:
+            done[end // 2] = True
+            n = _append_piece(out, n, pieces, end)
+            end ^= 1
+            if runs[end] != 0.0:
+                since = (pieces.ends[end // 2, end % 2], along_border[end])
+                n = _append_run(out, n, since, runs[end], border, way)
+            if partner[end] < 0:
+                break
+            n -= 1  # the run's last point is the partner itself
+            end = partner[end]
+    return n, count
+
+
+@helper
+def _way(edges: Floats) -> Floats:
+    """(m + 1,) way along all contours to the beginning of each edge, mm."""
+    way: Floats = floats(len(edges) + 1, 0.0)
+    for e in range(len(edges)):
+        way[e + 1] = way[e] + np.hypot(edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1])
+    return way
+
+
+@helper
+def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
+    """(2 k,) way along all contours to each end."""
+    points, bounds, ends = pieces
+    along_border: Floats = floats(2 * len(ends), 0.0)
+    for k in range(len(ends)):
+        for side in range(2):
+            p, e = bounds[k + 1] - 1 if side else bounds[k], ends[k, side]
+            along = np.hypot(points[p, 0] - edges[e, 0], points[p, 1] - edges[e, 1])
+            along_border[2 * k + side] = min(way[e] + along, way[e + 1])
+    return along_border
+
+
+@helper
+def _next_ends(along_border: Floats, ends: Indices, border: EdgeIndex, way: Floats) -> tuple[Indices, Floats]:
+    """The next end along the contour from each end (itself if it is alone), and its distance. ends: (k, 2) edges they lie on."""
+    order, contour = argsort(along_border), longs(len(along_border), 0)
+    for end in range(len(contour)):
+        contour[end] = border.loop[ends[end // 2, end % 2]]
+    after, gap = longs(len(along_border), 0), floats(len(along_border), 0.0)
+    i = 0
+    while i < len(order):
+        c, j = contour[order[i]], i
+        while j < len(order) and contour[order[j]] == c:
+            j += 1
+        for k in range(i, j):
+            here, there = order[k], order[k + 1 if k + 1 < j else i]
+            after[here] = there
+            gap[here] = along_border[there] - along_border[here]
+            if k + 1 == j:
+                gap[here] += way[border.begins[c + 1]] - way[border.begins[c]]
+        i = j
+    return after, gap
+
+
+@helper
+def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> tuple[Indices, Indices]:
+    """Of each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
+    partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
+    for here in range(len(after)):
+        ties[here] = np.rint(gap[here] / TIE_MM)
+    order, root = argsort(ties), longs(len(after) // 2, 0)
+    for k in range(len(root)):
+        root[k] = k
+    for here in order:
+        there = after[here]
+        if gap[here] > most_mm:
+            break
+        if partner[here] >= 0 or partner[there] >= 0:
+            continue
+        a, b = here // 2, there // 2
+        if group[a] != group[b]:
+            continue
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        if a != b:
+            root[a] = b
+            partner[here], partner[there], sense[here], sense[there] = there, here, 1, -1
+    return partner, sense
+
+
+@helper
+def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm: float) -> Floats:
+    """Of each end the length of its hook, negative for a way back along the border."""
+    hooks: Floats = floats(len(after), 0.0)
+    free, before = floats(len(after), 0.0), longs(len(after), 0)
+    for here in range(len(after)):
+        before[after[here]] = here
+        free[here] = 0.0 if sense[here] == 1 else gap[here] - apart_mm
+    for here in range(len(after)):
+        if partner[here] < 0:
+            back = before[here]
+            side = here if free[here] >= free[back] else back
+            length = min(hook_mm, free[side])
+            if length > apart_mm:
+                hooks[here] = length if side == here else -length
+                free[side] -= length + apart_mm
+    return hooks
+
+
+@helper
+def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Floats:
+    """Of each end the length of its run along the border, to its partner or as a hook; negative: backward."""
+    runs: Floats = floats(len(partner), 0.0)
+    for here in range(len(partner)):
+        runs[here] = hooks[here]
+        if partner[here] >= 0:
+            runs[here] = gap[here] if sense[here] > 0 else -gap[partner[here]]
+    return runs
+
+
+@no_nrt
+def _append_run(out: Floats, n: int, since: tuple[int, float], length: float, border: EdgeIndex, way: Floats) -> int:
+    """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
+
+    since: the point's edge, and the way to it. Also the run's last point; returns the new n.
+    """
+    e, way_mm = since
+    edges, first, end = border.edges, border.begins[border.loop[e]], border.begins[border.loop[e] + 1]
+    left, forward = abs(length), length > 0.0
+    at = way_mm - way[e] if forward else way[e + 1] - way_mm
+    step = way[e + 1] - way[e]
+    corner = 2 if forward else 0
+    while left > step - at:
+        left -= step - at
+        out[n, 0], out[n, 1] = edges[e, corner], edges[e, corner + 1]
+        n += 1
+        e += 1 if forward else -1
+        e = first if e == end else end - 1 if e < first else e
+        step, at = way[e + 1] - way[e], 0.0
+    share = (at + left) / step if step > 0.0 else 0.0
+    share = share if forward else 1.0 - share
+    out[n, 0] = edges[e, 0] + share * (edges[e, 2] - edges[e, 0])
+    out[n, 1] = edges[e, 1] + share * (edges[e, 3] - edges[e, 1])
+    return n + 1
+
+
+@no_nrt
+def _append_piece(out: Floats, n: int, pieces: Pieces, end: int) -> int:
+    """Appends the points of a piece, beginning at one of its ends; returns the new n."""
+    first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
+    for i in range(last - first + 1):
+        p = first + i if end % 2 == 0 else last - i
+        out[n, 0], out[n, 1] = pieces.points[p, 0], pieces.points[p, 1]
+        n += 1
+    return n
+
+
+@helper
+def _reverse(out: Floats, first: int, end: int) -> None:
+    """Turns round the order of points first .. end - 1."""
+    for k in range((end - first) // 2):
+        for axis in range(2):
+            out[first + k, axis], out[end - 1 - k, axis] = out[end - 1 - k, axis], out[first + k, axis]
