@@ -1,6 +1,6 @@
 """Bead: a piece of plastic to lay down, before its place in the order, its speed and its travel are known; how wide beads are."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import pi
 
@@ -9,7 +9,7 @@ import numpy as np
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.process import WIDTHS, Process
-from slicer.geometry.polyline import length_mm, simplify
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
@@ -76,12 +76,6 @@ class Bead:
     def length_mm(self) -> float:
         """Length of the bead."""
         return length_mm(self.points)
-
-
-def simplify_bead(bead: Bead) -> Bead:
-    """The bead with its points simplified."""
-    points = simplify(bead.points)
-    return bead if points is bead.points else replace(bead, points=points)
 
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:

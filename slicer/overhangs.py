@@ -4,17 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
-import numpy as np
-
-from mdp.mesh import Floats, Mesh
-from mdp.overhang import UP, Mask, facing_down
+from mdp.overhang import UP, facing_down
 from mdp.support_need.need import needs_support
 from slicer.fill.bridge import LEAST, Bridge, find_bridge
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, offset, union
-from slicer.sections import Sections
+from slicer.sectioning import RIM_MM, Sections, faces_by_layer
 
-RIM_MM = 0.04  # the shadows of faces in neighbouring layers overlap by this so that they unite
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
 HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
 
@@ -62,20 +58,6 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
                 overhang = replace(overhang, hanging=wanted, unwanted=overhang.hanging - wanted)
             overhangs[i] = overhang
     return overhangs
-
-
-def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
-    """Chosen faces seen from above, (3, 2) counter-clockwise where they look down, by the layers whose strip of the surface they
-    belong to."""
-    corners = mesh.vertices[mesh.faces[chosen]]
-    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1), side="right")  # a section is what lies just below its plane
-    last = np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1))
-    last = np.minimum(np.maximum(last, first), len(cuts_mm) - 1)
-    faces: dict[int, list[Floats]] = {}
-    for corner, a, b in zip(np.ascontiguousarray(corners[:, ::-1, :2]), first.tolist(), last.tolist(), strict=True):
-        for layer in range(a, b + 1):
-            faces.setdefault(layer, []).append(corner)
-    return faces
 
 
 def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons:

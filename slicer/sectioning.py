@@ -3,24 +3,29 @@
 Outsides and holes may be compensated, larger or smaller, so that the print's sizes are the model's: plastic bulges and shrinks
 where it meets air. A cut face meets plastic: what lies beside it, of a part printed later, stays where it is, or the parts would
 leave a gap or be pressed into each other. Nor does what is added beside the end of a cut reach over the later part's base plane,
-above which the head moves; over that of a limb only beside the limb.
+above which the head moves; over that of a limb only beside the limb. What a person marked on a part is known by layers, too.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from mdp.cut import convex_hull
 from mdp.decomposition import Part
-from mdp.mesh import Floats, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.mesh import Floats, Indices, Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
+from mdp.zone import Zone, touched
 from profiles.machine import Table
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import (
     first_layer_process,
     least_width_mm,
+    with_line_width,
 )
 from slicer.fill.region import shell_layers
 from slicer.geometry.polygons import (
@@ -39,13 +44,9 @@ from slicer.geometry.polygons import (
 )
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights, pedestal_layers
-from slicer.interface.base_plane import limb_planes, plane_in_frame_of
-from slicer.interface.interface import joints, near_parts, plastic_below, sections_of
+from slicer.interface.interface import joints, limb_planes, near_parts, plane_in_frame_of, plastic_below, sections_of
 from slicer.interface.interlock import Pins, cut_grooves, cut_pins, grooves, plan_pins
-from slicer.sections import Sections
-from slicer.strokes.vase import vase_profile
 from slicer.walls.counts import FEATURE
-from slicer.zones import no_seam_segments, no_support_areas
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
 TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
@@ -53,6 +54,66 @@ BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base 
 
 
 HAIR_MM = 0.04  # nobody can tell whether a piece only so much thicker than the thinnest gets a line all along
+RIM_MM = 0.04  # the shadows of faces in neighbouring layers overlap by this so that they unite
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """A part's layers, one entry each, before anything is laid, and all that is known of the model's other parts around them.
+
+    Part: printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame.
+    Layers: `outlines` are all of each; `own` without the pedestal, `ungrooved` those before the grooves for later parts.
+    Model around: later parts have `beside` of each layer and `above` of those over the last one, as many as shells reach; the
+    model has `beneath` of those under the base plane, the nearest first, () where earlier parts are not known; earlier parts
+    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is its
+    outline, of use to part 1. `joints`, (k, 6) segments, are where the part meets others on the surface.
+    Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
+    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, () for nowhere.
+    pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold something, but nothing that gets a
+    line.
+    """
+
+    part: Part
+    earlier: Sequence[Part]
+    later: Sequence[Part]
+    profile: Profile
+    mesh: Mesh
+    heights: Heights
+    outlines: Sequence[Polygons]
+    own: Sequence[Polygons]
+    ungrooved: Sequence[Polygons]
+    beside: Sequence[Polygons]
+    plastic_below: Polygons | None
+    plate: Polygons
+    above: Sequence[Polygons] = ()
+    beneath: Sequence[Polygons] = ()
+    standing: Sequence[Polygons] = ()
+    joints: Floats = field(default_factory=lambda: np.zeros((0, 6)))
+    pins: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    grooves: Polygons = field(default_factory=Polygons)
+    no_seam: Sequence[Floats] = ()
+    no_support: Sequence[Polygons] = ()
+    pedestal_layers: int = 0
+    too_thin: frozenset[int] = frozenset()
+
+    @property
+    def on_platform(self) -> bool:
+        """Whether the part is the first one."""
+        return self.part.index == 1
+
+    @property
+    def process(self) -> Process:
+        """The settings of the part."""
+        return self.profile.process
+
+    @cached_property
+    def support_process(self) -> Process:
+        """The settings of its support, with the width of its lines."""
+        return with_line_width(self.process, self.process.support_line_width_mm)
+
+    def below(self, layer: int) -> Polygons | None:
+        """The plastic that a layer lies on; None for the platform."""
+        return self.outlines[layer - 1] if layer else self.plastic_below
 
 
 def section_part(
@@ -120,6 +181,14 @@ def section_part(
     )
 
 
+def vase_profile(profile: Profile) -> Profile:
+    """The profile with which the bottom is sliced, and which knows of one wall and no inside above it."""
+    if not profile.process.spiral_vase:
+        return profile
+    hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
+    return profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
+
+
 def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_mm: float) -> Polygons:
     """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
     least_mm = FEATURE * least_width_mm(nozzle_mm, height_mm)
@@ -131,40 +200,6 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
 def _is_hair(piece: Polygons, least_mm: float) -> bool:
     around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
     return bool(2.0 * piece.area() < least_mm * around_mm and offset(piece, -0.5 * least_mm).is_empty())
-
-
-def plate_outline(table: Table) -> Polygons:
-    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
-    if table.size_mm is not None:
-        return Polygons.square(table.size_mm, True)
-    return Polygons.circle(table.radius_mm, 180)
-
-
-def _model_around(
-    part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process
-) -> tuple[list[Polygons], list[Polygons], list[Polygons]]:
-    """What later parts have of a part's layers and of those over them, and what the model has of those under its base plane, the
-    nearest first: as many layers as its shells reach."""
-    (top, bottom), step = shell_layers(process), process.layer_height_mm
-    over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
-    far_mm = max(step * max(top, bottom, process.interface_top_layers), reach_mm(process))
-    before, after = (near_parts(part, others, far_mm) for others in (earlier, later))
-    others, count = sections_of(after, part, np.concatenate([heights.cut_mm, over])), len(heights.cut_mm)
-    deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
-    beneath = [closing(model, CLOSING_MM) for model in sections_of([*before, *after], part, deep)[::-1]] if earlier else []
-    return others[:count], others[count:], beneath
-
-
-def _without_pedestal(
-    outlines: Sequence[Polygons], mesh: Mesh, cuts_mm: Floats, pedestal_mm: float, layers: int
-) -> list[Polygons]:
-    """Outlines of the model alone: empty in the pedestal, and its own foot where it is sunk into the pedestal's top."""
-    sunk_mm = pedestal_mm + PLATFORM_TOLERANCE_MM
-    foot = clean(cross_sections(mesh, np.array([sunk_mm + ABOVE_MM]))[0])
-    if foot.is_empty():
-        foot = outlines[-1]
-    above = [o ^ foot if cut < sunk_mm else o for o, cut in zip(outlines[layers:], cuts_mm[layers:].tolist(), strict=True)]
-    return [*([Polygons()] * layers), *above]
 
 
 def lay_on_plate(outlines: Sequence[Polygons], lowest: int, base: Polygons, width_mm: float) -> list[Polygons]:
@@ -180,6 +215,21 @@ def lay_on_plate(outlines: Sequence[Polygons], lowest: int, base: Polygons, widt
         return list(outlines)
     laid = offset(wide, ledge_mm + 0.5 * width_mm) ^ base
     return [*(outline + laid for outline in outlines[:lowest]), *outlines[lowest:]]
+
+
+def _model_around(
+    part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process
+) -> tuple[list[Polygons], list[Polygons], list[Polygons]]:
+    """What later parts have of a part's layers and of those over them, and what the model has of those under its base plane, the
+    nearest first: as many layers as its shells reach."""
+    (top, bottom), step = shell_layers(process), process.layer_height_mm
+    over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
+    far_mm = max(step * max(top, bottom, process.interface_top_layers), reach_mm(process))
+    before, after = (near_parts(part, others, far_mm) for others in (earlier, later))
+    others, count = sections_of(after, part, np.concatenate([heights.cut_mm, over])), len(heights.cut_mm)
+    deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
+    beneath = [closing(model, CLOSING_MM) for model in sections_of([*before, *after], part, deep)[::-1]] if earlier else []
+    return others[:count], others[count:], beneath
 
 
 def reach_mm(process: Process) -> float:
@@ -246,3 +296,111 @@ def compensate_elephant_foot(outline: Polygons, elephant_foot_mm: float, width_m
     deep = elephant_foot_mm + 0.5 * width_mm
     narrow = outline - offset(offset(outline, -deep), deep + 0.01)
     return offset(outline, -elephant_foot_mm) + narrow
+
+
+def _without_pedestal(
+    outlines: Sequence[Polygons], mesh: Mesh, cuts_mm: Floats, pedestal_mm: float, layers: int
+) -> list[Polygons]:
+    """Outlines of the model alone: empty in the pedestal, and its own foot where it is sunk into the pedestal's top."""
+    sunk_mm = pedestal_mm + PLATFORM_TOLERANCE_MM
+    foot = clean(cross_sections(mesh, np.array([sunk_mm + ABOVE_MM]))[0])
+    if foot.is_empty():
+        foot = outlines[-1]
+    above = [o ^ foot if cut < sunk_mm else o for o, cut in zip(outlines[layers:], cuts_mm[layers:].tolist(), strict=True)]
+    return [*([Polygons()] * layers), *above]
+
+
+def plate_outline(table: Table) -> Polygons:
+    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
+    if table.size_mm is not None:
+        return Polygons.square(table.size_mm, True)
+    return Polygons.circle(table.radius_mm, 180)
+
+
+def no_seam_segments(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Floats]:
+    """(k, 6) for each layer segments of the part's frame at its middle, one of cuts_mm: what that cuts of the faces that the
+    part's zones name, and of all faces within their boxes. mesh: the part's, in its frame."""
+    marked = part.no_seam
+    chords = [_chords(mesh, np.zeros(len(mesh.faces), dtype=np.bool_) if marked.faces is None else marked.faces, cuts_mm)]
+    for box in marked.boxes:
+        segments, layer = _chords(mesh, touched(part.mesh, [box]), cuts_mm)
+        low, high = _within((segments + np.array([0.0, 0.0, part.base.offset_mm])) @ part.rotation, box)
+        inside = low < high
+        start, along = segments[inside, 0], segments[inside, 1] - segments[inside, 0]
+        ends = start[:, None] + np.stack([low[inside], high[inside]], axis=1)[..., None] * along[:, None]
+        chords.append((ends, layer[inside]))
+    segments, layer = (np.concatenate(columns) for columns in zip(*chords, strict=True))
+    order = np.argsort(layer, kind="stable")
+    first = np.searchsorted(layer[order], np.arange(1, len(cuts_mm)))
+    return np.split(segments[order].reshape(-1, 6), first)
+
+
+def _chords(mesh: Mesh, chosen: Mask, cuts_mm: Floats) -> tuple[Floats, Indices]:
+    """(k, 2, 3) what level planes cut of the chosen faces, and (k,) which plane each is of."""
+    corners = mesh.vertices[mesh.faces[chosen]]
+    heights = corners[:, :, 2]
+    first, last = np.searchsorted(cuts_mm, heights.min(axis=1)), np.searchsorted(cuts_mm, heights.max(axis=1))
+    counts = last - first
+    face = np.repeat(np.arange(len(corners)), counts)
+    layer = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)
+    around = corners[face]
+    above = around[:, :, 2] - cuts_mm[layer][:, None]
+    after, beyond = np.roll(around, -1, axis=1), np.roll(above, -1, axis=1)
+    crossed = (above > 0.0) != (beyond > 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = around + (above / (above - beyond))[..., None] * (after - around)
+    return places[crossed].reshape(-1, 2, 3), layer[crossed.any(axis=1)]
+
+
+def _within(segments: Floats, box: Zone) -> tuple[Floats, Floats]:
+    """Shares along (k, 2, 3) segments between which each lies in a box; the first is the greater where none of it does."""
+    segments = box.along(segments)
+    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, last = (np.array(box.min_mm) - start) / along, (np.array(box.max_mm) - start) / along
+    outside = (along == 0.0) & ((start < box.min_mm) | (start > box.max_mm))
+    enters = np.where(along == 0.0, -np.inf, np.minimum(first, last))
+    leaves = np.where(along == 0.0, np.inf, np.maximum(first, last))
+    low, high = enters.max(axis=1).clip(0.0, 1.0), leaves.min(axis=1).clip(0.0, 1.0)
+    return low, np.where(outside.any(axis=1), low, high)
+
+
+def no_support_areas(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
+    """For each layer the sections of the boxes and the shadows of the faces, as they belong to it, that get no support; [] for a
+    part that may have some everywhere.
+
+    mesh: the part's, in its frame; cuts_mm: the middles of the layers.
+    """
+    marked = part.no_support
+    if not marked.anywhere:
+        return []
+    named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))
+    boxes = [convex_hull(box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm)) for box in marked.boxes]
+    sections = [cross_sections(box, cuts_mm) for box in boxes]
+    layers = []
+    for k in range(len(cuts_mm)):
+        pieces = [Polygons(loops[k]) for loops in sections]
+        if k in named:
+            pieces.append(offset(Polygons([_upward(face) for face in named[k]]), RIM_MM))
+        layers.append(union(pieces))
+    return layers
+
+
+def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
+    """Chosen faces seen from above, (3, 2) counter-clockwise where they look down, by the layers whose strip of the surface they
+    belong to."""
+    corners = mesh.vertices[mesh.faces[chosen]]
+    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1), side="right")  # a section is what lies just below its plane
+    last = np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1))
+    last = np.minimum(np.maximum(last, first), len(cuts_mm) - 1)
+    faces: dict[int, list[Floats]] = {}
+    for corner, a, b in zip(np.ascontiguousarray(corners[:, ::-1, :2]), first.tolist(), last.tolist(), strict=True):
+        for layer in range(a, b + 1):
+            faces.setdefault(layer, []).append(corner)
+    return faces
+
+
+def _upward(face: Floats) -> Floats:
+    """The shadow (3, 2) of a face, counter-clockwise."""
+    (ax, ay), (bx, by) = face[1] - face[0], face[2] - face[0]
+    return face if ax * by - ay * bx > 0.0 else face[::-1]

@@ -1,13 +1,20 @@
-"""Slicing: one part of a decomposition becomes layers of paths in its own frame.
+"""Slicing: the parts of a decomposition become layers of paths, each in its own frame.
 
-Each value is made from the one before: the part's sections (slicer.sectioning), what of them overhangs (slicer.overhangs), the
+Each value is made from the one before: a part's sections (slicer.sectioning), what of them overhangs (slicer.overhangs), the
 support that this needs (slicer.support.support; for all parts together slicer.support.handed_down), the shells of every
-layer and its beads (slicer.shells), and these in order, with speed and flow.
+layer and its beads (slicer.shells), and these in order, with speed and flow (slicer.strokes).
+
+First the support of all parts is planned together, for what one part's support stands on may be printed with another. From
+then on a part's paths depend on nothing but the plan and the profile, so the result is the same bit for bit however many
+processes slice. Where one part is most of the print, its layers are worked out side by side instead.
 """
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from math import ceil, pi
+from mmap import mmap
 
 import numpy as np
 
@@ -17,29 +24,112 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import Bead
+from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons
-from slicer.interface.cut_faces import interface_mm3
+from slicer.geometry.polyline import length_mm
 from slicer.interface.interface import skin_beside
-from slicer.interface.interlock import begin_inside, fill_grooves, fill_pins
+from slicer.interface.interlock import pin_width_mm, plan_pins
 from slicer.overhangs import Overhang, find_overhangs
-from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, Unsupported
-from slicer.sectioning import section_part
-from slicer.sections import Sections
-from slicer.shells import FEWEST_LAYERS, Shells, build_shells, lay_beads
+from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, bead_area_mm2
+from slicer.sectioning import Sections, section_part
+from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, lay_beads
 from slicer.strokes.order import order_beads
-from slicer.strokes.overhanging import split_overhangs
-from slicer.strokes.pieces import in_pieces
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams, rear_of, seam_limits
 from slicer.strokes.seam_plan import plan_seams
 from slicer.strokes.speed import fan_share, first_layer_speeds, layer_time_s, own_fans, rising_fan, speeds_mm_s
-from slicer.strokes.strokes import Strokes
+from slicer.strokes.strokes import Strokes, in_pieces, split, split_overhangs
+from slicer.strokes.travels import may_wipe_over
 from slicer.strokes.vase import bottom_layers, vase_layers
-from slicer.strokes.wiping import may_wipe_over
-from slicer.support.missed import explain
-from slicer.support.support import Supports, own_supports
+from slicer.support.handed_down import plan_supports
+from slicer.support.support import Supports, explain, own_supports
 
+FEWEST_IN_ALL = 250  # fewer are sliced sooner than processes are forked and their paths brought back
+LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it
 OnLayer = Callable[[int, int], None]
+
+
+SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
+
+
+RANK = OUTSIDE - 1  # before all else of the layer
+ROUND = 12  # chords of a circle that the tip goes
+MOST_AREA = 3.0  # of a stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
+
+
+@dataclass(frozen=True, eq=False)
+class SlicingProgress:
+    """How far slicing is, part by part in print order: layers done, how many are expected, and the parts that are sliced."""
+
+    layers: tuple[int, ...]
+    expected: tuple[int, ...]
+    ready: tuple[SlicedPart | None, ...]
+
+    @property
+    def begun(self) -> int:
+        """How many parts are sliced or being sliced."""
+        return sum(count > 0 for count in self.layers)
+
+    @property
+    def share(self) -> float:
+        """What of all layers is done, 0 to 1, an estimate that never falls: a part that is ready may have fewer than expected."""
+        pieces = zip(self.layers, self.expected, self.ready, strict=True)
+        return sum(of if piece else min(count, of) for count, of, piece in pieces) / max(sum(self.expected), 1)
+
+
+def slice_parts(
+    parts: Sequence[Part], profile: Profile, on_progress: Callable[[SlicingProgress], None] | None = None
+) -> tuple[SlicedPart, ...]:
+    """Every part sliced; on_progress: called now and then.
+
+    Raises SliceError as slice_part does, for the first part in print order that has a reason.
+    """
+    if not parts:
+        return ()
+    if profile.process.spiral_vase and len(parts) > 1:
+        raise SliceError(
+            f"process.spiral_vase climbs round a model in one part, this one is in {len(parts)}: --parts 1 prints it in one piece"
+        )
+    pins = plan_pins(parts, profile)
+    sections = [section_part(part, profile, parts[:k], parts[k + 1 :], pins) for k, part in enumerate(parts)]
+    overhangs = [find_overhangs(layers) for layers in sections]
+    supports = plan_supports([own_supports(*pair) for pair in zip(sections, overhangs, strict=True)])
+    expected = [len(support.areas) for support in supports]
+    layers = np.frombuffer(mmap(-1, 4 * len(parts)), np.int32)  # those that are done: other processes write them, too
+    ready: list[SlicedPart | None] = [None] * len(parts)
+    errors: dict[int, SliceError] = {}
+    here = os.getpid()
+
+    def show() -> None:
+        if on_progress is not None and os.getpid() == here:
+            on_progress(SlicingProgress(tuple(layers.tolist()), tuple(expected), tuple(ready)))
+
+    def sliced(k: int) -> SlicedPart | SliceError:
+        def on_layer(layer: int, of: int) -> None:
+            layers[k] = layer
+            show()
+
+        try:
+            return slice_supported(supports[k], overhangs[k], on_layer)
+        except SliceError as error:
+            return error
+
+    by_layers = max(expected) > LARGEST_SHARE * sum(expected) or sum(expected) < FEWEST_IN_ALL
+    largest_first = sorted(range(len(parts)), key=lambda k: (-expected[k], k))  # so that no large one is left for the end
+    results = (
+        map(sliced, largest_first)
+        if by_layers
+        else parallel_map(lambda place: sliced(largest_first[place]), len(parts), helps=False, on_wait=show)
+    )
+    for k, result in zip(largest_first, results, strict=True):
+        if isinstance(result, SliceError):
+            errors[k] = result
+        else:
+            ready[k] = result
+            layers[k] = len(result.layers)
+            show()
+    if errors:
+        raise errors[min(errors)]
+    return tuple(piece for piece in ready if piece is not None)
 
 
 def slice_part(
@@ -103,45 +193,12 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     return SlicedPart(
         sections.part.index,
         tuple(layers),
-        _unsupported(supports, layers),
+        explain(supports, np.array([layer.z_mm for layer in layers])),
         interface_mm3(sections, shells.regions),
         len(too_thin),
         float(sections.heights.tip_mm[too_thin[0]]) if too_thin else 0.0,
         len(sections.pins),
     )
-
-
-def _unsupported(supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupported, ...]:
-    """The places that got no support, with the numbers of the layers that print anything."""
-    tops = np.array([layer.z_mm for layer in layers])
-    count = np.searchsorted(tops, supports.sections.heights.tip_mm, side="right")
-    return tuple(
-        replace(area, layer=int(count[area.layer])) for area in explain(supports.sections, supports.missed, supports.unwanted)
-    )
-
-
-def order_layer(
-    beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons
-) -> tuple[Strokes, Floats, float]:
-    """The beads of a layer in order, with their (k,) speeds and the flow of all of them.
-
-    tip: where the layer below ends; skin: its outer walls beside the edges of interfaces.
-    """
-    sections, own, height_mm = shells.sections, shells.layers[index].process, float(shells.sections.heights.height_mm[index])
-    profile, process, on_platform, outline = sections.profile, sections.process, sections.on_platform, sections.outlines[index]
-    if index == 0 and not on_platform:
-        beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
-    strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
-    strokes = split_overhangs(strokes, outline, sections.below(index), own)
-    if index == 0 and not on_platform and process.interlock == "grooves":
-        strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
-    fixed: Mapping[Kind, float] | None = None
-    flow = profile.material.flow
-    if index == 0:
-        fixed = first_layer_speeds(process, on_platform)
-        flow *= process.first_layer_flow if on_platform else process.interface_flow
-    strokes = in_pieces(strokes, height_mm)
-    return strokes, speeds_mm_s(strokes, profile, height_mm, fixed, flow), flow
 
 
 def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
@@ -175,6 +232,69 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
         approach=strokes.approach,
         approach_starts=strokes.approach_starts,
     )
+
+
+def order_layer(
+    beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons
+) -> tuple[Strokes, Floats, float]:
+    """The beads of a layer in order, with their (k,) speeds and the flow of all of them.
+
+    tip: where the layer below ends; skin: its outer walls beside the edges of interfaces.
+    """
+    sections, own, height_mm = shells.sections, shells.layers[index].process, float(shells.sections.heights.height_mm[index])
+    profile, process, on_platform, outline = sections.profile, sections.process, sections.on_platform, sections.outlines[index]
+    if index == 0 and not on_platform:
+        beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
+    strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
+    strokes = split_overhangs(strokes, outline, sections.below(index), own)
+    if index == 0 and not on_platform and process.interlock == "grooves":
+        strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
+    fixed: Mapping[Kind, float] | None = None
+    flow = profile.material.flow
+    if index == 0:
+        fixed = first_layer_speeds(process, on_platform)
+        flow *= process.first_layer_flow if on_platform else process.interface_flow
+    strokes = in_pieces(strokes, height_mm)
+    return strokes, speeds_mm_s(strokes, profile, height_mm, fixed, flow), flow
+
+
+def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
+    """The strokes that fill a part's pins: rounds in the mouth, as many as keep the plastic to what every firmware takes."""
+    process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
+    radius = 0.5 * (pin_width_mm(profile) - nozzle_mm)
+    beads = []
+    for x, y, mm3 in pins.tolist():
+        rounds = max(ceil(mm3 / (MOST_AREA * nozzle_mm**2 * 2.0 * pi * radius)), 1)
+        turn = 2.0 * pi * np.arange(rounds * ROUND + 1) / ROUND
+        ring = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        points = np.vstack([np.zeros((1, 2)), ring]) + np.array([x, y])
+        bead_mm3 = length_mm(points) * bead_area_mm2(process.line_width_mm, height_mm) * process.interface_flow
+        beads.append(Bead(Kind.GAP, points, process.line_width_mm, RANK, mm3 / bead_mm3))
+    return beads
+
+
+def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
+    """The beads of a first layer on plastic, what fills its walls before them: outer walls are laid last, against beads that are
+    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up
+    for there, not where a wall has its seam.
+    """
+    inside = [replace(bead, rank=BEFORE_WALLS) if FILL <= bead.rank <= LAST else bead for bead in beads]
+    if any(bead.rank <= OUTSIDE for bead in inside):
+        return inside
+    for kind in (Kind.INFILL, Kind.SKIN):
+        longest = max((bead for bead in inside if bead.kind is kind), key=lambda bead: bead.length_mm, default=None)
+        if longest is not None:
+            return [replace(longest, rank=OUTSIDE), *(bead for bead in inside if bead is not longest)]
+    return inside
+
+
+def fill_grooves(strokes: Strokes, area: Polygons, process: Process, height_mm: float) -> Strokes:
+    """The first layer's strokes of a part on plastic, richer over the area of its grooves by what they hold."""
+    if area.is_empty():
+        return strokes
+    richer = 1.0 + process.interlock_mm / height_mm
+    strokes, within = split(strokes, area, strokes.is_of(*SKINS), process.line_width_mm)
+    return replace(strokes, flow=np.where(within, strokes.flow * richer, strokes.flow))
 
 
 def _check_not_empty(sections: Sections, layers: Sequence[Layer]) -> None:

@@ -18,8 +18,8 @@ from mdp.plane import Plane
 from mdp.search.parts import Outcome, Taken, made_of, make_parts
 from mdp.search.problem import Problem
 from profiles.profile import Profile, load
-from slicer.parts import slice_parts
 from slicer.paths import SlicedPart
+from slicer.slice import slice_parts
 from tests.machine.moves import Stroke, Travel, Wipe, moves_of
 from tests.shapes import from_manifold
 

@@ -88,7 +88,7 @@ def test_the_check_tells_what_exists_from_what_does_not() -> None:
     [
         "mdp.read.read_mesh(path, scale, rotate_deg)",
         "mdp.search.search.decompose(mesh, name, profile)",
-        "slicer.parts.slice_parts(parts, profile, on_progress)",
+        "slicer.slice.slice_parts(parts, profile, on_progress)",
         "machine.planning.plan.plan(decomposition, sliced, profile, stops)",
         "machine.gcode.writer.write_gcode(program, profile)",
         "machine.reader.parse.parse_gcode(lines, machine)",

@@ -30,7 +30,7 @@ from machine.reader.gcode_file import GcodeFile
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
 from profiles.profile import Profile, load
-from slicer.parts import slice_parts
+from slicer.slice import slice_parts
 
 T = TypeVar("T")
 

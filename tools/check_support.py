@@ -20,8 +20,7 @@ from profiles.profile import Profile, load
 from slicer.overhangs import find_overhangs
 from slicer.sectioning import section_part
 from slicer.support.handed_down import plan_supports
-from slicer.support.missed import explain
-from slicer.support.support import Supports, own_supports
+from slicer.support.support import Supports, explain, own_supports
 
 HEAD = (
     "model",

@@ -15,7 +15,7 @@ from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.paths import KINDS, Layer, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
-from slicer.strokes.wiping import STANDING_MM
+from slicer.strokes.travels import STANDING_MM
 
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 

@@ -20,7 +20,7 @@ from mdp.pose import Pose
 from profiles.errors import MoveError
 from profiles.profile import Profile
 from slicer.geometry.polyline import length_between
-from slicer.strokes.wiping import STANDING_MM, distance, first_length, runs_round, wipe_trail
+from slicer.strokes.travels import STANDING_MM, distance, first_length, runs_round, wipe_trail
 
 TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
 NOWHERE = np.zeros((0, 3))

@@ -15,7 +15,7 @@ from profiles.profile import Profile
 from slicer.paths import KINDS
 from slicer.strokes.speed import axes_mm_s2, stroke_accelerations, travel_mm_s2
 from slicer.strokes.strokes import Strokes
-from slicer.strokes.wiping import STANDING_MM
+from slicer.strokes.travels import STANDING_MM
 
 # A wipe turns in its middle by 45 deg, as over the small rings after which most are: mm along each axis for a mm of all of it.
 TURNED = 0.5 / sqrt(2.0)

@@ -21,7 +21,7 @@ from slicer.estimate.hanging import ThickSupport, support_lengths_mm, thick_supp
 from slicer.estimate.layer import sections_near, sliced_layers
 from slicer.estimate.rough import choose_layers, rough_lengths_mm
 from slicer.paths import bead_area_mm2
-from slicer.strokes.vase import vase_profile
+from slicer.sectioning import vase_profile
 
 SAMPLES = 7  # layers of a print that are sliced: the error of 23 parts by it is 1 % in the median, with 12 layers 0.7 %
 FEWEST = 4  # layers of a part

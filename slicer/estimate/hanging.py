@@ -17,12 +17,9 @@ from slicer.geometry.polygons import Polygons, clean, edges
 from slicer.heights import Heights, part_heights
 from slicer.interface.interface import plastic_below
 from slicer.overhangs import find_overhangs
-from slicer.sectioning import plate_outline
-from slicer.sections import Sections
-from slicer.strokes.vase import vase_profile
+from slicer.sectioning import Sections, no_support_areas, plate_outline, vase_profile
 from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, own_supports
-from slicer.zones import no_support_areas
 
 LAYERS = 36  # thick layers at most, and one above what hangs
 COARSE_MM = 0.05  # sections are simplified by this

@@ -19,14 +19,11 @@ from slicer.fill.infill import pattern_density
 from slicer.fill.region import Cover, Region, region_of, shell_layers, sparse_area
 from slicer.geometry.polygons import Polygons
 from slicer.heights import Heights, pedestal_layers
-from slicer.interface.cut_faces import cover, cut_walls, model_sections
 from slicer.paths import bead_area_mm2
-from slicer.sectioning import section_part
-from slicer.sections import Sections
-from slicer.shells import Shell, Shells, lay_beads, layer_processes
+from slicer.sectioning import Sections, section_part
+from slicer.shells import Shell, Shells, cover, cut_walls, lay_beads, layer_processes, model_sections, strengthen_overhangs
 from slicer.slice import order_layer
 from slicer.strokes.order import SUPPORTS
-from slicer.strokes.overhanging import strengthen_overhangs
 from slicer.strokes.seam import NO_LIMITS, NO_SEAMS, Surroundings, place_seams, rear_of
 from slicer.support.handed_down import up_to
 from slicer.support.support import Supports

@@ -13,9 +13,8 @@ the part below it is a hole like any other, with walls round it and a floor.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import compress
-from math import ceil, pi
+from math import ceil
 
 import manifold3d as m3
 import numpy as np
@@ -26,78 +25,19 @@ from mdp.mesh import Floats, Mesh
 from mdp.topology.cross_section import cross_sections
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead, interface_process
+from slicer.bead import interface_process
 from slicer.geometry.edge_index import index_edges, lie_within
 from slicer.geometry.polygons import Polygons, area_mm2, clean, islands, offset, offset_round, union
-from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights
 from slicer.interface.interface import BELOW_MM, base_section, frame_change, in_frame_of, near_parts
-from slicer.paths import Kind, bead_area_mm2
-from slicer.strokes.split import split
-from slicer.strokes.strokes import Strokes
 
 STRIPE = 2.0  # line widths: grooves and ridges as wide as two beads can be printed
-SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
 SIDES = 24  # of a hole
 MOUTH_MM = 1.0  # holes are cut so far beyond the base plane, where there is nothing, so that no skin is left over them
-RANK = OUTSIDE - 1  # before all else of the layer
-ROUND = 12  # chords of a circle that the tip goes
-MOST_AREA = 3.0  # of a stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
 HALVINGS = 20
 WIDENED, MOST_WIDENED = 1.1, 60  # a grid with too many places, by so much and so often
 
 Pins = Mapping[int, Floats]  # by the part that fills them: (k, 3) x and y of the mouth's middle, mm, and the mm3 of its hole
-
-
-def grooves(part: Part, process: Process) -> Polygons:
-    """Grooves under a part's base, in its frame: stripes along x that end before the walls, so that none is seen."""
-    base, first = base_section(part), interface_process(process)
-    inside = offset(base, -(first.walls + 1) * first.line_width_mm) if not base.is_empty() else base
-    if inside.is_empty():
-        return inside
-    x0, y0, x1, y1 = inside.bounds()
-    wide = STRIPE * process.line_width_mm
-    stripe = Polygons.square((x1 - x0 + 2.0, wide))
-    rows = np.arange(np.floor(y0 / (2.0 * wide)), np.ceil(y1 / (2.0 * wide)) + 1)
-    return inside ^ Polygons.compose([stripe.translate((x0 - 1.0, 2.0 * wide * row)) for row in rows])
-
-
-def cut_grooves(
-    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cuts_mm: Floats, profile: Profile
-) -> list[Polygons]:
-    """The part's outlines without the grooves of the parts that will stand on it; profile: of the whole print."""
-    cutters = []
-    for upper in later:
-        process = profile.of_part(upper.index).process
-        area = grooves(upper, process) if process.interlock == "grooves" else Polygons()
-        if not area.is_empty():
-            solid = m3.Manifold.extrude(area, 2.0 * process.interlock_mm).translate((0.0, 0.0, -process.interlock_mm))
-            cutters.append(mesh_of(solid).transform(*frame_change(upper, part)))
-    return _cut_out(outlines, cutters, cuts_mm)
-
-
-def cut_pins(
-    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], pins: Pins, cuts_mm: Floats, profile: Profile
-) -> list[Polygons]:
-    """The part's outlines without the holes of the parts that will stand on it; profile: of the whole print."""
-    return _cut_out(outlines, _holes(part, later, pins, profile), cuts_mm)
-
-
-def _cut_out(outlines: Sequence[Polygons], cutters: Sequence[Mesh], cuts_mm: Floats) -> list[Polygons]:
-    """Outlines at heights without what some solids take of them."""
-    left = list(outlines)
-    for cutter in cutters:
-        left = [area - Polygons(cut) if cut else area for area, cut in zip(left, cross_sections(cutter, cuts_mm), strict=True)]
-    return left
-
-
-def fill_grooves(strokes: Strokes, area: Polygons, process: Process, height_mm: float) -> Strokes:
-    """The first layer's strokes of a part on plastic, richer over the area of its grooves by what they hold."""
-    if area.is_empty():
-        return strokes
-    richer = 1.0 + process.interlock_mm / height_mm
-    strokes, within = split(strokes, area, strokes.is_of(*SKINS), process.line_width_mm)
-    return replace(strokes, flow=np.where(within, strokes.flow * richer, strokes.flow))
 
 
 def plan_pins(parts: Sequence[Part], profile: Profile) -> Pins:
@@ -148,6 +88,22 @@ def room_around_mm(process: Process) -> float:
     return (process.walls + 1) * process.line_width_mm
 
 
+def _holes(part: Part, uppers: Sequence[Part], pins: Pins, profile: Profile) -> list[Mesh]:
+    """The holes of other parts, by their own profiles, as they are cut out of those below, in the frame of a part."""
+    holes = []
+    for upper in uppers:
+        if len(pins.get(upper.index, ())):
+            own = profile.of_part(upper.index)
+            wide_mm, depth_mm = pin_width_mm(own), own.process.pin_depth_mm
+            several = [_hole(x, y, wide_mm, -depth_mm, MOUTH_MM) for x, y in pins[upper.index][:, :2].tolist()]
+            holes.append(mesh_of(m3.Manifold.compose(several)).transform(*frame_change(upper, part)))
+    return holes
+
+
+def _hole(x: float, y: float, wide_mm: float, bottom_mm: float, top_mm: float) -> Solid:
+    return m3.Manifold.extrude(Polygons.circle(0.5 * wide_mm, SIDES), top_mm - bottom_mm).translate((x, y, bottom_mm))
+
+
 def _places(room: Polygons, process: Process) -> list[tuple[float, float]]:
     """Middles of holes: a grid in the room, as wide as leaves no more of them than are wanted."""
     step_mm, places = process.pin_spacing_mm, _grid(room, process.pin_spacing_mm)
@@ -190,22 +146,6 @@ def _deepest(island: Polygons) -> tuple[float, float]:
     return 0.5 * (x0 + x1), 0.5 * (y0 + y1)
 
 
-def _hole(x: float, y: float, wide_mm: float, bottom_mm: float, top_mm: float) -> Solid:
-    return m3.Manifold.extrude(Polygons.circle(0.5 * wide_mm, SIDES), top_mm - bottom_mm).translate((x, y, bottom_mm))
-
-
-def _holes(part: Part, uppers: Sequence[Part], pins: Pins, profile: Profile) -> list[Mesh]:
-    """The holes of other parts, by their own profiles, as they are cut out of those below, in the frame of a part."""
-    holes = []
-    for upper in uppers:
-        if len(pins.get(upper.index, ())):
-            own = profile.of_part(upper.index)
-            wide_mm, depth_mm = pin_width_mm(own), own.process.pin_depth_mm
-            several = [_hole(x, y, wide_mm, -depth_mm, MOUTH_MM) for x, y in pins[upper.index][:, :2].tolist()]
-            holes.append(mesh_of(m3.Manifold.compose(several)).transform(*frame_change(upper, part)))
-    return holes
-
-
 def _taken_mm3(hole: Mesh, heights: Heights) -> float:
     """What a hole, in the frame of the part below, takes of its layers."""
     first, last = np.searchsorted(heights.cut_mm, hole.bounds_mm[:, 2])
@@ -214,31 +154,43 @@ def _taken_mm3(hole: Mesh, heights: Heights) -> float:
     return float(np.dot(areas, heights.height_mm[first:last]))
 
 
-def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
-    """The strokes that fill a part's pins: rounds in the mouth, as many as keep the plastic to what every firmware takes."""
-    process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
-    radius = 0.5 * (pin_width_mm(profile) - nozzle_mm)
-    beads = []
-    for x, y, mm3 in pins.tolist():
-        rounds = max(ceil(mm3 / (MOST_AREA * nozzle_mm**2 * 2.0 * pi * radius)), 1)
-        turn = 2.0 * pi * np.arange(rounds * ROUND + 1) / ROUND
-        ring = radius * np.column_stack([np.cos(turn), np.sin(turn)])
-        points = np.vstack([np.zeros((1, 2)), ring]) + np.array([x, y])
-        bead_mm3 = length_mm(points) * bead_area_mm2(process.line_width_mm, height_mm) * process.interface_flow
-        beads.append(Bead(Kind.GAP, points, process.line_width_mm, RANK, mm3 / bead_mm3))
-    return beads
+def cut_pins(
+    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], pins: Pins, cuts_mm: Floats, profile: Profile
+) -> list[Polygons]:
+    """The part's outlines without the holes of the parts that will stand on it; profile: of the whole print."""
+    return _cut_out(outlines, _holes(part, later, pins, profile), cuts_mm)
 
 
-def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
-    """The beads of a first layer on plastic, what fills its walls before them: outer walls are laid last, against beads that are
-    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up
-    for there, not where a wall has its seam.
-    """
-    inside = [replace(bead, rank=BEFORE_WALLS) if FILL <= bead.rank <= LAST else bead for bead in beads]
-    if any(bead.rank <= OUTSIDE for bead in inside):
+def _cut_out(outlines: Sequence[Polygons], cutters: Sequence[Mesh], cuts_mm: Floats) -> list[Polygons]:
+    """Outlines at heights without what some solids take of them."""
+    left = list(outlines)
+    for cutter in cutters:
+        left = [area - Polygons(cut) if cut else area for area, cut in zip(left, cross_sections(cutter, cuts_mm), strict=True)]
+    return left
+
+
+def cut_grooves(
+    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cuts_mm: Floats, profile: Profile
+) -> list[Polygons]:
+    """The part's outlines without the grooves of the parts that will stand on it; profile: of the whole print."""
+    cutters = []
+    for upper in later:
+        process = profile.of_part(upper.index).process
+        area = grooves(upper, process) if process.interlock == "grooves" else Polygons()
+        if not area.is_empty():
+            solid = m3.Manifold.extrude(area, 2.0 * process.interlock_mm).translate((0.0, 0.0, -process.interlock_mm))
+            cutters.append(mesh_of(solid).transform(*frame_change(upper, part)))
+    return _cut_out(outlines, cutters, cuts_mm)
+
+
+def grooves(part: Part, process: Process) -> Polygons:
+    """Grooves under a part's base, in its frame: stripes along x that end before the walls, so that none is seen."""
+    base, first = base_section(part), interface_process(process)
+    inside = offset(base, -(first.walls + 1) * first.line_width_mm) if not base.is_empty() else base
+    if inside.is_empty():
         return inside
-    for kind in (Kind.INFILL, Kind.SKIN):
-        longest = max((bead for bead in inside if bead.kind is kind), key=lambda bead: bead.length_mm, default=None)
-        if longest is not None:
-            return [replace(longest, rank=OUTSIDE), *(bead for bead in inside if bead is not longest)]
-    return inside
+    x0, y0, x1, y1 = inside.bounds()
+    wide = STRIPE * process.line_width_mm
+    stripe = Polygons.square((x1 - x0 + 2.0, wide))
+    rows = np.arange(np.floor(y0 / (2.0 * wide)), np.ceil(y1 / (2.0 * wide)) + 1)
+    return inside ^ Polygons.compose([stripe.translate((x0 - 1.0, 2.0 * wide * row)) for row in rows])

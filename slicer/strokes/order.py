@@ -20,8 +20,7 @@ from profiles.process import Process
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, WALLS, Bead
 from slicer.geometry.polygons import Polygons, area_mm2, contours
 from slicer.paths import Kind
-from slicer.strokes.path_order import order_paths
-from slicer.strokes.rings import AS_IT_IS, CLOSED, OPEN, order_lines
+from slicer.strokes.path_order import AS_IT_IS, CLOSED, OPEN, order_lines, order_paths
 from slicer.strokes.strokes import Strokes, strokes_of
 from slicer.strokes.travels import NOWHERE, travels
 
@@ -145,14 +144,13 @@ def _short_order(items: Sequence[Sequence[Bead]], tip: Floats, goal: Floats) -> 
     lines = [item[0].points if len(item) == 1 else np.array([item[0].points[0], item[-1].points[-1]]) for item in items]
     fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
     placed: list[tuple[Bead, Floats]] = []
-    for run in order_lines(lines, fixed, [_freedom(item) for item in items], tip, goal):
-        item = items[run.number]
-        if len(item) > 1:
-            placed += [(bead, bead.points) for bead in item]
-        elif len(run.pieces) > 1:
-            placed += [(replace(item[0], points=piece), piece) for piece in run.pieces]
+    for k, pieces in order_lines(lines, fixed, [_freedom(item) for item in items], tip, goal):
+        if len(items[k]) > 1:
+            placed += [(bead, bead.points) for bead in items[k]]
+        elif len(pieces) > 1:
+            placed += [(replace(items[k][0], points=piece), piece) for piece in pieces]
         else:
-            placed.append((item[0], run.pieces[0]))
+            placed.append((items[k][0], pieces[0]))
     return placed
 
 

@@ -183,12 +183,6 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
     return out, np.array(list(seams.values())).reshape(-1, 2)
 
 
-def start_at_rear(loop: Floats) -> Floats:
-    """A loop (n, 2) closed and begun at its rearmost point, the leftmost of several."""
-    at = int(np.lexsort((loop[:, 0], -loop[:, 1]))[0])
-    return np.concatenate([loop[at:], loop[: at + 1]])
-
-
 class _Target(NamedTuple):
     """Where a seam is drawn to, and the distance, mm, that an inner or outer corner is worth."""
 

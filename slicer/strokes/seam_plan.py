@@ -5,21 +5,24 @@ worth, an inner one more than an outer one, and a little for its way to the rear
 costs by the millimetre, up to a jump. The outlines are a forest, each on the nearest one of the layer below, so the cheapest
 choice of all is found exactly: from the top down every place sums up the best that can stand on it, from the bottom up each
 outline takes its best one.
+
+What is seen of a place is the share of the light over the surface there that nothing of the whole model keeps from it. It is
+worked out by rays for samples that lie farther apart than seams may, and looked up among those that face the same way.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdp.kernels.arrays import longs, table
+from mdp.decomposition import Part
+from mdp.directions.spread import spread_like_light
+from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import helper, kernel
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices, Mesh
+from mdp.sweep.rays import blocked_shares, triangle_tree
 from slicer.geometry.polygons import contours
-from slicer.sections import Sections
+from slicer.sectioning import Sections
 from slicer.strokes.seam import SeamLimits, corner_strength, keeps_clear, rear_of
-from slicer.strokes.visibility import Outside, Visibility
 
 SPACING_MM = 1.0  # of the places of an outline
 FEWEST = 8  # places of an outline
@@ -28,16 +31,13 @@ TO_REAR = 5e-4  # what a mm to the rear costs: among places that are seen alike,
 SHIFT, JUMP = 0.14, 2.4  # what a mm of way between two layers costs, and a jump at most
 FORBIDDEN = 1e3  # more than all that a part's seams can cost otherwise
 APART_MM = 3.0  # outlines that are farther from each other have seams of their own
-
-
-class Places(NamedTuple):
-    """xy: (n, 2) outline after outline from the lowest layer up; cost: (n,); first: (k + 1,) where each outline's begin; layer:
-    (k,)."""
-
-    xy: Floats
-    cost: Floats
-    first: NDArray[np.int64]
-    layer: NDArray[np.int64]
+ALONG_MM, UP_MM = 2.5, 2.0  # between samples: along an outline, and upward
+FEWEST_SAMPLES = 6  # samples of an outline
+RAYS = 24
+LIFT_MM = 0.1  # of a ray's beginning beside the outline
+FAR_MM = 1e5
+BLUR_MM = 1.0  # samples so near count alike
+ASIDE = 1e-3  # what a sample that faces another way counts
 
 
 def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]:
@@ -49,18 +49,61 @@ def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]
     loops = [(layer, loop) for layer, of_layer in enumerate(outlines) for loop in of_layer]
     if not loops:
         return [np.zeros((0, 2)) for _ in outlines]
-    visibility, rear = Visibility(sections, outlines), rear_of(sections.mesh.bounds_mm)
+    (levels, samples), rear = light_samples(sections, outlines), rear_of(sections.mesh.bounds_mm)
     offered, costs = [], []
     for layer, loop in loops:
         places, strength = _offered(loop)
         clear = keeps_clear(places[:, :2], limits[layer])
         worth = np.where(strength > 0.0, INNER, OUTER) * np.abs(strength)
-        seen = visibility.at(layer, Outside(places[:, :2], places[:, 2:]))
+        seen = light_at(layer, places, sections.heights.cut_mm, levels, samples)
         costs.append(seen - worth + TO_REAR * np.hypot(*(places[:, :2] - rear).T) + FORBIDDEN * ~clear)
         offered.append(places[:, :2])
     first, layers = np.cumsum([0, *map(len, offered)]), np.array([layer for layer, _ in loops])
-    chosen = choose(Places(np.concatenate(offered), np.concatenate(costs), first, layers))
+    chosen = choose(np.concatenate(offered), np.concatenate(costs), first, layers)
     return [chosen[layers == layer] for layer in range(len(outlines))]
+
+
+def light_samples(sections: Sections, outlines: Sequence[Sequence[Floats]]) -> tuple[Indices, list[Floats]]:
+    """Some layers of a part, lowest first, and for each (n, 5) samples of its outlines: x, y, the unit vector out of the solid,
+    and how much is seen of the place, 0 to 1. outlines: loops (n, 2) of every layer, solid on their left."""
+    of, cuts_mm = sections.part, sections.heights.cut_mm
+    filled = np.flatnonzero([bool(loops) for loops in outlines])
+    near = np.searchsorted(cuts_mm[filled], np.arange(cuts_mm[0], cuts_mm[-1], UP_MM)).clip(max=len(filled) - 1)
+    levels: Indices = np.unique([*filled[near], filled[-1]])
+    samples = [_samples(outlines[level]) for level in levels]
+    counts, (places, outward) = [len(level) for level in samples], np.split(np.concatenate(samples), [2], axis=1)
+    heights_mm = np.repeat(cuts_mm[levels], counts)[:, None] + of.base.offset_mm
+    level, up = np.zeros_like(heights_mm), np.ones_like(heights_mm)
+    lifted = np.hstack([places + LIFT_MM * outward, heights_mm]) @ of.rotation
+    along = np.hstack([-outward[:, 1:], outward[:, :1], level])
+    frames = np.stack([along, np.hstack([level, level, up]), np.hstack([outward, level])], axis=1) @ of.rotation
+    tree = triangle_tree(_together([*sections.earlier, of, *sections.later]))
+    blocked = blocked_shares(tree, lifted, frames, spread_like_light(RAYS), FAR_MM, in_turn=True)
+    seen = np.column_stack([places, outward, 1.0 - blocked])
+    return levels, np.split(seen, np.cumsum(counts)[:-1])
+
+
+def _samples(loops: Sequence[Floats]) -> Floats:
+    """(n, 4) places spread evenly over loops, and unit vectors out of the solid there."""
+    samples = []
+    for loop in loops:
+        sides = np.roll(loop, -1, axis=0) - loop
+        lengths = np.hypot(*sides.T)
+        ends = np.cumsum(lengths)
+        count = max(FEWEST_SAMPLES, int(np.ceil(ends[-1] / ALONG_MM)))
+        along = (np.arange(count) + 0.5) * ends[-1] / count
+        at = np.searchsorted(ends, along).clip(max=len(loop) - 1)
+        way = sides[at] / np.maximum(lengths[at], 1e-12)[:, None]
+        places = loop[at] + (along - ends[at] + lengths[at])[:, None] * way
+        samples.append(np.column_stack([places, way[:, 1], -way[:, 0]]))
+    return np.concatenate(samples)
+
+
+def _together(parts: Sequence[Part]) -> Mesh:
+    """The surfaces of parts as one."""
+    first = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
+    faces = [part.mesh.faces + begin for part, begin in zip(parts, first, strict=False)]
+    return Mesh(np.concatenate([part.mesh.vertices for part in parts]), np.concatenate(faces).astype(parts[0].mesh.faces.dtype))
 
 
 @kernel
@@ -98,33 +141,52 @@ def _offered(loop: Floats) -> tuple[Floats, Floats]:
     return places, strengths
 
 
-@helper
-def _cheapest(places: Places, best: Floats, outline: int, below: int) -> tuple[int, float]:
-    """The place of an outline that costs least with all on it and the way to it from a place below, and that cost; below -1:
-    there is none."""
-    least, taken = np.inf, places.first[outline]
-    for p in range(places.first[outline], places.first[outline + 1]):
-        cost = best[p]
-        if below >= 0:
-            way = np.hypot(places.xy[p, 0] - places.xy[below, 0], places.xy[p, 1] - places.xy[below, 1])
-            cost += min(SHIFT * way, JUMP)
-        if cost < least:
-            least, taken = cost, p
-    return taken, least
+def light_at(layer: int, asked: Floats, cuts_mm: Floats, levels: Indices, samples: Sequence[Floats]) -> Floats:
+    """(n,) how much is seen of places of a layer, 0 to 1, between those of the levels below and above.
+
+    asked: (n, 4) x, y and the unit vector out of the solid; cuts_mm: heights of all layers; levels, samples: as light_samples.
+    """
+    upper = min(int(np.searchsorted(levels, layer)), len(levels) - 1)
+    lower = upper if levels[upper] <= layer else max(upper - 1, 0)
+    low_mm, high_mm = cuts_mm[levels[[lower, upper]]]
+    share = 0.0 if high_mm <= low_mm else float(np.clip((cuts_mm[layer] - low_mm) / (high_mm - low_mm), 0.0, 1.0))
+    below: Floats = _look_up(asked, samples[lower])
+    return below if share <= 0.0 else (1.0 - share) * below + share * _look_up(asked, samples[upper])
 
 
 @kernel
-def choose(places: Places) -> Floats:
-    """(k, 2) the place of each outline, of all choices the one that costs least together."""
-    xy, first, count = places.xy, places.first, len(places.layer)
-    below, best = longs(count, -1), places.cost.copy()
+def _look_up(asked: Floats, samples: Floats) -> Floats:
+    """(n,) mean of what is seen of samples, those near by that face the same way counting most."""
+    out: Floats = floats(len(asked), 0.0)
+    for k in range(len(out)):
+        x, y, nx, ny = asked[k, 0], asked[k, 1], asked[k, 2], asked[k, 3]
+        whole, total = 0.0, 0.0
+        for s in range(len(samples)):
+            dx, dy = samples[s, 0] - x, samples[s, 1] - y
+            apart = dx * dx + dy * dy + BLUR_MM * BLUR_MM
+            weight = max(nx * samples[s, 2] + ny * samples[s, 3], ASIDE) / (apart * apart)
+            whole += weight
+            total += weight * samples[s, 4]
+        out[k] = total / whole
+    return out
+
+
+@kernel
+def choose(xy: Floats, cost: Floats, first: Indices, layer: Indices) -> Floats:
+    """(k, 2) the place of each outline, of all choices the one that costs least together.
+
+    xy: (n, 2) places, outline after outline from the lowest layer up; cost: (n,) of each; first: (k + 1,) where each outline's
+    begin; layer: (k,) of each outline.
+    """
+    count = len(layer)
+    below, best = longs(count, -1), cost.copy()
     begin = 0
     for k in range(count):
-        while places.layer[begin] < places.layer[k] - 1:
+        while layer[begin] < layer[k] - 1:
             begin += 1
         least = APART_MM * (first[k + 1] - first[k])
         for j in range(begin, k):
-            if places.layer[j] != places.layer[k] - 1:
+            if layer[j] != layer[k] - 1:
                 break
             far = 0.0
             for p in range(first[k], first[k + 1]):
@@ -139,9 +201,24 @@ def choose(places: Places) -> Floats:
     for k in range(count - 1, -1, -1):
         if below[k] >= 0:
             for q in range(first[below[k]], first[below[k] + 1]):
-                best[q] += _cheapest(places, best, k, q)[1]
+                best[q] += _cheapest(xy, best, first, k, q)[1]
     chosen, taken = table(count, 2), longs(count, 0)
     for k in range(count):
-        taken[k] = _cheapest(places, best, k, taken[below[k]] if below[k] >= 0 else -1)[0]
+        taken[k] = _cheapest(xy, best, first, k, taken[below[k]] if below[k] >= 0 else -1)[0]
         chosen[k, 0], chosen[k, 1] = xy[taken[k], 0], xy[taken[k], 1]
     return chosen
+
+
+@helper
+def _cheapest(xy: Floats, best: Floats, first: Indices, outline: int, below: int) -> tuple[int, float]:
+    """The place of an outline that costs least with all on it and the way to it from a place below, and that cost; below -1:
+    there is none."""
+    least, taken = np.inf, first[outline]
+    for p in range(first[outline], first[outline + 1]):
+        cost = best[p]
+        if below >= 0:
+            way = np.hypot(xy[p, 0] - xy[below, 0], xy[p, 1] - xy[below, 1])
+            cost += min(SHIFT * way, JUMP)
+        if cost < least:
+            least, taken = cost, p
+    return taken, least

@@ -1,21 +1,37 @@
-"""Strokes: the beads of a layer in printing order as one table, before their speed is known; splitting one is a refinement."""
+"""Strokes: the beads of a layer in printing order as one table, before their speed is known, and its refinements.
+
+Strokes are parted where they enter and leave an area, where they hardly lie on the layer below, and where their width changes.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel
+from mdp.kernels.arrays import flags, floats, longs, table
+from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
-from slicer.bead import Bead
+from profiles.process import Process
+from slicer.bead import EVEN_MM, Bead
+from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
+from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import PATH_RESOLUTION_MM, lengths_mm, mark_corners
 from slicer.geometry.segments import Segment, nearest_share
-from slicer.paths import NUMBER, Kind, is_of
+from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
+Buffers = tuple[Floats, Indices, Indices, Mask]
+SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
+HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
+STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
+SHORTEST_HANGING = 2.0  # line widths: no stretch is split off for less, the speed would flicker
+NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
+MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
+SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
+MOST_SPREAD_MM, LEAST_MM = 0.03, 0.045  # but for one where they change by that much, which is no shorter than this
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,3 +162,254 @@ def _widths_at(places: Floats, course: Floats) -> Floats:
                     break
         at = nearest
     return out
+
+
+def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float) -> tuple[Strokes, Mask]:
+    """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area.
+
+    No piece is shorter than shortest_mm.
+    """
+    index = index_edges(area)
+    count, room = -1, 2 * len(strokes.points) + 64
+    while count < 0:
+        out = np.empty((room, 3)), np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.bool_)
+        count = _split(strokes.points, strokes.starts, wanted, index, shortest_mm, out)
+        room *= 4
+    points, starts, source, within = out
+    pieces = strokes.refined(points[: starts[count]].copy(), starts[: count + 1].copy(), source[:count])
+    is_whole = np.bincount(source[:count], minlength=len(strokes))[source[:count]] == 1
+    return replace(pieces, small=pieces.small & (is_whole | pieces.varies)), within[:count].copy()
+
+
+@kernel
+def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, shortest_mm: float, out: Buffers) -> int:
+    """Fills in the pieces and returns how many there are, -1 where there is no room for them.
+
+    out: points (n, 3), (k + 1,) where each piece begins, (k,) the stroke of each and whether it lies within the area.
+    """
+    out_points, begins, source, is_within = out
+    room = len(out_points)
+    cut, within = table(room, 3), flags(room)
+    count = n = begins[0] = 0
+    for k in range(len(starts) - 1):
+        a, b = starts[k], starts[k + 1]
+        size = 0
+        if wanted[k]:
+            size = _cut_into(points[a:b], area, cut, within)
+            if size < 0:
+                return -1
+            _steady(cut, within, size, shortest_mm)
+        whole = True
+        for i in range(1, size - 1):
+            whole = whole and within[i] == within[0]
+        if n + (b - a if whole else 2 * size) > room or count + max(size, 1) >= room:
+            return -1
+        if whole:
+            for i in range(a, b):
+                for axis in range(3):
+                    out_points[n, axis] = points[i, axis]
+                n += 1
+            source[count], is_within[count], begins[count + 1] = k, size > 1 and within[0], n
+            count += 1
+            continue
+        begin = 0
+        for i in range(size - 1):
+            if i + 2 < size and within[i + 1] == within[begin]:
+                continue
+            for at in range(begin, i + 2):
+                for axis in range(3):
+                    out_points[n, axis] = cut[at, axis]
+                n += 1
+            source[count], is_within[count], begins[count + 1] = k, within[begin], n
+            count, begin = count + 1, i + 1
+    return count
+
+
+@helper
+def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None:
+    """Runs of steps shorter than that take after their neighbours, those within last so that none is overlooked for a gap.
+
+    points: of which `size` count; within: of as many steps less one. A line that is a single run has no neighbours.
+    """
+    for inner in range(2):
+        a = 0
+        while a < size - 1:
+            b, length_mm = a, 0.0
+            while b < size - 1 and within[b] == within[a]:
+                length_mm += np.hypot(points[b + 1, 0] - points[b, 0], points[b + 1, 1] - points[b, 1])
+                b += 1
+            if a == 0 and b == size - 1:
+                return
+            if within[a] == (inner > 0) and length_mm < shortest_mm:
+                for step in range(a, b):
+                    within[step] = inner == 0
+            a = b
+
+
+def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
+    """The polyline (n, 2) with the places added where it enters and leaves an area, and which steps lie within."""
+    index, size, room = index_edges(area), -1, 2 * len(points) + 64
+    while size < 0:
+        out, marks = np.empty((room, 2)), np.empty(room, np.bool_)
+        size = _cut(points, index, out, marks)
+        room *= 4
+    return out[:size], marks[: size - 1]
+
+
+@kernel
+def _cut(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
+    return _cut_into(points, area, out, marks)
+
+
+@helper
+def _cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
+    """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
+
+    points, out: (n, 2 or more), further columns are interpolated.
+    """
+    shares, crossed = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0)
+    columns, n = points.shape[1], 1
+    for axis in range(columns):
+        out[0, axis] = points[0, axis]
+    for k in range(len(points) - 1):
+        step = Segment(points[k, 0], points[k, 1], points[k + 1, 0], points[k + 1, 1])
+        many = crossings(area, step, shares[:-1], crossed)
+        if n + many + 1 > len(out):
+            return -1
+        shares[many] = 1.0
+        since = 0.0
+        for s in range(many + 1):
+            if s < many and not SNAP < shares[s] < 1.0 - SNAP:
+                continue
+            # Tested for every piece: where a line leaves the area exactly at one of its points, no step crosses an edge.
+            middle = 0.5 * (since + shares[s])
+            is_within = within(area, step.x0 + middle * (step.x1 - step.x0), step.y0 + middle * (step.y1 - step.y0))
+            for axis in range(columns):
+                end = points[k + 1, axis]
+                out[n, axis] = end if s == many else points[k, axis] + shares[s] * (end - points[k, axis])
+            marks[n - 1], since = is_within, shares[s]
+            n += 1
+    return n
+
+
+def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None, process: Process) -> Strokes:
+    """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic.
+
+    below: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the
+    share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share.
+    """
+    if below is None or process.overhang_share <= 0.0:
+        return strokes
+    width_mm, shortest_mm = process.line_width_mm, SHORTEST_HANGING * process.line_width_mm
+    beyond = hanging_area(section, below, 0.5, width_mm)
+    if beyond.area() < shortest_mm * NOISE_MM:
+        return strokes  # the section barely overhangs: no centreline, half a line inside it, can
+    for share in sorted({*STEPS, process.overhang_share}, reverse=True):
+        hanging = beyond if share == 0.5 else hanging_area(section, below, share, width_mm)
+        if hanging.area() < shortest_mm * NOISE_MM:
+            break
+        kinds = HANGING if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
+        strokes, within = split(strokes, hanging, strokes.is_of(*kinds), shortest_mm)
+        kind, overhang = strokes.kind, np.where(within, sum(step >= share for step in STEPS), strokes.overhang)
+        if share <= process.overhang_share:
+            kind = np.where(within, NUMBER[Kind.OVERHANG], kind)
+        strokes = replace(strokes, kind=kind.astype(np.int8), overhang=overhang.astype(np.int8))
+    return strokes
+
+
+def hanging_area(section: Polygons, below: Polygons, share: float, width_mm: float) -> Polygons:
+    """Where the centreline of a bead has less than a share of its width on what is below."""
+    return section - offset(below, (0.5 - share) * width_mm + NOISE_MM)
+
+
+def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
+    """The strokes in the same order, those of varying width in pieces whose widths are the means of their stretches.
+
+    height_mm: of the layer; the pieces together hold the plastic of the whole.
+    """
+    if not strokes.varies.any():
+        return strokes
+    changes = np.abs(np.diff(strokes.points[:, 2]))
+    room = 2 * (len(strokes.points) + int(np.ceil(changes / EVEN_MM).sum()))
+    points, starts, source, width_mm = _part(strokes.points, strokes.starts, strokes.varies, strokes.width_mm, room)
+    out = strokes.refined(points, starts, source)
+    whole, own = bead_area_mm2(out.width_mm, height_mm), bead_area_mm2(width_mm, height_mm)
+    flow = np.where(out.varies, 1.0 + (out.flow - 1.0) * whole / own, out.flow)
+    return replace(out, width_mm=width_mm, flow=flow)
+
+
+@kernel
+def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats, room: int) -> tuple[Floats, Indices, Indices, Floats]:
+    """The pieces: points (n, 3), n no more than the room, (k + 1,) where each begins, (k,) the stroke and the width of each."""
+    out, begins, source, widths = table(room, 3), longs(room, 0), longs(room, 0), floats(room, 0.0)
+    count = n = 0
+    for k in range(len(starts) - 1):
+        a, b = starts[k], starts[k + 1]
+        if not varies[k]:
+            for i in range(a, b):
+                for axis in range(3):
+                    out[n, axis] = points[i, axis]
+                n += 1
+            source[count], widths[count], begins[count + 1] = k, width_mm[k], n
+            count += 1
+            continue
+        line = _with_small_steps(points[a:b])
+        ends = _ends(line)
+        begin = 0
+        for end in range(1, len(line)):
+            if not ends[end]:
+                continue
+            least, total, weights = line[begin, 2], 0.0, 0.0
+            for i in range(begin, end):
+                step = max(np.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1]), 1e-9)
+                total, weights = total + 0.5 * (line[i + 1, 2] + line[i, 2]) * step, weights + step
+                least = min(least, line[i + 1, 2])
+            for i in range(begin, end + 1):
+                for axis in range(3):
+                    out[n, axis] = line[i, axis]
+                n += 1
+            source[count], widths[count], begins[count + 1] = k, min(total / weights, least + MOST_OVER_MM), n
+            count, begin = count + 1, end
+    return out[:n].copy(), begins[: count + 1].copy(), source[:count].copy(), widths[:count].copy()
+
+
+@helper
+def _with_small_steps(points: Floats) -> Floats:
+    """The line (n, 3) with points added where its width changes by more than EVEN_MM from one to the next."""
+    size = 1
+    for i in range(len(points) - 1):
+        size += max(ceil(abs(points[i + 1, 2] - points[i, 2]) / EVEN_MM), 1)
+    out = table(size, 3)
+    n = 0
+    for i in range(len(points) - 1):
+        steps = max(ceil(abs(points[i + 1, 2] - points[i, 2]) / EVEN_MM), 1)
+        for s in range(steps):
+            for axis in range(3):
+                out[n, axis] = points[i, axis] + s / steps * (points[i + 1, axis] - points[i, axis])
+            n += 1
+    for axis in range(3):
+        out[n, axis] = points[len(points) - 1, axis]
+    return out
+
+
+@helper
+def _ends(line: Floats) -> Mask:
+    """(n,) True for the points of a line (n, 3) at which a piece ends: pieces are as long as the widths allow."""
+    ends = flags(len(line))
+    left = 0.0
+    for i in range(len(line) - 1):
+        left += np.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
+    length = 0.0
+    low = high = 0.5 * (line[1, 2] + line[0, 2])
+    for i in range(len(line) - 1):
+        step = np.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
+        width = 0.5 * (line[i + 1, 2] + line[i, 2])
+        spread = max(high, width) - min(low, width)
+        least_mm = LEAST_MM if spread > MOST_SPREAD_MM else SHORTEST_MM
+        if spread > EVEN_MM and length >= least_mm and left >= least_mm:
+            ends[i] = True
+            length, low, high = 0.0, width, width
+        length, left = length + step, left - step
+        low, high = min(low, width), max(high, width)
+    ends[len(line) - 1] = True
+    return ends

@@ -1,4 +1,5 @@
-"""Travels: which of them pull the filament back, and which make a detour through the inside of an area instead.
+"""Travels: which of them pull the filament back, which make a detour through the inside of an area instead, and wipes: the way of
+the tip while filament is pulled back, over what it has just printed, so that the drop stays there.
 
 A travel may ooze where it stays inside the section, or over one and the same piece of support. All other ways lead through open
 air or over a surface: what oozes there is a string or a blob on a wall. Beside the edge of an interface, where a blob is seen all
@@ -14,20 +15,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import floats, longs
-from mdp.kernels.kernel import helper, kernel
+from mdp.kernels.arrays import floats, longs, table
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
+from mdp.overhang import Mask
 from profiles.process import Process
 from slicer.bead import outer_wall_width_mm
 from slicer.geometry.edge_index import EdgeIndex, crosses, crossings, free, index_edges, lie_within, nearest, within
 from slicer.geometry.polygons import Polygons, offset
+from slicer.geometry.polyline import length_between
 from slicer.geometry.segments import Segment
+from slicer.strokes.strokes import Strokes
 
 SAFE = 0.4  # line widths inside the area within which travels ooze unseen; centrelines of outer walls lie at 0.5
 BEHIND = 1.1  # detours run behind the outer wall where the area is wide enough,
 AMONG = 0.45  # else as near to its middle as the walls themselves
 TAUT = 3.0  # a detour along the border may be longer than allowed by this factor before it is pulled taut
 NOWHERE = np.zeros((0, 2))
+STANDING_MM = 1e-6
+ROUND = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
 
 
 def travels(
@@ -108,24 +114,6 @@ class Combing:
         return None
 
 
-class _Stretch(NamedTuple):
-    """A stretch of a loop's border: from its edge `leaving` to the point x, y of its edge `coming`."""
-
-    leaving: int
-    coming: int
-    x: float
-    y: float
-
-
-@helper
-def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, float, bool]:
-    """Where a detour from a point begins: there, or where it reaches the track's inside; and whether it does."""
-    if within(track, x, y):
-        return x, y, True
-    ax, ay, side = nearest(track, x, y, reach)
-    return ax + 1e-7 * (ax - x), ay + 1e-7 * (ay - y), side >= 0 and free(safe, Segment(x, y, ax, ay))
-
-
 @kernel
 def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, reach: float, path: Floats) -> int:
     """Fills in the path from end to end, both included; returns how many points it has, 0 where there is none."""
@@ -149,6 +137,24 @@ def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, 
     for i in range(1, n):
         total += np.hypot(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
     return n if total <= longest else 0
+
+
+class _Stretch(NamedTuple):
+    """A stretch of a loop's border: from its edge `leaving` to the point x, y of its edge `coming`."""
+
+    leaving: int
+    coming: int
+    x: float
+    y: float
+
+
+@helper
+def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, float, bool]:
+    """Where a detour from a point begins: there, or where it reaches the track's inside; and whether it does."""
+    if within(track, x, y):
+        return x, y, True
+    ax, ay, side = nearest(track, x, y, reach)
+    return ax + 1e-7 * (ax - x), ay + 1e-7 * (ay - y), side >= 0 and free(safe, Segment(x, y, ax, ay))
 
 
 @helper
@@ -239,3 +245,73 @@ def _pull_taut(safe: EdgeIndex, path: Floats, count: int) -> int:
 def _sees(safe: EdgeIndex, path: Floats, i: int, j: int) -> bool:
     """Whether the straight line between two points of a path crosses no border."""
     return free(safe, Segment(path[i, 0], path[i, 1], path[j, 0], path[j, 1]))
+
+
+def may_wipe_over(strokes: Strokes, skin: Polygons, wipe_mm: float) -> Mask:
+    """(k,) whether a wipe may go over each stroke: not where it ends beside the skin and such a wipe would lead onto it."""
+    may = np.ones(len(strokes), np.bool_)
+    if skin.is_empty() or not len(strokes):
+        return may
+    border = index_edges(skin)
+    off = ~lie_within(border, strokes.last_points)
+    for k in np.flatnonzero(off).tolist():
+        points = np.ascontiguousarray(strokes.points[strokes.starts[k] : strokes.starts[k + 1], :2])
+        way = way_of_wipe(points, float(strokes.width_mm[k]), wipe_mm)
+        may[k] = len(way) < 2 or not crosses(border, way[:-1], way[1:]).any()
+    return may
+
+
+@kernel
+def way_of_wipe(points: Floats, width_mm: float, wipe_mm: float) -> Floats:
+    """The way (n, 2 or 3) of a wipe of wipe_mm after a stroke, over nothing but that."""
+    return first_length(wipe_trail(points, width_mm), wipe_mm)
+
+
+@helper
+def wipe_trail(points: Floats, width_mm: float) -> Floats:
+    """The way of a wipe after a stroke (n, 2 or 3): on along a ring, over its seam; back along a line."""
+    count, onward = len(points), runs_round(points, width_mm)
+    across = 1 if onward and distance(points, 0, count - 1) > STANDING_MM else 0
+    trail: Floats = table(count + across, points.shape[1])
+    for i in range(len(trail)):
+        k = (i - across) % count if onward else count - 1 - i
+        for axis in range(points.shape[1]):
+            trail[i, axis] = points[k, axis]
+    return trail
+
+
+@no_nrt
+def runs_round(points: Floats, width_mm: float) -> bool:
+    """Whether a path ends where it begins, or nearly."""
+    return bool(distance(points, 0, len(points) - 1) <= width_mm and length_between(points, 0, len(points)) > ROUND * width_mm)
+
+
+@no_nrt
+def distance(points: Floats, i: int, k: int) -> float:
+    """Between two of the points (n, 2 or 3)."""
+    squared = 0.0
+    for axis in range(points.shape[1]):
+        squared += (points[k, axis] - points[i, axis]) ** 2
+    return float(np.sqrt(squared))
+
+
+@helper
+def first_length(way: Floats, length: float) -> Floats:
+    """The first `length` mm of a polyline (n, 2 or 3), or all of it; without points that repeat."""
+    first: Floats = table(len(way), way.shape[1])
+    count, run = 0, 0.0
+    for i in range(len(way) if len(way) > 1 and length > 0.0 else 0):
+        step = distance(way, i - 1, i) if i else 0.0
+        if i and step <= STANDING_MM:
+            continue
+        run += step
+        for axis in range(way.shape[1]):
+            first[count, axis] = way[i, axis]
+            if run >= length:
+                first[count, axis] = first[count - 1, axis] + (1.0 - (run - length) / step) * (
+                    way[i, axis] - first[count - 1, axis]
+                )
+        count += 1
+        if run >= length:
+            break
+    return first[:count]

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
@@ -19,27 +18,11 @@ from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.paths import Kind, Layer, Path, bead_area_mm2
-from slicer.sections import Sections
+from slicer.sectioning import Sections
 from slicer.strokes.speed import fan_share, rising_fan
 
 PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
-
-
-def vase_profile(profile: Profile) -> Profile:
-    """The profile with which the bottom is sliced, and which knows of one wall and no inside above it."""
-    if not profile.process.spiral_vase:
-        return profile
-    hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
-    return profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
-
-
-def check_vase(parts: Sequence[Part], profile: Profile) -> None:
-    """Raise SliceError for a vase of several parts."""
-    if profile.process.spiral_vase and len(parts) > 1:
-        raise SliceError(
-            f"process.spiral_vase climbs round a model in one part, this one is in {len(parts)}: --parts 1 prints it in one piece"
-        )
 
 
 def bottom_layers(process: Process) -> int:

@@ -1,30 +1,57 @@
-"""Support beads: outlines, sparse lines that stand on each other, dense lines next to the part; and those of a pedestal.
+"""Auxiliary beads: what is printed for a part and taken off it: support, a pedestal, skirt and brim.
 
-A pedestal lifts a model off the platform. It is printed like a raft, sparse under a closed roof, and breaks away: the roof ends a
-small gap below the model's first layer, which is printed at its own height: it bonds to the roof only here and there, enough to
-hold the model upright and tilted, and comes off by hand.
+Support has outlines, sparse lines that stand on each other, and dense lines next to the part. A pedestal lifts a model off the
+platform. It is printed like a raft, sparse under a closed roof, and breaks away: the roof ends a small gap below the model's
+first layer, which is printed at its own height: it bonds to the roof only here and there, enough to hold the model upright and
+tilted, and comes off by hand.
 """
 
 from collections.abc import Sequence
+from math import ceil
 
+import numpy as np
+
+from mdp.cost.footing import tips_over
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import OUTSIDE, Bead, spacing_mm
+from slicer.bead import OUTSIDE, Bead, spacing_mm, with_line_width
 from slicer.fill.lines import zigzag_lines
 from slicer.fill.skin import SolidLines, skin_beads
-from slicer.geometry.polygons import Polygons, close_loop, contours, offset, opening
+from slicer.geometry.polygons import (
+    Polygons,
+    area_mm2,
+    close_loop,
+    contours,
+    offset,
+    offset_round,
+    opening,
+    union,
+)
 from slicer.paths import Kind
+from slicer.support.support import Supports
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
 ROOF_LAYERS = 3  # of a pedestal: the first of them sags between the sparse lines, the last one is even
 PEDESTAL_DENSITY = 0.25  # of its inside: lines near enough for the roof to span, as a raft's base
 SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it
+BRIM_RANK = -2000  # before all walls; the loops count down from it
+LEAST_COVERED_MM2 = 1e-3  # areas smaller than this are rounding
 
 
-def support_cell_mm(process: Process) -> float:
-    """How far apart the sparse lines of support lie, mm: what dense lines laid over it have to span."""
-    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
-    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density
+def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Bead]:
+    """Support, pedestal, skirt and brim of a layer; process: of the layer."""
+    sections = supports.sections
+    outline, height_mm = sections.outlines[layer], float(sections.heights.height_mm[layer])
+    on_plate = layer == 0 and sections.on_platform
+    support_process = with_line_width(process, process.support_line_width_mm)
+    beads = support_beads(supports.areas[layer], supports.dense[layer], support_process, height_mm, on_plate)
+    if layer < sections.pedestal_layers:
+        beads += pedestal_beads(outline, layer, sections.pedestal_layers, process, height_mm)
+    if on_plate:
+        top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in (sections.part, *sections.later))
+        footprint = union([outline, supports.areas[0]])
+        beads += brim(footprint, outline, sections.plate, process, top_mm=top_mm, height_mm=height_mm)
+    return beads
 
 
 def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: float, first: bool) -> list[Bead]:
@@ -75,3 +102,49 @@ def pedestal_beads(outline: Polygons, layer: int, layers: int, process: Process,
     inner, apart = offset(inside, -0.5 * spacing), spacing / PEDESTAL_DENSITY
     sparse = zigzag_lines(inner, offset(inside, -0.25 * width), angle, apart, JOIN * apart)
     return beads + [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in sparse]
+
+
+def brim(
+    footprint: Polygons, base: Polygons, plate: Polygons, process: Process, *, top_mm: float, height_mm: float
+) -> list[Bead]:
+    """The brim, outermost bead first so that it ends at the part; without a brim the skirt's loops.
+
+    footprint: all that the first layer prints; base: what of it the print stands on; plate: its outline, which no loop
+    leaves; top_mm: how high the print will be. A base that would tip over gets a brim of process.small_base_brim_mm.
+    """
+    spacing = spacing_mm(process.line_width_mm, height_mm)
+    width = process.brim_mm
+    if width == 0.0 and process.small_base_brim_mm > 0.0 and tips_over(base, top_mm):
+        width = process.small_base_brim_mm
+    if width > 0.0:
+        count, nearest = max(ceil(width / spacing - 1e-9), 1), process.brim_gap_mm + 0.5 * spacing
+    else:
+        count, nearest = process.skirt_loops, process.skirt_distance_mm + 0.5 * process.line_width_mm
+    outside, half = _outside(footprint), 0.5 * process.line_width_mm
+    beads: list[Bead] = []
+    for k in reversed(range(count)):
+        # Along the plate's edge the loops lie beside each other as they do elsewhere; one that finds no room is left out.
+        around = offset_round(outside, nearest + k * spacing) ^ offset(plate, -half - (count - 1 - k) * spacing)
+        if (offset_round(outside, min(half, nearest)) - around).area() > LEAST_COVERED_MM2:
+            continue
+        loops = [loop for loop in contours(around) if area_mm2(loop) > 0]
+        beads += [Bead(Kind.SKIRT, start_at_rear(loop), process.line_width_mm, BRIM_RANK - k) for loop in loops]
+    return beads
+
+
+def _outside(polygons: Polygons) -> Polygons:
+    """Without holes."""
+    outer = [loop for loop in contours(polygons) if area_mm2(loop) > 0]
+    return Polygons(outer) if outer else Polygons()
+
+
+def start_at_rear(loop: Floats) -> Floats:
+    """A loop (n, 2) closed and begun at its rearmost point, the leftmost of several."""
+    at = int(np.lexsort((loop[:, 0], -loop[:, 1]))[0])
+    return np.concatenate([loop[at:], loop[: at + 1]])
+
+
+def support_cell_mm(process: Process) -> float:
+    """How far apart the sparse lines of support lie, mm: what dense lines laid over it have to span."""
+    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
+    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density

@@ -16,15 +16,11 @@ import numpy as np
 from mdp.mesh import Floats
 from mdp.pose import shift
 from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union, unite_layers
-from slicer.interface.base_plane import BasePlane
-from slicer.interface.interface import frame_change, sections_of
+from slicer.interface.interface import BasePlane, frame_change, sections_of
 from slicer.overhangs import LEAST_MM2
-from slicer.sections import Sections
-from slicer.support.blocker import blocked_areas, near_table, support_reach_mm
-from slicer.support.missed import find_missed
-from slicer.support.reachable import ReachableAreas, reachable_areas
-from slicer.support.support import Supports, grow, stand, widen_foot
-from slicer.zones import no_seam_segments, no_support_areas
+from slicer.sectioning import Sections, no_seam_segments, no_support_areas
+from slicer.support.reachable import ReachableAreas, blocked_areas, near_table, reachable_areas, support_reach_mm
+from slicer.support.support import Supports, find_missed, grow, stand, widen_foot
 
 AROUND_MM = 3.0  # support handed down may go so much farther aside than its lean takes it
 SHALLOW_MM = 1.2  # so far below a plane the middles of support that can come up to it lie

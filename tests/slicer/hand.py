@@ -20,7 +20,7 @@ from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights
 from slicer.paths import KINDS, Kind, SlicedPart
 from slicer.paths import Path as Stroke
-from slicer.sections import Sections
+from slicer.sectioning import Sections
 from slicer.strokes.strokes import Strokes
 from tests.shapes import from_manifold
 

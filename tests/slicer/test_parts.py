@@ -7,10 +7,10 @@ import sys
 
 import pytest
 
-import slicer.parts
+import slicer.slice
 from mdp.kernels import threads
 from profiles.errors import SliceError
-from slicer.parts import SlicingProgress, slice_parts
+from slicer.slice import SlicingProgress, slice_parts
 from tests.shapes import box, hollow_tee
 from tests.slicer.hand import content, cut, profile, whole
 
@@ -23,7 +23,7 @@ def test_parts_side_by_side_are_the_same_bytes_as_one_after_the_other(cores: int
     parts = cut(box(10, 10, 60), *PLANES)
     monkeypatch.setattr(threads, "THREADS", cores)
     together = slice_parts(parts, profile())
-    monkeypatch.setattr(slicer.parts, "parallel_map", lambda work, count, **_: map(work, range(count)))
+    monkeypatch.setattr(slicer.slice, "parallel_map", lambda work, count, *_, **__: map(work, range(count)))
     assert [piece.index for piece in together] == [1, 2, 3]
     assert [content(piece) for piece in together] == [content(piece) for piece in slice_parts(parts, profile())]
 
@@ -79,7 +79,7 @@ def test_no_parts_are_sliced_to_none() -> None:
 
 SLICING = """
 import os
-import slicer.parts
+import slicer.slice
 from mdp.kernels import threads
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
@@ -89,9 +89,9 @@ def slice_supported(*_):
     while True:
         pass
 
-slicer.parts.slice_supported = slice_supported
+slicer.slice.slice_supported = slice_supported
 threads.use_threads(2)
-slicer.parts.slice_parts(cut(box(10, 10, 60), ((0.0, 0.0, 1.0), 30.0)), profile())
+slicer.slice.slice_parts(cut(box(10, 10, 60), ((0.0, 0.0, 1.0), 30.0)), profile())
 """
 
 
@@ -113,8 +113,8 @@ def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -
 
 ENDING = """
 import gc
-from slicer.interface.base_plane import room_of
-from slicer.parts import slice_parts
+from slicer.interface.interface import room_of
+from slicer.slice import slice_parts
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 

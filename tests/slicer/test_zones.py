@@ -11,11 +11,10 @@ from mdp.zone import AnyZone, Grown, Marked, Zone
 from profiles.frozen import Vector
 from slicer.estimate.hanging import thick_supports
 from slicer.heights import Heights
-from slicer.parts import slice_parts
 from slicer.paths import Kind, SlicedPart
-from slicer.slice import slice_part
-from slicer.support.blocker import unwanted_areas
-from slicer.zones import no_seam_segments, no_support_areas
+from slicer.sectioning import no_seam_segments, no_support_areas
+from slicer.slice import slice_part, slice_parts
+from slicer.support.reachable import unwanted_areas
 from tests.shapes import box, tee
 from tests.slicer.hand import BARE, cut, of_kind, profile, sections_at, volume_mm3, whole
 

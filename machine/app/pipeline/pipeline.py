@@ -43,8 +43,8 @@ from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 from slicer.interface.interlock import pin_width_mm, room_around_mm
-from slicer.parts import SlicingProgress, slice_parts
 from slicer.paths import SlicedPart
+from slicer.slice import SlicingProgress, slice_parts
 
 
 @dataclass(frozen=True, eq=False)

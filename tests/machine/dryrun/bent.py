@@ -13,7 +13,7 @@ from mdp.mesh import Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level
 from profiles.profile import Profile, load
-from slicer.parts import slice_parts
+from slicer.slice import slice_parts
 from tests.machine.hand import part
 from tests.shapes import from_manifold
 

@@ -11,7 +11,7 @@ from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile, load
-from slicer.parts import slice_parts
+from slicer.slice import slice_parts
 from tests.machine.dryrun.planted import layers_of, word
 from tests.shapes import standing
 from tests.slicer.hand import whole

@@ -9,9 +9,8 @@ from machine.planning.moves import SPEED, Moves
 from machine.planning.priming import RUN_MM, run_in
 from profiles.profile import Profile, load
 from slicer.bead import Bead
-from slicer.interface.interlock import begin_inside
 from slicer.paths import Kind, Layer, Path
-from slicer.slice import slice_part
+from slicer.slice import begin_inside, slice_part
 from tests.shapes import box
 from tests.slicer.hand import BARE, cut
 

@@ -16,7 +16,7 @@ from profiles.profile import Profile, load
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, Layer, Path
 from slicer.slice import slice_part
-from slicer.strokes.wiping import way_of_wipe
+from slicer.strokes.travels import way_of_wipe
 from tests.machine.moves import Retract, Stroke, Travel, Wipe, moves_of
 from tests.shapes import box
 from tests.slicer.hand import whole

@@ -13,7 +13,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.topology.cross_section import cross_sections
 from profiles.errors import SliceError
 from slicer.geometry.polygons import CLOSING_MM, area_mm2, clean, contours
-from slicer.overhangs import faces_by_layer
+from slicer.sectioning import faces_by_layer
 from tests.shapes import ball, bowl, box, from_manifold, hollow
 from tests.slicer.hand import profile, shared
 

@@ -11,9 +11,8 @@ from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from profiles.process import Process
 from slicer.estimate.estimate import Estimate, estimate
-from slicer.parts import slice_parts
 from slicer.paths import Kind
-from slicer.slice import slice_part
+from slicer.slice import slice_part, slice_parts
 from tests.shapes import box, standing, tee
 from tests.slicer.hand import BARE, SOLID, cut, profile, volume_mm3, whole
 

@@ -12,8 +12,7 @@ from mdp.pose import Pose, unit
 from profiles.frozen import Vector
 from slicer.geometry.polygons import Polygons
 from slicer.heights import Heights
-from slicer.interface.base_plane import BasePlane, plane_in_frame_of
-from slicer.interface.interface import frame_change
+from slicer.interface.interface import BasePlane, frame_change, plane_in_frame_of
 from tests.shapes import box
 from tests.slicer.hand import as_shapely
 

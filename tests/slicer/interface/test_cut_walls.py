@@ -9,12 +9,10 @@ import pytest
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, contours, offset, strips
-from slicer.interface.cut_faces import interface_mm3
 from slicer.overhangs import find_overhangs
 from slicer.paths import Kind
-from slicer.sectioning import section_part
-from slicer.sections import Sections
-from slicer.shells import Shells, build_shells
+from slicer.sectioning import Sections, section_part
+from slicer.shells import Shells, build_shells, interface_mm3
 from slicer.slice import slice_part
 from slicer.support.support import own_supports
 from tests.shapes import from_manifold

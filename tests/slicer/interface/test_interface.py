@@ -13,19 +13,18 @@ from mdp.mesh import Floats
 from mdp.topology.cross_section import cross_sections
 from slicer.bead import OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons, clean
-from slicer.interface.base_plane import plane_in_frame_of
-from slicer.interface.cut_faces import joined, nearest_areas
 from slicer.interface.interface import (
     frame_change,
     near_parts,
+    plane_in_frame_of,
     plastic_below,
     sections_of,
     skin_beside,
 )
-from slicer.interface.interlock import begin_inside
 from slicer.paths import Kind, Layer
 from slicer.sectioning import section_part
-from slicer.slice import slice_part
+from slicer.shells import joined, nearest_areas
+from slicer.slice import begin_inside, slice_part
 from tests.mdp.solids import random_direction, random_solid
 from tests.shapes import box
 from tests.slicer.hand import as_shapely, cut, profile

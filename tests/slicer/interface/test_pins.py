@@ -16,11 +16,10 @@ from mdp.mesh import Floats
 from profiles.errors import ProfileError
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, with_part_settings
-from slicer.interface.interlock import fill_pins, plan_pins
+from slicer.interface.interlock import plan_pins
 from slicer.paths import Kind, bead_area_mm2
-from slicer.sectioning import section_part
-from slicer.sections import Sections
-from slicer.slice import slice_part
+from slicer.sectioning import Sections, section_part
+from slicer.slice import fill_pins, slice_part
 from tests.shapes import box, from_manifold
 from tests.slicer.hand import BARE, cut, profile
 

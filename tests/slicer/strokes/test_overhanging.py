@@ -15,8 +15,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
-from slicer.strokes.overhanging import split_overhangs
-from slicer.strokes.strokes import Strokes, strokes_of
+from slicer.strokes.strokes import Strokes, split_overhangs, strokes_of
 from slicer.strokes.travels import NOWHERE
 from tests.shapes import standing
 from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, rows_of, whole

@@ -9,12 +9,10 @@ import pytest
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from slicer.geometry.polygons import contours
-from slicer.sectioning import section_part
-from slicer.sections import Sections
+from slicer.sectioning import Sections, section_part
 from slicer.slice import slice_part
 from slicer.strokes.seam import seam_limits
-from slicer.strokes.seam_plan import JUMP, SHIFT, Places, choose, plan_seams
-from slicer.strokes.visibility import Outside, Visibility
+from slicer.strokes.seam_plan import JUMP, SHIFT, choose, light_at, light_samples, plan_seams
 from tests.shapes import standing
 from tests.slicer.hand import BARE, cut, profile, whole
 from tests.slicer.strokes.test_seam import distance_mm, outer_seams
@@ -75,14 +73,17 @@ def test_seams_beside_a_joint_keep_clear_of_its_edge_and_lie_in_the_groove_that_
     assert np.abs(np.abs(np.concatenate(planned(top, base))) - [7, 2]).max() < 0.05
 
 
+def light(of: Sections, layer: int, asked: list[list[float]]) -> Floats:
+    return light_at(layer, np.array(asked), of.heights.cut_mm, *light_samples(of, [contours(area) for area in of.outlines]))
+
+
 def test_another_part_keeps_the_light_from_a_wall_that_it_stands_before() -> None:
     post, shade = m3.Manifold.cube((10, 10, 30), True), m3.Manifold.cube((4, 60, 30), True).translate((9, 0, 0))
     joined = post + shade + m3.Manifold.cube((30, 60, 4), True).translate((3, 0, -17))
     base, top = cut(standing(joined), ((0, 0, 1), 20.0))
-    alone, beside = (Visibility(of, [contours(area) for area in of.outlines]) for of in (sections(base), sections(base, top)))
-    facing = Outside(np.array([[5.0, 0.0]]), np.array([[1.0, 0.0]]))
     last = len(sections(base).outlines) - 2
-    assert beside.at(last, facing)[0] < alone.at(last, facing)[0] - 0.15
+    [alone], [beside] = (light(of, last, [[5.0, 0.0, 1.0, 0.0]]) for of in (sections(base), sections(base, top)))
+    assert beside < alone - 0.15
 
 
 def test_a_flat_wall_gets_all_light_and_one_beside_an_inner_corner_half_of_it() -> None:
@@ -90,10 +91,9 @@ def test_a_flat_wall_gets_all_light_and_one_beside_an_inner_corner_half_of_it() 
     ell = m3.Manifold.cube((100, 100, 100)) - m3.Manifold.cube((50, 50, 100)).translate((50, 50, 0))
     of = sections(whole(standing(ell)))
     (loop,) = contours(of.outlines[250])
-    visibility = Visibility(of, [contours(area) for area in of.outlines])
     corner = 0.5 * (loop.max(axis=0) + loop.min(axis=0))
-    asked = Outside(np.array([[corner[0] + 0.5, corner[1]], [loop[:, 0].min(), corner[1]]]), np.array([[0.0, 1.0], [-1.0, 0.0]]))
-    assert visibility.at(250, asked) == pytest.approx([0.5, 1.0], abs=0.06)
+    asked = [[corner[0] + 0.5, corner[1], 0.0, 1.0], [loop[:, 0].min(), corner[1], -1.0, 0.0]]
+    assert light(of, 250, asked) == pytest.approx([0.5, 1.0], abs=0.06)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -109,6 +109,6 @@ def test_no_other_choice_of_places_costs_less(seed: int) -> None:
         ways = [np.hypot(*(xy[at[k]] - xy[at[j]])) for k, j in enumerate(below) if j is not None]
         return float(cost[at].sum() + np.minimum(SHIFT * np.array(ways), JUMP).sum())
 
-    chosen = choose(Places(xy, cost, np.arange(0, 5 * count + 1, count), layer))
+    chosen = choose(xy, cost, np.arange(0, 5 * count + 1, count), layer)
     taken = tuple(int(np.hypot(*(xy[count * k : count * (k + 1)] - place).T).argmin()) for k, place in enumerate(chosen))
     assert costs(taken) == pytest.approx(min(costs(choice) for choice in product(range(count), repeat=5)))

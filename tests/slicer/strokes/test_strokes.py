@@ -6,9 +6,7 @@ import pytest
 from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, bead_area_mm2
-from slicer.strokes.pieces import in_pieces
-from slicer.strokes.split import split
-from slicer.strokes.strokes import strokes_of
+from slicer.strokes.strokes import in_pieces, split, strokes_of
 from tests.slicer.hand import rows_of
 
 

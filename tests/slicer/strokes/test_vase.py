@@ -12,9 +12,8 @@ from machine.planning.plan import plan
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
 from profiles.errors import SliceError
-from slicer.parts import slice_parts
 from slicer.paths import Kind, bead_area_mm2
-from slicer.slice import slice_part
+from slicer.slice import slice_part, slice_parts
 from tests.shapes import box, standing, tee
 from tests.slicer.hand import BARE, cut, profile, whole
 

@@ -7,7 +7,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, offset
 from slicer.paths import Kind
 from slicer.strokes.strokes import strokes_of
-from slicer.strokes.wiping import may_wipe_over
+from slicer.strokes.travels import may_wipe_over
 
 SQUARE = Polygons.square((20.0, 20.0))
 SKIN = SQUARE - offset(SQUARE, -0.36)

@@ -16,9 +16,9 @@ from mdp.pose import unit
 from slicer.geometry.polygons import Polygons
 from slicer.interface.interface import frame_change
 from slicer.overhangs import find_overhangs
-from slicer.parts import slice_parts
 from slicer.paths import Kind
 from slicer.sectioning import section_part
+from slicer.slice import slice_parts
 from slicer.support.handed_down import plan_supports, up_to
 from slicer.support.support import Supports, own_supports
 from tests.shapes import box, from_manifold, standing, tee

@@ -10,11 +10,11 @@ from mdp.decomposition import Decomposition
 from mdp.plane import Plane
 from profiles.profile import load
 from slicer.heights import Heights
-from slicer.interface.base_plane import AROUND_MM, shadow_of
-from slicer.parts import slice_parts
+from slicer.interface.interface import AROUND_MM, shadow_of
 from slicer.paths import Kind, SlicedPart
 from slicer.sectioning import section_part
-from slicer.support.blocker import above_base_planes, head_room
+from slicer.slice import slice_parts
+from slicer.support.reachable import above_base_planes, head_room
 from tests.limbs import decomposed, limb, posts
 from tests.shapes import from_manifold
 

@@ -4,8 +4,7 @@ import manifold3d as m3
 import pytest
 
 from mdp.decomposition import Part
-from slicer.parts import slice_parts
-from slicer.slice import slice_part
+from slicer.slice import slice_part, slice_parts
 from tests.shapes import standing, tee
 from tests.slicer.hand import cut, profile, whole
 

@@ -14,8 +14,7 @@ from slicer.heights import Heights
 from slicer.paths import Kind
 from slicer.sectioning import section_part
 from slicer.support.beads import support_beads, support_cell_mm
-from slicer.support.blocker import above_base_planes
-from slicer.support.reachable import ReachableAreas
+from slicer.support.reachable import ReachableAreas, above_base_planes
 from tests.mdp.solids import random_direction
 from tests.shapes import box
 from tests.slicer.hand import as_shapely, profile, ragged, whole

@@ -13,8 +13,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, bead_area_mm2
-from slicer.strokes.pieces import in_pieces
-from slicer.strokes.strokes import strokes_of
+from slicer.strokes.strokes import in_pieces, strokes_of
 from slicer.walls.walls import LEAST_GAP, MOST_WIDER, gaps
 from tests.slicer.hand import as_shapely, rows_of
 

@@ -18,8 +18,7 @@ from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
 from slicer.slice import slice_part
-from slicer.strokes.pieces import in_pieces
-from slicer.strokes.strokes import strokes_of
+from slicer.strokes.strokes import in_pieces, strokes_of
 from slicer.walls.counts import FEATURE, count_beads
 from slicer.walls.loops import lay_loops
 from slicer.walls.skeleton import skeleton_of

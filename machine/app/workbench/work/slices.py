@@ -20,7 +20,7 @@ from machine.view.page import print_page, with_comparison
 from mdp.decomposition import Decomposition
 from mdp.kernels.workers import Tell
 from profiles.profile import Profile
-from slicer.parts import SlicingProgress
+from slicer.slice import SlicingProgress
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.decomposition import Decomposition
 from profiles.profile import load
-from slicer.parts import slice_parts
+from slicer.slice import slice_parts
 from tests.shapes import from_manifold
 from tests.slicer.hand import cut
 

@@ -16,7 +16,7 @@ from machine.app.workbench.work.walls import walls
 from machine.dryrun.findings import Finding, known_findings
 from machine.program import Alternative
 from profiles.errors import PlanError
-from slicer.parts import slice_parts
+from slicer.slice import slice_parts
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
