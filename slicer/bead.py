@@ -9,6 +9,7 @@ import numpy as np
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.process import WIDTHS, Process
+from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, bead_area_mm2
 
@@ -22,6 +23,9 @@ EVEN_MM = 0.03  # widths that differ by less are one
 
 
 NARROWEST = 0.6  # diameters of the nozzle
+
+
+NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 
 @kernel
@@ -95,6 +99,16 @@ def width_for_mm(spacing: float, height_mm: float) -> float:
 def least_width_mm(nozzle_mm: float, height_mm: float) -> float:
     """Width of the narrowest bead."""
     return max(NARROWEST * nozzle_mm, height_mm)
+
+
+def wall_rank(level: int, process: Process) -> int:
+    """Rank of a wall counted from outside."""
+    return -level if process.wall_order == "inner-first" else level - process.walls
+
+
+def hanging_area(section: Polygons, below: Polygons, share: float, width_mm: float) -> Polygons:
+    """Where the centreline of a bead has less than a share of its width on what is below."""
+    return section - offset(below, (0.5 - share) * width_mm + NOISE_MM)
 
 
 def bulge_flow(width_mm: float, height_mm: float, free_sides: int, most_mm: float) -> float:

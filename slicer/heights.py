@@ -93,6 +93,13 @@ def pedestal_layers(heights: Heights, pedestal_mm: float) -> int:
     return int(np.searchsorted(heights.tip_mm, pedestal_mm + 1e-6))
 
 
+def shell_layers(process: Process) -> tuple[int, int]:
+    """Solid layers under and over a surface: as many as asked for, more where layers are thin; 0 stays 0."""
+    counts = (process.top_layers, process.top_thickness_mm), (process.bottom_layers, process.bottom_thickness_mm)
+    top, bottom = (max(count, ceil(mm / process.layer_height_mm - 1e-6)) if count else 0 for count, mm in counts)
+    return top, bottom
+
+
 def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm: float) -> Heights:
     """Equal layers of a part that reaches from its base plane up to top_mm.
 

@@ -1,18 +1,56 @@
-"""Overhangs: what of each layer needs support, what bridges from anchor to anchor, and what is a ledge that carries itself."""
+"""Overhangs: what of each layer needs support, what is a ledge that carries itself, and what bridges from anchor to anchor, in
+the direction in which its lines sag least."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
+import numpy as np
+
+from mdp.kernels.arrays import floats, ints, table
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats
 from mdp.overhang import UP, facing_down
 from mdp.support_need.need import needs_support
-from slicer.fill.bridge import LEAST, Bridge, find_bridge
-from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, islands, offset, union
+from mdp.support_need.spans import ROUNDING_MM, TOLERATED, line_across
+from slicer.geometry.clip import rotation_2d
+from slicer.geometry.edge_index import EdgeIndex, index_edges, within
+from slicer.geometry.polygons import (
+    Polygons,
+    edges,
+    islands,
+    offset,
+    opening,
+    strips,
+    union,
+)
 from slicer.sectioning import RIM_MM, Sections, faces_by_layer
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
-HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
+TURNS = 18  # directions tried over half a turn, besides those of the place's own sides; the search tries fewer
+SIDES = 8  # of its longest sides are tried, along and across: lines follow a real side, not the mean of several
+LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
+LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
+ADRIFT = 10.0  # and one held nowhere like this
+LINE_RIM_MM = 0.02  # neighbouring lines overlap by this so that they unite
+GAIN = 0.01  # a direction is better only by this share, more than where the lines happen to lie; else the place's own sides win
+
+
+@dataclass(frozen=True, eq=False)
+class Bridge:
+    """hanging: what it spans; angle_deg: direction of its lines, 0 to 180.
+
+    longest_mm: the longest span; loose: share of the lines' length that is not held at both ends.
+    """
+
+    hanging: Polygons
+    angle_deg: float
+    longest_mm: float
+    loose: float
+
+    def carries(self, longest_mm: float) -> bool:
+        """Whether it needs no support: every line from anchor to anchor, none longer than that."""
+        return self.loose <= TOLERATED and self.longest_mm <= longest_mm + ROUNDING_MM
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,16 +130,128 @@ def _sort_islands(
     return Overhang(left ^ need, tuple(bridges), left - need)
 
 
-def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
-    """The places that hanging layers make up together."""
-    areas = [offset(area, RIM_MM) for area in hanging if not area.is_empty()]
-    return union([union(areas[k : k + HEAP]) for k in range(0, len(areas), HEAP)])
+def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
+    """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
+
+    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The sum of squared spans is
+    least, a line held at one end counting as 2.63 times its length: where all lines reach over, that is the direction of the
+    shortest spans.
+    """
+    if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):
+        return None
+    sides = edges(hanging)
+    angle, longest_mm, loose, _ = _least_sag(sides, anchors, _angles(sides), width_mm)
+    return None if np.isnan(angle) else Bridge(hanging, float(np.degrees(angle)), longest_mm, loose)
 
 
-def drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
-    """The hanging places without those that, seen from above, are too small to matter."""
-    small = union([island for island in islands(seen_from_above(hanging)) if island.area() < least_mm2])
-    if small.is_empty():
-        return list(hanging)
-    large = [area if area.is_empty() else area - small for area in hanging]
-    return [area if area.area() >= LEAST_MM2 else Polygons() for area in large]
+def _angles(sides: Floats) -> Floats:
+    """Directions worth trying, radians in 0 .. pi, those of the place's sides first."""
+    steps = sides[:, 2:] - sides[:, :2]
+    longest = np.argsort(-np.hypot(*steps.T), kind="stable")[:SIDES]
+    along = np.arctan2(steps[longest, 1], steps[longest, 0])
+    own = np.round(np.concatenate([along, along + 0.5 * np.pi]) % np.pi, 4)
+    return np.concatenate([np.unique(own), np.pi * np.arange(TURNS) / TURNS])
+
+
+@kernel
+def _least_sag(sides: Floats, anchors: EdgeIndex, angles: Floats, width_mm: float) -> tuple[float, float, float, float]:
+    """The angle at which lines sag least (nan: none is held), its longest span and the loose share of its lines; and the angle
+    with the greatest length of lines held at both ends."""
+    best, least, longest_mm, loose = np.nan, np.inf, 0.0, 0.0
+    holding, most_mm = 0.0, -1.0
+    for angle in angles:
+        lines = _lines_across(sides, anchors, angle, width_mm)
+        total = sagging = free = longest = 0.0
+        any_held = False
+        for k in range(len(lines)):
+            held, span = lines[k, 3], lines[k, 1] - lines[k, 0]
+            total, longest, any_held = total + span, max(longest, span), any_held or held > 0.0
+            sagging += (1.0 if held == 2.0 else LOOSE**2 if held == 1.0 else ADRIFT**2) * span * span
+            free += span if held < 2.0 else 0.0
+        if total - free > most_mm:
+            holding, most_mm = angle, total - free
+        if any_held and sagging < least * (1.0 - GAIN) * total:
+            best, least, longest_mm, loose = angle, sagging / total, longest, free / total
+    return best, longest_mm, loose, holding
+
+
+@kernel
+def _lines_across(sides: Floats, anchors: EdgeIndex, angle: float, width_mm: float) -> Floats:
+    """(n, 4) lines of a width across a place: begin, end and height in the frame turned by the angle; how many ends are held."""
+    cos, sin, low, high, room = np.cos(angle), np.sin(angle), np.inf, -np.inf, 1
+    for e in range(len(sides)):
+        y, after = sides[e, 1] * cos - sides[e, 0] * sin, sides[e, 3] * cos - sides[e, 2] * sin
+        low, high, room = min(low, y), max(high, y), room + int(abs(after - y) / width_mm) + 1
+    out, places, crossed = table(room // 2, 4), floats(len(sides), 0.0), ints(len(sides), 0)
+    n = 0
+    for line in range(int(np.ceil((high - low) / width_mm - 0.5))):
+        y = low + (line + 0.5) * width_mm
+        for c in range(0, line_across(sides, (cos, sin), y, places, crossed) - 1, 2):
+            for end in range(2):
+                x = places[c + end]
+                out[n, end] = x
+                out[n, 3] += int(within(anchors, cos * x - sin * y, sin * x + cos * y))
+            out[n, 2] = y
+            n += 1
+    return out[:n]
+
+
+def bridges_of_layers(
+    sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons]
+) -> list[tuple[Bridge, ...]]:
+    """The bridges of every layer: those that carry themselves, and what hangs over no support, as well as it can be.
+
+    Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
+    supported: where each layer's support is.
+    """
+    process, heights, outlines = sections.process, sections.heights, sections.outlines
+    bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
+    for i, overhang in enumerate(overhangs):
+        free, below = overhang.hanging + overhang.ledges, sections.below(i)
+        if free.is_empty() or below is None:
+            continue
+        drop_mm = float(heights.bottom_mm[i]) - process.support_gap_mm - 2.0 * process.layer_height_mm
+        lowest = int(np.searchsorted(heights.tip_mm, drop_mm))
+        held = union([area for area in supported[lowest:i] if not area.is_empty()])
+        held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
+        bare = opening(free - held, 0.25 * process.line_width_mm)
+        if not bare.is_empty():
+            slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
+            carrying = union([below if i else offset(below, RIM_MM), held, slopes])
+            anchors = index_edges(offset(carrying, 0.25 * process.line_width_mm))
+            bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
+    return bridges
+
+
+def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> list[Bridge]:
+    """Lines over one connected hanging place, each piece of it in the direction in which most of them are held at both ends.
+
+    Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn.
+    """
+    bridges: list[Bridge] = []
+    left = [hanging]
+    while left:
+        piece = left.pop()
+        bridge = find_bridge(piece, anchors, width_mm)
+        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(piece, anchors, width_mm)
+        if held is None:
+            bridges += [bridge] if bridge is not None else []
+        else:
+            bridges.append(held)
+            left += islands(opening(piece - held.hanging, 0.25 * width_mm))
+    return bridges
+
+
+def _held_piece(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
+    """What of a place has lines held at both ends in the direction that has most of them; None where that is next to nothing."""
+    sides = edges(hanging)
+    *_, angle = _least_sag(sides, anchors, _angles(sides), width_mm)
+    lines = _lines_across(sides, anchors, angle, width_mm)
+    lines = lines[lines[:, 3] == 2.0]
+    if not len(lines):
+        return None
+    ends = lines[:, [0, 2, 1, 2]].reshape(-1, 2, 2) @ rotation_2d(float(np.degrees(angle))).T
+    piece = opening(strips(list(ends), 0.5 * width_mm + LINE_RIM_MM) ^ hanging, 0.5 * width_mm)
+    if piece.area() < LEAST * width_mm**2:
+        return None
+    return Bridge(piece, float(np.degrees(angle)), float((lines[:, 1] - lines[:, 0]).max()), 0.0)

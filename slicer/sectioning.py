@@ -27,7 +27,6 @@ from slicer.bead import (
     least_width_mm,
     with_line_width,
 )
-from slicer.fill.region import shell_layers
 from slicer.geometry.polygons import (
     CLOSING_MM,
     Polygons,
@@ -43,10 +42,21 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm
-from slicer.heights import Heights, part_heights, pedestal_layers
-from slicer.interface.interface import joints, limb_planes, near_parts, plane_in_frame_of, plastic_below, sections_of
-from slicer.interface.interlock import Pins, cut_grooves, cut_pins, grooves, plan_pins
-from slicer.walls.counts import FEATURE
+from slicer.heights import Heights, part_heights, pedestal_layers, shell_layers
+from slicer.interface.interface import (
+    Pins,
+    cut_grooves,
+    cut_pins,
+    grooves,
+    joints,
+    limb_planes,
+    near_parts,
+    plan_pins,
+    plane_in_frame_of,
+    plastic_below,
+    sections_of,
+)
+from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
 TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps

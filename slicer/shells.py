@@ -13,12 +13,25 @@ import numpy as np
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import WALLS, Bead, first_layer_process, interface_process, spacing_mm, with_line_width
-from slicer.fill.bridge import Bridge, bridge_area, bridge_beads, find_bridges, infill_bridge_area
+from slicer.bead import (
+    WALLS,
+    Bead,
+    bulge_flow,
+    first_layer_process,
+    hanging_area,
+    interface_process,
+    mean_width_mm,
+    outer_wall_width_mm,
+    spacing_mm,
+    varying,
+    wall_rank,
+    width_for_mm,
+    with_line_width,
+)
 from slicer.fill.infill import infill_beads, pattern_density
-from slicer.fill.region import Cover, Region, regions, shell_layers
-from slicer.fill.skin import SolidLines, ironed_areas, ironing_beads, skin_lines, uncovered_area
-from slicer.geometry.edge_index import index_edges
+from slicer.fill.region import Cover, Region, ironed_areas, regions
+from slicer.fill.skin import SolidLines, skin_beads, skin_lines
+from slicer.geometry.clip import cut_line
 from slicer.geometry.polygons import (
     CLOSING_MM,
     Polygons,
@@ -32,15 +45,15 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm, simplify
+from slicer.heights import shell_layers
 from slicer.interface.interface import limb_planes, plane_in_frame_of
-from slicer.overhangs import Overhang
-from slicer.paths import Kind
-from slicer.sectioning import RIM_MM, Sections
-from slicer.strokes.strokes import cut_line, hanging_area
+from slicer.overhangs import Bridge, Overhang, bridges_of_layers
+from slicer.paths import Kind, bead_area_mm2
+from slicer.sectioning import Sections
 from slicer.support.beads import auxiliary_beads
 from slicer.support.support import Supports
 from slicer.walls.variable import Wall
-from slicer.walls.walls import Walls, gaps, layer_walls, wall_beads, wall_rank, walls
+from slicer.walls.walls import Walls, gaps, layer_walls, uncovered_area, walls
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
@@ -52,6 +65,13 @@ REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cu
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
+
+
+NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges
+ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
+
+
+IRONED = 100  # after all else of an island
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +129,8 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     walled = [_walls_from(*found) for found in parallel_map(contours_of, len(processes), FEWEST_LAYERS)]
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
     filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process)
-    bridges = bridges_of_layers(sections, overhangs, supports.areas)
     ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process)
+    bridges = bridges_of_layers(sections, overhangs, supports.areas)
     infill = with_line_width(process, process.infill_line_width_mm)
     return Shells(
         supports,
@@ -241,33 +261,6 @@ def cover(sections: Sections, model: Sequence[Polygons | None], insides: Sequenc
     return Cover(filled, insides, below, above[:top], later if any(not area.is_empty() for area in later) else ())
 
 
-def bridges_of_layers(
-    sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons]
-) -> list[tuple[Bridge, ...]]:
-    """The bridges of every layer: those that carry themselves, and what hangs over no support, as well as it can be.
-
-    Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
-    supported: where each layer's support is.
-    """
-    process, heights, outlines = sections.process, sections.heights, sections.outlines
-    bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
-    for i, overhang in enumerate(overhangs):
-        free, below = overhang.hanging + overhang.ledges, sections.below(i)
-        if free.is_empty() or below is None:
-            continue
-        drop_mm = float(heights.bottom_mm[i]) - process.support_gap_mm - 2.0 * process.layer_height_mm
-        lowest = int(np.searchsorted(heights.tip_mm, drop_mm))
-        held = union([area for area in supported[lowest:i] if not area.is_empty()])
-        held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
-        bare = opening(free - held, 0.25 * process.line_width_mm)
-        if not bare.is_empty():
-            slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
-            carrying = union([below if i else offset(below, RIM_MM), held, slopes])
-            anchors = index_edges(offset(carrying, 0.25 * process.line_width_mm))
-            bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
-    return bridges
-
-
 def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
     """What a layer prints of the part itself, and for it; walls that run round come as loops, without their seams."""
     laid = _part_beads(shells, layer), auxiliary_beads(shells.supports, shells.layers[layer].process, layer)
@@ -288,12 +281,12 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         area = bridge_area(bridge, shell.walls.inside, width)
         if not area.is_empty():
             beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
-            region = region.without(area, width)
+            region = _without(region, area, width)
     if layer and process.infill_density < DENSE:
         area = infill_bridge_area(region.solid, shells.layers[layer - 1].region.sparse, width)
         if not area.is_empty():
             beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
-            region = region.without(area, width)
+            region = _without(region, area, width)
     top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
     places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
     for area, kind, solid in ((region.solid, Kind.SKIN, lines), (region.top, Kind.TOP_SKIN, top)):
@@ -305,6 +298,71 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     beads += ironing_beads(shell.ironed, lines, process)
     sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
     return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
+
+
+def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
+    """The walls as beads; all ranks are at most 0, so that walls come before gaps, skin and infill.
+
+    Outer beads make up for what their outer round side leaves out of the section.
+    """
+    outer, beads = outer_wall_width_mm(process), []
+    outer_flow = bulge_flow(outer, height_mm, 1, process.outer_bulge * outer)
+    for level, loops in enumerate(walled.loops):
+        kind, width, flow = (Kind.INNER_WALL, process.line_width_mm, 1.0) if level else (Kind.OUTER_WALL, outer, outer_flow)
+        beads += [Bead(kind, loop, width, wall_rank(level, process), flow) for loop in loops]
+    for wall in walled.varying:  # one that fills a place from side to side bulges on both
+        kind, width = Kind.INNER_WALL if wall.level else Kind.OUTER_WALL, mean_width_mm(wall.course)
+        flow = bulge_flow(width, height_mm, wall.free, process.outer_bulge * process.line_width_mm)
+        rank, course = wall_rank(wall.level, process), varying(wall.course)
+        beads.append(Bead(kind, wall.points, width, rank, flow, line=not wall.closed, course=course))
+    return beads
+
+
+def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
+    """Where the lines of a bridge run: over what hangs of a layer's inside, and onto the anchors as far as the inside reaches."""
+    wide = opening(span.hanging ^ inside, 0.5 * width_mm)
+    return wide if wide.is_empty() else offset(wide, ANCHORED * width_mm) ^ inside
+
+
+def _without(region: Region, area: Polygons, width_mm: float) -> Region:
+    """The region without the place of a bridge."""
+
+    def rest(polygons: Polygons) -> Polygons:
+        left = polygons - area
+        return left if left.is_empty() or left.area() == polygons.area() else opening(left, 0.25 * width_mm)
+
+    return replace(region, top=rest(region.top), solid=rest(region.solid), sparse=rest(region.sparse))
+
+
+def bridge_beads(area: Polygons, lines: SolidLines, flow: float, over_infill: bool = False) -> list[Bead]:
+    """The lines of a bridge with its own flow. over_infill: the first solid ones over sparse infill, across the lines below
+    wherever those have one direction."""
+    return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in skin_beads(area, Kind.BRIDGE, lines)]
+
+
+def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float) -> Polygons:
+    """Where solid lines span the sparse infill of the layer below, and as far beyond as they hold on to what is solid there.
+
+    Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
+    """
+    if solid.is_empty() or sparse_below.is_empty():
+        return Polygons()
+    spanned = solid ^ sparse_below
+    if spanned.area() < (NARROW * width_mm) ** 2:
+        return Polygons()
+    wide = opening(spanned, 0.5 * NARROW * width_mm)
+    return wide if wide.is_empty() else offset(wide, ANCHORED * width_mm) ^ solid
+
+
+def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:
+    """Lines across those of the skin; their flow is counted on a bead of the line's width."""
+    if area.is_empty():
+        return []
+    spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
+    flow = process.ironing_flow * spacing * height_mm / bead_area_mm2(width, height_mm)
+    dense = SolidLines(skin.angle_deg + 90.0, width_for_mm(spacing, height_mm), height_mm, in_order=True)
+    beads, _ = skin_lines(area, Kind.IRONING, dense)
+    return [replace(bead, width_mm=width, flow=flow, rank=IRONED) for bead in beads]
 
 
 def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, float]:

@@ -10,7 +10,7 @@ processes slice. Where one part is most of the print, its layers are worked out 
 """
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, pi
@@ -26,20 +26,20 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.polyline import length_mm
-from slicer.interface.interface import skin_beside
-from slicer.interface.interlock import pin_width_mm, plan_pins
+from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm, mark_corners
+from slicer.heights import shell_layers
+from slicer.interface.interface import pin_width_mm, plan_pins, skin_beside
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.sectioning import Sections, section_part
 from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, lay_beads
 from slicer.strokes.order import order_beads
-from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams, rear_of, seam_limits
-from slicer.strokes.seam_plan import plan_seams
+from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
+from slicer.strokes.seam_plan import plan_seams, rear_of, seam_limits
 from slicer.strokes.speed import fan_share, first_layer_speeds, layer_time_s, own_fans, rising_fan, speeds_mm_s
 from slicer.strokes.strokes import Strokes, in_pieces, split, split_overhangs
 from slicer.strokes.travels import may_wipe_over
-from slicer.strokes.vase import bottom_layers, vase_layers
+from slicer.strokes.vase import vase_layers
 from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, explain, own_supports
 
@@ -154,7 +154,8 @@ def slice_part(
     """
     sections = section_part(part, profile, earlier, later)
     overhangs = find_overhangs(sections)
-    return slice_supported(own_supports(sections, overhangs), overhangs, on_layer)
+    supports = own_supports(sections, overhangs)
+    return slice_supported(supports, overhangs, on_layer)
 
 
 def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer: OnLayer | None = None) -> SlicedPart:
@@ -169,7 +170,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     layers: list[Layer] = []
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = rear, np.zeros((0, 2)), 0, len(sections.outlines)
-    usual = min(bottom_layers(process), count) if process.spiral_vase else count
+    usual = min(max(1, shell_layers(process)[1]), count) if process.spiral_vase else count
     for i, (own, auxiliary) in enumerate(parallel_map(partial(lay_beads, shells), usual, FEWEST_LAYERS)):
         if own:
             last = i
@@ -185,7 +186,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         if on_layer is not None:
             on_layer(i + 1, count)
     if usual < count:
-        layers += vase_layers(sections, supports.areas, tip)
+        layers += vase_layers(sections, supports.areas, usual, tip)
     _check_not_empty(sections, layers)
     if sections.on_platform and process.walls:
         _check_on_plate(sections.part, layers, process)
@@ -213,7 +214,9 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
         fan = process.interface_fan if index else process.interface_first_layer_fan
         add_c = process.interface_temperature_add_c
     layer_fan = fan * fan_share(material, process, layer_time_s(strokes, speeds, profile))
-    strokes = strokes.simplified()
+    own_fan = own_fans(strokes, material, fan, layer_fan)
+    corners = mark_corners(strokes.points, strokes.starts, PATH_RESOLUTION_MM)
+    strokes = replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts])
     return Layer(
         z_mm=float(sections.heights.tip_mm[index]),
         height_mm=float(sections.heights.height_mm[index]),
@@ -225,7 +228,7 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
         width_mm=strokes.width_mm,
         speed_mm_s=speeds,
         flow=strokes.flow * flow,
-        own_fan=own_fans(strokes, material, fan, layer_fan),
+        own_fan=own_fan,
         retract=strokes.retract,
         wiped=may_wipe_over(strokes, skin, material.wipe_mm),
         below_mm=np.zeros((len(strokes), 2)),
@@ -249,12 +252,11 @@ def order_layer(
     strokes = split_overhangs(strokes, outline, sections.below(index), own)
     if index == 0 and not on_platform and process.interlock == "grooves":
         strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
-    fixed: Mapping[Kind, float] | None = None
+    strokes = in_pieces(strokes, height_mm)
     flow = profile.material.flow
     if index == 0:
-        fixed = first_layer_speeds(process, on_platform)
         flow *= process.first_layer_flow if on_platform else process.interface_flow
-    strokes = in_pieces(strokes, height_mm)
+    fixed = None if index else first_layer_speeds(process, on_platform)
     return strokes, speeds_mm_s(strokes, profile, height_mm, fixed, flow), flow
 
 

@@ -24,7 +24,7 @@ CONFINED = {
         "mdp/repair/",
         "mdp/formats/polygons",
         "slicer/geometry/",
-        "slicer/interface/interlock",
+        "slicer/interface/",
         "machine/kinematics/collision",
         "machine/app/pipeline/precompile",
         "machine/calibration/coupon/",

@@ -66,9 +66,9 @@ def row(file: Path, profile: Profile) -> str:
     left_mm2 = [sum(supports.unsupported_mm2 for supports in several) for several in (own, planned)]
     volumes = [_mm3(several, profile) for several in (own, planned)]
     why = [
-        f"part {part.index} layer {area.layer + 1}: {area.mm2:.1f} mm2, {area.reason}"
+        f"part {part.index} layer {area.layer}: {area.mm2:.1f} mm2, {area.reason}"
         for part, supports in zip(parts, planned, strict=True)
-        for area in explain(supports.sections, supports.missed, supports.unwanted)
+        for area in explain(supports, supports.sections.heights.tip_mm)
     ]
     cells = [file.name, len(parts), f"{needs_mm2:.1f}", *(f"{mm2:.1f}" for mm2 in left_mm2)]
     cells += [f"{left_mm2[1] / max(needs_mm2, 1e-9):.4f}", *(f"{mm3:.0f}" for mm3 in volumes)]

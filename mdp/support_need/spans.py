@@ -1,6 +1,6 @@
 """Spans: whether straight lines over a hanging place, all in one direction, reach from anchor to anchor and are short enough.
 
-One definition for the search's patches of the surface and for the slicer's bridges (slicer.fill.bridge): where lines cross the
+One definition for the search's patches of the surface and for the slicer's bridges (slicer.overhangs): where lines cross the
 sides, and how much of their length may be loose or too long. Each chooses the directions and lines that it can afford, and what
 holds a line: in the search the sides of the rim that are anchors, in the slicer the layer below.
 """

@@ -16,15 +16,16 @@ from slicer.bead import Bead, with_line_width
 from slicer.estimate.duration import strokes_s
 from slicer.estimate.hanging import ThickSupport
 from slicer.fill.infill import pattern_density
-from slicer.fill.region import Cover, Region, region_of, shell_layers, sparse_area
+from slicer.fill.region import Cover, Region, region_of, sparse_area
 from slicer.geometry.polygons import Polygons
-from slicer.heights import Heights, pedestal_layers
+from slicer.heights import Heights, pedestal_layers, shell_layers
 from slicer.paths import bead_area_mm2
 from slicer.sectioning import Sections, section_part
 from slicer.shells import Shell, Shells, cover, cut_walls, lay_beads, layer_processes, model_sections, strengthen_overhangs
 from slicer.slice import order_layer
 from slicer.strokes.order import SUPPORTS
-from slicer.strokes.seam import NO_LIMITS, NO_SEAMS, Surroundings, place_seams, rear_of
+from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
+from slicer.strokes.seam_plan import NO_LIMITS, rear_of
 from slicer.support.handed_down import up_to
 from slicer.support.support import Supports
 from slicer.walls.walls import Walls

@@ -13,8 +13,7 @@ from mdp.kernels.sorting import rank
 from mdp.mesh import Floats, Indices, Ints, Mesh
 from profiles.process import Process
 from slicer.bead import spacing_mm
-from slicer.fill.region import shell_layers
-from slicer.heights import Heights
+from slicer.heights import Heights, shell_layers
 
 TINY_MM2 = 1e-9
 

@@ -2,15 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
 
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, larger, offset, opening, union
+from slicer.heights import shell_layers
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
 BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
 ANCHOR = 2.0  # line widths that solid layers under walls reach into the infill around, as a bridge reaches over its anchors
 FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
+
+
+LEAST_IRONED_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +28,6 @@ class Region:
     solid: Polygons
     sparse: Polygons
     uncut: Polygons
-
-    def without(self, area: Polygons, width_mm: float) -> "Region":
-        """The region without the place of a bridge."""
-
-        def rest(polygons: Polygons) -> Polygons:
-            left = polygons - area
-            return left if left.is_empty() or left.area() == polygons.area() else opening(left, 0.25 * width_mm)
-
-        return Region(self.bare, rest(self.top), rest(self.solid), rest(self.sparse), self.uncut)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +67,6 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
     sparse_areas = [sparse_area(*row, process) for row in zip(cover.insides, above, below, strict=False)]
     hollow = _without_footings(sparse_areas, cover, process)
     return [region_of(inside, hollow[i], cover, i, on_plastic, process) for i, inside in enumerate(insides)]
-
-
-def shell_layers(process: Process) -> tuple[int, int]:
-    """Solid layers under and over a surface: as many as asked for, more where layers are thin; 0 stays 0."""
-    counts = (process.top_layers, process.top_thickness_mm), (process.bottom_layers, process.bottom_thickness_mm)
-    top, bottom = (max(count, ceil(mm / process.layer_height_mm - 1e-6)) if count else 0 for count, mm in counts)
-    return top, bottom
 
 
 def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
@@ -180,3 +167,18 @@ def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, pr
     skin = opening(union(near) ^ inside, 0.5 * THIN * width_mm)
     left = opening(left if skin.is_empty() else left - offset(skin, 0.5 * width_mm), width_mm)
     return larger(left, FEW_MM2 * width_mm**2)
+
+
+def ironed_areas(regions: Sequence[Region], beside: Sequence[Polygons], process: Process) -> list[Polygons]:
+    """The skin of each layer that has nothing above it, a line's width away from where a later part will stand.
+
+    beside: what later parts have of each layer and of the one over the last.
+    """
+    if not process.ironing:
+        return [Polygons()] * len(regions)
+    width = process.line_width_mm
+    tops = [
+        region.bare if above.is_empty() else region.bare - offset(above, width)
+        for region, above in zip(regions, beside[1:], strict=True)
+    ]
+    return [larger(opening(top, 0.5 * width), LEAST_IRONED_MM2) for top in tops]

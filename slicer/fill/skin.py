@@ -7,34 +7,29 @@ over tops that stay visible, in dense lines that hardly push any plastic.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
-from mdp.mesh import Floats
-from profiles.process import Process
-from slicer.bead import Bead, spacing_mm, width_for_mm
+from mdp.mesh import Floats, Indices
+from slicer.bead import Bead, spacing_mm
 from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, horizontal_lines
-from slicer.fill.region import Region
-from slicer.geometry.clip import Indices, Pieces, rotation_2d
+from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
-from slicer.geometry.polygons import Polygons, islands, larger, offset, opening, strips
+from slicer.geometry.polygons import Polygons, islands, offset
 from slicer.geometry.polyline import length_mm
-from slicer.paths import Kind, bead_area_mm2
-from slicer.walls.walls import LEAST_GAP, gaps
+from slicer.paths import Kind
+from slicer.walls.walls import gaps, uncovered_area
 
 JOIN = 4.0  # spacings along the border: line ends nearer than this are joined
 EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
 RANK = 2  # behind gaps (slicer.walls.walls), before infill
-FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
 # Of 2,250 skins of bracket, tree, figure and the bunny (as they stand, default process, commit 5c72b83f) 90 of 100 ask for 0.82
 # to 1.06. What asks for less or more are specks whose lines hardly fit.
 LEAST_FLOW, MOST_FLOW = 0.85, 1.15
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
-IRONED = 100  # after all else of an island
-LEAST_IRONED_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
 
 
 @dataclass(frozen=True)
@@ -194,36 +189,3 @@ def _nearer_end_first(line: Floats, out: Sequence[Floats], turned: Floats) -> Fl
         return line
     tip = out[-1][-1]
     return line[::-1] if np.hypot(*(line[-1] - tip)) < np.hypot(*(line[0] - tip)) else line
-
-
-def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> Polygons:
-    """What of an area lines of that width do not cover, as far as plastic fits into it."""
-    few_mm2 = FEW_MM2 * width_mm**2
-    rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
-    return larger(opening(larger(rest, few_mm2), 0.5 * LEAST_GAP * width_mm), few_mm2)
-
-
-def ironed_areas(regions: Sequence[Region], beside: Sequence[Polygons], process: Process) -> list[Polygons]:
-    """The skin of each layer that has nothing above it, a line's width away from where a later part will stand.
-
-    beside: what later parts have of each layer and of the one over the last.
-    """
-    if not process.ironing:
-        return [Polygons()] * len(regions)
-    width = process.line_width_mm
-    tops = [
-        region.bare if above.is_empty() else region.bare - offset(above, width)
-        for region, above in zip(regions, beside[1:], strict=True)
-    ]
-    return [larger(opening(top, 0.5 * width), LEAST_IRONED_MM2) for top in tops]
-
-
-def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:
-    """Lines across those of the skin; their flow is counted on a bead of the line's width."""
-    if area.is_empty():
-        return []
-    spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
-    flow = process.ironing_flow * spacing * height_mm / bead_area_mm2(width, height_mm)
-    dense = SolidLines(skin.angle_deg + 90.0, width_for_mm(spacing, height_mm), height_mm, in_order=True)
-    beads, _ = skin_lines(area, Kind.IRONING, dense)
-    return [replace(bead, width_mm=width, flow=flow, rank=IRONED) for bead in beads]

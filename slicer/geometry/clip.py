@@ -1,18 +1,20 @@
-"""Clip: open lines clipped to the inside of polygons, each piece with the edges of the border on which it ends."""
+"""Clip: open lines clipped to the inside of polygons, each piece with the edges of the border on which it ends, and lines cut
+where they enter and leave."""
 
 from math import cos, radians, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats, longs
-from mdp.kernels.kernel import kernel
-from mdp.mesh import Floats
-from slicer.geometry.edge_index import EdgeIndex, crossings
+from mdp.kernels.kernel import helper, kernel
+from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
+from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
+from slicer.geometry.polygons import Polygons
 from slicer.geometry.segments import Segment
 
-Indices = NDArray[np.int64]
+SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
 
 
 class Pieces(NamedTuple):
@@ -48,15 +50,6 @@ def clip_lines(points: Floats, starts: Indices, border: EdgeIndex) -> Pieces:
     return Pieces(out.points[:n].copy(), out.starts[: pieces + 1].copy(), out.ends[:pieces].copy())
 
 
-def merge_pieces(several: list[Pieces]) -> Pieces:
-    """Pieces of several bundles of lines as one bundle."""
-    if len(several) < 2:
-        return several[0] if several else NO_PIECES
-    sizes = np.concatenate([np.diff(pieces.starts) for pieces in several])
-    starts = np.concatenate([[0], np.cumsum(sizes)])
-    return Pieces(np.concatenate([p.points for p in several]), starts, np.concatenate([p.ends for p in several]))
-
-
 @kernel
 def _clip(points: Floats, bounds: Indices, border: EdgeIndex, out: Pieces) -> tuple[int, int]:
     """Fills in the pieces; returns the number of points and of pieces, -1 where there is no room for them."""
@@ -85,3 +78,58 @@ def _clip(points: Floats, bounds: Indices, border: EdgeIndex, out: Pieces) -> tu
             n = out.starts[count]
     out.starts[count] = n
     return n, count
+
+
+def merge_pieces(several: list[Pieces]) -> Pieces:
+    """Pieces of several bundles of lines as one bundle."""
+    if len(several) < 2:
+        return several[0] if several else NO_PIECES
+    sizes = np.concatenate([np.diff(pieces.starts) for pieces in several])
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    return Pieces(np.concatenate([p.points for p in several]), starts, np.concatenate([p.ends for p in several]))
+
+
+def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
+    """The polyline (n, 2) with the places added where it enters and leaves an area, and which steps lie within."""
+    index, size, room = index_edges(area), -1, 2 * len(points) + 64
+    while size < 0:
+        out, marks = np.empty((room, 2)), np.empty(room, np.bool_)
+        size = _cut(points, index, out, marks)
+        room *= 4
+    return out[:size], marks[: size - 1]
+
+
+@kernel
+def _cut(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
+    return cut_into(points, area, out, marks)
+
+
+@helper
+def cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
+    """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
+
+    points, out: (n, 2 or more), further columns are interpolated.
+    """
+    shares, crossed = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0)
+    columns, n = points.shape[1], 1
+    for axis in range(columns):
+        out[0, axis] = points[0, axis]
+    for k in range(len(points) - 1):
+        step = Segment(points[k, 0], points[k, 1], points[k + 1, 0], points[k + 1, 1])
+        many = crossings(area, step, shares[:-1], crossed)
+        if n + many + 1 > len(out):
+            return -1
+        shares[many] = 1.0
+        since = 0.0
+        for s in range(many + 1):
+            if s < many and not SNAP < shares[s] < 1.0 - SNAP:
+                continue
+            # Tested for every piece: where a line leaves the area exactly at one of its points, no step crosses an edge.
+            middle = 0.5 * (since + shares[s])
+            is_within = within(area, step.x0 + middle * (step.x1 - step.x0), step.y0 + middle * (step.y1 - step.y0))
+            for axis in range(columns):
+                end = points[k + 1, axis]
+                out[n, axis] = end if s == many else points[k, axis] + shares[s] * (end - points[k, axis])
+            marks[n - 1], since = is_within, shares[s]
+            n += 1
+    return n

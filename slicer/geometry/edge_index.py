@@ -8,12 +8,11 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import sort_into_bins
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.topology.cross_section import loop_edges
 from slicer.geometry.polygons import Polygons, contours
@@ -21,7 +20,6 @@ from slicer.geometry.segments import Segment, crossing, edge, level_crossing, ne
 
 MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
 FARTHEST_MM = 1e7  # where the search for the nearest edge ends
-Indices = NDArray[np.int64]
 
 
 class Grid(NamedTuple):

@@ -10,12 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import longs
 from mdp.kernels.kernel import kernel
 from mdp.kernels.sorting import counting_sort
-from mdp.mesh import Floats, Ints
+from mdp.mesh import Floats, Indices, Ints
 from profiles.process import Process
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, WALLS, Bead
 from slicer.geometry.polygons import Polygons, area_mm2, contours
@@ -28,6 +27,31 @@ SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 SUPPORTS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
 FIRST = -1  # the number of what comes before all islands: skirt and brim
+
+
+def order_beads(
+    beads: Sequence[Bead],
+    section: Polygons,
+    process: Process,
+    tip: Floats | None,
+    support: Polygons | None = None,
+    skin: Polygons | None = None,
+) -> Strokes:
+    """The beads of one layer in printing order.
+
+    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
+    beside an edge of an interface, which no travel passes over.
+    """
+    support = Polygons() if support is None else support
+    placed, retracts, detours = list[tuple[Bead, Floats]](), np.zeros(0, np.bool_), dict[int, Floats]()
+    if beads:
+        first = beads[0].points[0] if tip is None else tip
+        placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
+        to = np.array([points[0] for _, points in placed])
+        since = np.array([first, *(points[-1] for _, points in placed[:-1])])
+        retracts, detours = travels(since, to, section, support, process, skin)
+        retracts[0] = retracts[0] or tip is None
+    return strokes_of(placed, retracts, detours, process.small_wall_mm)
 
 
 def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> Ints:
@@ -59,31 +83,6 @@ def _pieces_around(starts: Floats, area: Polygons) -> Ints:
     pieces = np.full(len(starts), len(outer), np.int32)
     np.minimum.at(pieces, start, piece.astype(np.int32))  # of an island in a hole of another one the inner, which is smaller
     return pieces
-
-
-def order_beads(
-    beads: Sequence[Bead],
-    section: Polygons,
-    process: Process,
-    tip: Floats | None,
-    support: Polygons | None = None,
-    skin: Polygons | None = None,
-) -> Strokes:
-    """The beads of one layer in printing order.
-
-    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
-    beside an edge of an interface, which no travel passes over.
-    """
-    if not beads:
-        return strokes_of([], np.zeros(0, np.bool_), {}, process.small_wall_mm)
-    support = Polygons() if support is None else support
-    first = beads[0].points[0] if tip is None else tip
-    placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
-    to = np.array([points[0] for _, points in placed])
-    since = np.array([first, *(points[-1] for _, points in placed[:-1])])
-    retracts, detours = travels(since, to, section, support, process, skin)
-    retracts[0] = retracts[0] or tip is None
-    return strokes_of(placed, retracts, detours, process.small_wall_mm)
 
 
 def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first: bool) -> list[tuple[Bead, Floats]]:
@@ -127,6 +126,89 @@ def _middle(beads: Sequence[Bead]) -> Floats:
     return middle
 
 
+def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
+    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together."""
+    leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
+    walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
+    phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
+    for bead in beads:
+        if leaders and BEFORE_WALLS < bead.rank <= 0:
+            continue
+        phase = FILL if FILL <= bead.rank <= LAST else bead.rank
+        if bead.follows and phases[phase]:
+            phases[phase][-1].append(bead)
+        else:
+            phases[phase].append([bead])
+    if walls:
+        phases[0] = _families(walls, leaders)
+    return [phases[rank] for rank in sorted(phases)]
+
+
+def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]]:
+    """Each outer wall with the inner walls nearest to it, in chains from the inside out that begin side by side."""
+    points = np.concatenate([leader.points for leader in leaders])
+    which = np.repeat(np.arange(len(leaders)), [len(leader.points) for leader in leaders])
+    inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
+    members: list[list[Bead]] = [[] for _ in leaders]
+    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, _starts(inner))]
+    for bead, k in zip(inner, near, strict=True):
+        members[k].append(bead)
+    return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]
+
+
+def _starts(beads: Sequence[Bead]) -> Floats:
+    return np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
+
+
+@kernel
+def _nearest(points: Floats, places: Floats) -> Indices:
+    """The point nearest to each place; points sorted into square cells, searched ring by ring."""
+    low_x, high_x, low_y, high_y = points[0, 0], points[0, 0], points[0, 1], points[0, 1]
+    for k in range(len(points)):
+        low_x, high_x = min(low_x, points[k, 0]), max(high_x, points[k, 0])
+        low_y, high_y = min(low_y, points[k, 1]), max(high_y, points[k, 1])
+    cells = max(int(np.sqrt(len(points) / 2.0)), 1)
+    size = (max(high_x - low_x, high_y - low_y) + 1e-6) / cells
+    cell = longs(len(points), 0)
+    for k in range(len(points)):
+        cell[k] = int((points[k, 0] - low_x) / size) * cells + int((points[k, 1] - low_y) / size)
+    first, order = counting_sort(cell, cells * cells)
+    out: Indices = longs(len(places), 0)
+    for p in range(len(places)):
+        px, py = places[p, 0], places[p, 1]
+        column, row = min(max(int((px - low_x) / size), 0), cells - 1), min(max(int((py - low_y) / size), 0), cells - 1)
+        best, least, ring = 0, np.inf, 0
+        while ring <= cells and (ring - 1) * size < least:
+            for c in range(max(column - ring, 0), min(column + ring, cells - 1) + 1):
+                for r in range(max(row - ring, 0), min(row + ring, cells - 1) + 1):
+                    if max(abs(c - column), abs(r - row)) != ring:
+                        continue
+                    for k in range(first[c * cells + r], first[c * cells + r + 1]):
+                        distance = np.hypot(points[order[k], 0] - px, points[order[k], 1] - py)
+                        if distance < least:
+                            best, least = order[k], distance
+            ring += 1
+        out[p] = best
+    return out
+
+
+def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
+    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
+
+    The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
+    print them first would mean to go there and back.
+    """
+    chain, others = [leader], list[Bead]()
+    for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
+        equal = [bead for bead in family if bead.rank == rank]
+        equal.sort(key=lambda bead: float(((bead.points[0] - leader.points[0]) ** 2).sum()))
+        chain.append(equal[0])
+        others += equal[1:]
+    yield sorted(chain, key=lambda bead: bead.rank)
+    if others:
+        yield from _chains(others[0], others[1:])
+
+
 def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], tip: Floats, goal: Floats) -> list[tuple[Bead, Floats]]:
     """The phases of an island one after the other, each once more when it is known where the next one begins."""
     goals = [NOWHERE] * (len(phases) - 1) + [goal]
@@ -160,86 +242,3 @@ def _freedom(chain: Sequence[Bead]) -> int:
     if len(chain) > 1 or bead.kind in SEAMED:
         return AS_IT_IS
     return CLOSED if bead.closed else OPEN if bead.kind is Kind.INFILL else AS_IT_IS
-
-
-def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
-    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together."""
-    leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
-    walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
-    phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
-    for bead in beads:
-        if leaders and BEFORE_WALLS < bead.rank <= 0:
-            continue
-        phase = FILL if FILL <= bead.rank <= LAST else bead.rank
-        if bead.follows and phases[phase]:
-            phases[phase][-1].append(bead)
-        else:
-            phases[phase].append([bead])
-    if walls:
-        phases[0] = _families(walls, leaders)
-    return [phases[rank] for rank in sorted(phases)]
-
-
-def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]]:
-    """Each outer wall with the inner walls nearest to it, in chains from the inside out that begin side by side."""
-    points = np.concatenate([leader.points for leader in leaders])
-    which = np.repeat(np.arange(len(leaders)), [len(leader.points) for leader in leaders])
-    inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
-    members: list[list[Bead]] = [[] for _ in leaders]
-    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, _starts(inner))]
-    for bead, k in zip(inner, near, strict=True):
-        members[k].append(bead)
-    return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]
-
-
-def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
-    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
-
-    The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
-    print them first would mean to go there and back.
-    """
-    chain, others = [leader], list[Bead]()
-    for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
-        equal = [bead for bead in family if bead.rank == rank]
-        equal.sort(key=lambda bead: float(((bead.points[0] - leader.points[0]) ** 2).sum()))
-        chain.append(equal[0])
-        others += equal[1:]
-    yield sorted(chain, key=lambda bead: bead.rank)
-    if others:
-        yield from _chains(others[0], others[1:])
-
-
-def _starts(beads: Sequence[Bead]) -> Floats:
-    return np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
-
-
-@kernel
-def _nearest(points: Floats, places: Floats) -> NDArray[np.int64]:
-    """The point nearest to each place; points sorted into square cells, searched ring by ring."""
-    low_x, high_x, low_y, high_y = points[0, 0], points[0, 0], points[0, 1], points[0, 1]
-    for k in range(len(points)):
-        low_x, high_x = min(low_x, points[k, 0]), max(high_x, points[k, 0])
-        low_y, high_y = min(low_y, points[k, 1]), max(high_y, points[k, 1])
-    cells = max(int(np.sqrt(len(points) / 2.0)), 1)
-    size = (max(high_x - low_x, high_y - low_y) + 1e-6) / cells
-    cell = longs(len(points), 0)
-    for k in range(len(points)):
-        cell[k] = int((points[k, 0] - low_x) / size) * cells + int((points[k, 1] - low_y) / size)
-    first, order = counting_sort(cell, cells * cells)
-    out: NDArray[np.int64] = longs(len(places), 0)
-    for p in range(len(places)):
-        px, py = places[p, 0], places[p, 1]
-        column, row = min(max(int((px - low_x) / size), 0), cells - 1), min(max(int((py - low_y) / size), 0), cells - 1)
-        best, least, ring = 0, np.inf, 0
-        while ring <= cells and (ring - 1) * size < least:
-            for c in range(max(column - ring, 0), min(column + ring, cells - 1) + 1):
-                for r in range(max(row - ring, 0), min(row + ring, cells - 1) + 1):
-                    if max(abs(c - column), abs(r - row)) != ring:
-                        continue
-                    for k in range(first[c * cells + r], first[c * cells + r + 1]):
-                        distance = np.hypot(points[order[k], 0] - px, points[order[k], 1] - py)
-                        if distance < least:
-                            best, least = order[k], distance
-            ring += 1
-        out[p] = best
-    return out

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 
 TRIES = 2  # the order depends on where lines begin, and that on the order
 WORTH_MM = 5.0  # travel that taking a line in two has to save: a bead that ends and begins once more shows
@@ -29,7 +29,7 @@ MANY = 1000  # paths, from which on there are few passes
 GAIN_MM = 1e-6  # less is rounding, and an exchange back and forth would never end
 MOST_MOVED = 3  # as Or (1976); one leaves the same ways 0.3 to 0.8 % longer, four change them by -0.4 to +0.5 %
 
-Order = tuple[NDArray[np.int64], NDArray[np.bool_]]
+Order = tuple[Indices, NDArray[np.bool_]]
 
 
 def order_lines(
@@ -154,7 +154,7 @@ class _Sequence(NamedTuple):
     out y of each path as it runs now, then of the goal.
     """
 
-    order: NDArray[np.int64]
+    order: Indices
     flips: NDArray[np.bool_]
     fixed: NDArray[np.bool_]
     ends: Floats

@@ -11,15 +11,20 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.geometry.polygons import start_at
-from slicer.geometry.segments import Segment, near_height, nearest_share, squared_distance_in_space
+from slicer.geometry.segments import Segment, nearest_share
 from slicer.paths import Kind
+from slicer.strokes.seam_plan import (
+    NO_LIMITS,
+    SeamLimits,
+    corner_strength,
+    is_clear,
+)
 from slicer.strokes.strokes import RINGS
 
 REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
@@ -33,106 +38,6 @@ FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
 NO_SEAMS = np.zeros((0, 2))
 SAMPLE_MM = 2.0  # straight sides are tried at this distance, too
 OFF_WALL = 0.7  # of its length a lead has to reach inside: so far beside its middle the outer wall is out of the tip's way
-ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise is none
-SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, and from where on it does so fully
-SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
-
-
-@helper
-def corner_strength(loop: Floats, i: int) -> float:
-    """How much a corner the vertex of a loop (n, 2), solid on its left, is: 0 up to SMOOTH_DEG of turn, from SHARP_DEG on 1 where
-    it is an inner one and -1 where it is an outer one."""
-    px, py = _arm(loop, i, -1)
-    qx, qy = _arm(loop, i, 1)
-    bx, by, cx, cy = loop[i, 0] - px, loop[i, 1] - py, qx - loop[i, 0], qy - loop[i, 1]
-    cross, dot = bx * cy - by * cx, bx * cx + by * cy
-    if dot > SMOOTH_COSINE * np.hypot(bx, by) * np.hypot(cx, cy):
-        return 0.0
-    turn = np.degrees(np.arctan2(abs(cross), dot))
-    strength = min((turn - SMOOTH_DEG) / (SHARP_DEG - SMOOTH_DEG), 1.0)
-    return float(strength if cross < 0.0 else -strength)
-
-
-@helper
-def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
-    """The point ARM_MM along the loop from a vertex, forward or backward."""
-    n, left, at = len(loop), ARM_MM, i
-    for _ in range(n):
-        ax, ay = loop[at % n, 0], loop[at % n, 1]
-        dx, dy = loop[(at + sense) % n, 0] - ax, loop[(at + sense) % n, 1] - ay
-        step = np.hypot(dx, dy)
-        if step >= left:
-            return ax + left / step * dx, ay + left / step * dy
-        left -= step
-        at += sense
-    return loop[at % n, 0], loop[at % n, 1]
-
-
-def lead_in(loop: Floats, lead_mm: float) -> Floats:
-    """(2,) from the loop's beginning to where a lead inside begins, as far as there is room."""
-    way = _inward(loop)
-    lead: Floats = way * min(lead_mm, 0.5 * _room_mm(loop, way))
-    return lead
-
-
-def begin_with_room(loop: Floats, lead_mm: float) -> Floats:
-    """The loop, begun at the place nearest to its beginning from which a lead leaves its outer wall; the one with most room where
-    there is none: in a sharp corner the way inside runs along the wall.
-    """
-    deepest, most = loop, _depth_mm(loop, lead_mm)
-    if most >= OFF_WALL * lead_mm:
-        return loop
-    steps = start_at(loop, 1) - loop
-    counts = (np.hypot(*steps.T) / SAMPLE_MM).astype(np.int64) + 1
-    places = [(i, s / counts[i]) for i in range(len(loop)) for s in range(counts[i])]
-    places.sort(key=lambda place: float(np.hypot(*(loop[place[0]] + place[1] * steps[place[0]] - loop[0]))))
-    for i, share in places:
-        begun = start_at(loop, i)
-        if share:
-            begun = np.concatenate([(loop[i] + share * steps[i])[None], start_at(loop, (i + 1) % len(loop))])
-        depth = _depth_mm(begun, lead_mm)
-        if depth > most:
-            deepest, most = begun, depth
-        if depth >= OFF_WALL * lead_mm:
-            break
-    return deepest
-
-
-def _depth_mm(loop: Floats, lead_mm: float) -> float:
-    """How far from the loop a lead begins."""
-    return float(_nearest(loop, (loop[0] + lead_in(loop, lead_mm))[None], np.inf)[0])
-
-
-def _inward(loop: Floats) -> Floats:
-    """Unit vector to the left of the loop at its beginning, where the solid is."""
-    steps = np.array([loop[0] - loop[-1], loop[1] - loop[0]])
-    steps /= np.maximum(np.hypot(*steps.T), 1e-12)[:, None]
-    along = steps.sum(axis=0)
-    length = float(np.hypot(*along))
-    along = along / length if length > 1e-6 else steps[1]
-    return np.array([-along[1], along[0]])
-
-
-def _room_mm(loop: Floats, way: Floats) -> float:
-    """How far the inside of a loop (n, 2) reaches from its beginning along a unit vector; 0 where that leads out of it."""
-    sides, beside = start_at(loop, 1) - loop, (loop - loop[0]) @ np.array([-way[1], way[0]])
-    following = start_at(beside, 1)
-    crossed = np.flatnonzero((beside > 0.0) != (following > 0.0))
-    share = beside[crossed] / (beside[crossed] - following[crossed])
-    along = (loop[crossed] + share[:, None] * sides[crossed] - loop[0]) @ way
-    along = along[along > 1e-6]
-    return float(along.min()) if len(along) % 2 else 0.0
-
-
-class SeamLimits(NamedTuple):
-    """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
-
-    edges: Floats
-    z: float
-    keep_mm: Floats
-
-
-NO_LIMITS = SeamLimits(np.zeros((0, 6)), 0.0, np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,12 +54,6 @@ class Surroundings:
     limits: SeamLimits
     layer: int
     planned: Floats = field(default_factory=lambda: NO_SEAMS)
-
-
-def rear_of(bounds_mm: Floats) -> Floats:
-    """(2,) a point behind the middle of a part, as far as the part is deep; bounds_mm: (2, 3)."""
-    low, high = bounds_mm
-    return np.array([0.5 * (low[0] + high[0]), 2.0 * high[1] - low[1]])
 
 
 def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -> tuple[list[Bead], Floats]:
@@ -192,32 +91,6 @@ class _Target(NamedTuple):
     outer_mm: float
 
 
-def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Process) -> SeamLimits:
-    """Those of (n, 6) interface edges that lie within reach of a layer, and (k, 6) where a person wants no seam in it."""
-    keep_mm = process.interface_seam_mm
-    near = near_height(interfaces, z_mm, keep_mm)
-    distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(unwanted)])
-    return SeamLimits(np.concatenate([near, unwanted]), float(z_mm), distances_mm)
-
-
-@kernel
-def keeps_clear(places: Floats, limits: SeamLimits) -> NDArray[np.bool_]:
-    """(n,) whether (n, 2) places are clear of the limits."""
-    clear = np.ones(len(places), np.bool_)
-    for k in range(len(places)):
-        clear[k] = _clear(limits, places[k, 0], places[k, 1])
-    return clear
-
-
-def _start_at_best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[Floats, bool]:
-    """The loop (n, 2) begun at its place of least cost, and whether that is clear of interface edges."""
-    at, share, free = _best(loop, target, interfaces)
-    if share > 0.0:
-        new = loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at])
-        return np.concatenate([new[None], loop[at + 1 :], loop[: at + 1]]), free
-    return start_at(loop, at), free
-
-
 def _beside(loop: Floats, outer: Floats) -> _Target:
     """Where an inner wall's seam is drawn to: the nearest of the (k, 2) seams of outer walls."""
     distance, x, y = _nearest(loop, outer, np.inf)
@@ -244,22 +117,6 @@ def _target(loop: Floats, process: Process, around: Surroundings) -> _Target:
     return _Target(x, y, *(ANYWHERE if process.seam == "corner" else NEARBY))
 
 
-def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
-    """The loop as a polyline that ends a gap before its beginning; lead_mm: both ends are drawn inside by that, as far as
-    there is room."""
-    points = np.concatenate([loop, loop[:1]])
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    if gap_mm > 0.0 and steps.sum() > 4.0 * gap_mm:
-        beyond = np.cumsum(steps[::-1])[::-1]  # from each point to the end
-        last = int(np.flatnonzero(beyond > gap_mm)[-1])
-        share = (beyond[last] - gap_mm) / steps[last]
-        points = np.concatenate([points[: last + 1], (points[last] + share * (points[last + 1] - points[last]))[None]])
-    if lead_mm > 0.0:
-        inward = lead_in(loop, lead_mm)
-        points = np.concatenate([(points[0] + inward)[None], points, (points[-1] + 0.5 * inward)[None]])
-    return points
-
-
 @kernel
 def _point_at(loop: Floats, share: float) -> tuple[float, float]:
     """The point at a share of a loop's length, counted from its least point, so that it does not depend on the loop's start."""
@@ -283,26 +140,6 @@ def _point_at(loop: Floats, share: float) -> tuple[float, float]:
     return loop[first, 0], loop[first, 1]
 
 
-@helper
-def _side(loop: Floats, i: int) -> Segment:
-    """The side from a vertex of a loop to the next one."""
-    after = (i + 1) % len(loop)
-    return Segment(loop[i, 0], loop[i, 1], loop[after, 0], loop[after, 1])
-
-
-@helper
-def _project(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
-    """Distance from a point to a loop, the side that is nearest and how far along it."""
-    least, at, share = np.inf, 0, 0.0
-    for i in range(len(loop)):
-        side = _side(loop, i)
-        t = nearest_share(side, x, y)
-        distance = np.hypot(side.x0 + t * (side.x1 - side.x0) - x, side.y0 + t * (side.y1 - side.y0) - y)
-        if distance < least:
-            least, at, share = distance, i, t
-    return least, at, share
-
-
 @kernel
 def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, float, float]:
     """The point nearest to a loop as (distance, x, y); the distance is infinite when none is within reach."""
@@ -321,6 +158,35 @@ def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, floa
     return best, bx, by
 
 
+@helper
+def _project(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
+    """Distance from a point to a loop, the side that is nearest and how far along it."""
+    least, at, share = np.inf, 0, 0.0
+    for i in range(len(loop)):
+        side = _side(loop, i)
+        t = nearest_share(side, x, y)
+        distance = np.hypot(side.x0 + t * (side.x1 - side.x0) - x, side.y0 + t * (side.y1 - side.y0) - y)
+        if distance < least:
+            least, at, share = distance, i, t
+    return least, at, share
+
+
+@helper
+def _side(loop: Floats, i: int) -> Segment:
+    """The side from a vertex of a loop to the next one."""
+    after = (i + 1) % len(loop)
+    return Segment(loop[i, 0], loop[i, 1], loop[after, 0], loop[after, 1])
+
+
+def _start_at_best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[Floats, bool]:
+    """The loop (n, 2) begun at its place of least cost, and whether that is clear of interface edges."""
+    at, share, free = _best(loop, target, interfaces)
+    if share > 0.0:
+        new = loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at])
+        return np.concatenate([new[None], loop[at + 1 :], loop[: at + 1]]), free
+    return start_at(loop, at), free
+
+
 @kernel
 def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, float, bool]:
     """The place of least cost as (side, share of it), and whether it keeps clear of interface edges."""
@@ -331,7 +197,7 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
     elif share <= 1e-6:
         share = 0.0
     side = _side(loop, at)
-    free = _clear(interfaces, side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0))
+    free = is_clear(interfaces, side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0))
     least = distance + (0.0 if free else FORBIDDEN)
     if target.inner_mm == 0.0 and target.outer_mm == 0.0 and free:
         return at, share, free
@@ -346,7 +212,7 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
                 strength = corner_strength(loop, i)
                 cost -= strength * target.inner_mm if strength > 0.0 else -strength * target.outer_mm
             if cost < least:
-                clear = _clear(interfaces, cx, cy)
+                clear = is_clear(interfaces, cx, cy)
                 if clear or not free:
                     cost += 0.0 if clear else FORBIDDEN
                     if cost < least:
@@ -354,11 +220,73 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
     return at, share, free
 
 
-@helper
-def _clear(interfaces: SeamLimits, x: float, y: float) -> bool:
-    """Whether a place at their height keeps clear of all interface edges."""
-    for e in range(len(interfaces.edges)):
-        begin, end = interfaces.edges[e, :3], interfaces.edges[e, 3:]
-        if squared_distance_in_space((x, y, interfaces.z), begin, end) < interfaces.keep_mm[e] * interfaces.keep_mm[e]:
-            return False
-    return True
+def begin_with_room(loop: Floats, lead_mm: float) -> Floats:
+    """The loop, begun at the place nearest to its beginning from which a lead leaves its outer wall; the one with most room where
+    there is none: in a sharp corner the way inside runs along the wall.
+    """
+    deepest, most = loop, _depth_mm(loop, lead_mm)
+    if most >= OFF_WALL * lead_mm:
+        return loop
+    steps = start_at(loop, 1) - loop
+    counts = (np.hypot(*steps.T) / SAMPLE_MM).astype(np.int64) + 1
+    places = [(i, s / counts[i]) for i in range(len(loop)) for s in range(counts[i])]
+    places.sort(key=lambda place: float(np.hypot(*(loop[place[0]] + place[1] * steps[place[0]] - loop[0]))))
+    for i, share in places:
+        begun = start_at(loop, i)
+        if share:
+            begun = np.concatenate([(loop[i] + share * steps[i])[None], start_at(loop, (i + 1) % len(loop))])
+        depth = _depth_mm(begun, lead_mm)
+        if depth > most:
+            deepest, most = begun, depth
+        if depth >= OFF_WALL * lead_mm:
+            break
+    return deepest
+
+
+def _depth_mm(loop: Floats, lead_mm: float) -> float:
+    """How far from the loop a lead begins."""
+    return float(_nearest(loop, (loop[0] + lead_in(loop, lead_mm))[None], np.inf)[0])
+
+
+def lead_in(loop: Floats, lead_mm: float) -> Floats:
+    """(2,) from the loop's beginning to where a lead inside begins, as far as there is room."""
+    way = _inward(loop)
+    lead: Floats = way * min(lead_mm, 0.5 * _room_mm(loop, way))
+    return lead
+
+
+def _inward(loop: Floats) -> Floats:
+    """Unit vector to the left of the loop at its beginning, where the solid is."""
+    steps = np.array([loop[0] - loop[-1], loop[1] - loop[0]])
+    steps /= np.maximum(np.hypot(*steps.T), 1e-12)[:, None]
+    along = steps.sum(axis=0)
+    length = float(np.hypot(*along))
+    along = along / length if length > 1e-6 else steps[1]
+    return np.array([-along[1], along[0]])
+
+
+def _room_mm(loop: Floats, way: Floats) -> float:
+    """How far the inside of a loop (n, 2) reaches from its beginning along a unit vector; 0 where that leads out of it."""
+    sides, beside = start_at(loop, 1) - loop, (loop - loop[0]) @ np.array([-way[1], way[0]])
+    following = start_at(beside, 1)
+    crossed = np.flatnonzero((beside > 0.0) != (following > 0.0))
+    share = beside[crossed] / (beside[crossed] - following[crossed])
+    along = (loop[crossed] + share[:, None] * sides[crossed] - loop[0]) @ way
+    along = along[along > 1e-6]
+    return float(along.min()) if len(along) % 2 else 0.0
+
+
+def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
+    """The loop as a polyline that ends a gap before its beginning; lead_mm: both ends are drawn inside by that, as far as
+    there is room."""
+    points = np.concatenate([loop, loop[:1]])
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    if gap_mm > 0.0 and steps.sum() > 4.0 * gap_mm:
+        beyond = np.cumsum(steps[::-1])[::-1]  # from each point to the end
+        last = int(np.flatnonzero(beyond > gap_mm)[-1])
+        share = (beyond[last] - gap_mm) / steps[last]
+        points = np.concatenate([points[: last + 1], (points[last] + share * (points[last + 1] - points[last]))[None]])
+    if lead_mm > 0.0:
+        inward = lead_in(loop, lead_mm)
+        points = np.concatenate([(points[0] + inward)[None], points, (points[-1] + 0.5 * inward)[None]])
+    return points

@@ -11,6 +11,7 @@ worked out by rays for samples that lie farther apart than seams may, and looked
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from mdp.directions.spread import spread_like_light
 from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices, Mesh
+from mdp.overhang import Mask
 from mdp.sweep.rays import blocked_shares, triangle_tree
+from profiles.process import Process
 from slicer.geometry.polygons import contours
+from slicer.geometry.segments import near_height, squared_distance_in_space
 from slicer.sectioning import Sections
-from slicer.strokes.seam import SeamLimits, corner_strength, keeps_clear, rear_of
 
 SPACING_MM = 1.0  # of the places of an outline
 FEWEST = 8  # places of an outline
@@ -38,6 +41,34 @@ LIFT_MM = 0.1  # of a ray's beginning beside the outline
 FAR_MM = 1e5
 BLUR_MM = 1.0  # samples so near count alike
 ASIDE = 1e-3  # what a sample that faces another way counts
+ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise is none
+SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, and from where on it does so fully
+SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
+
+
+class SeamLimits(NamedTuple):
+    """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
+
+    edges: Floats
+    z: float
+    keep_mm: Floats
+
+
+NO_LIMITS = SeamLimits(np.zeros((0, 6)), 0.0, np.zeros(0))
+
+
+def rear_of(bounds_mm: Floats) -> Floats:
+    """(2,) a point behind the middle of a part, as far as the part is deep; bounds_mm: (2, 3)."""
+    low, high = bounds_mm
+    return np.array([0.5 * (low[0] + high[0]), 2.0 * high[1] - low[1]])
+
+
+def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Process) -> SeamLimits:
+    """Those of (n, 6) interface edges that lie within reach of a layer, and (k, 6) where a person wants no seam in it."""
+    keep_mm = process.interface_seam_mm
+    near = near_height(interfaces, z_mm, keep_mm)
+    distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(unwanted)])
+    return SeamLimits(np.concatenate([near, unwanted]), float(z_mm), distances_mm)
 
 
 def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]:
@@ -139,6 +170,55 @@ def _offered(loop: Floats) -> tuple[Floats, Floats]:
             places[stretch, 2], places[stretch, 3] = x / length, y / length
         along += step
     return places, strengths
+
+
+@helper
+def corner_strength(loop: Floats, i: int) -> float:
+    """How much a corner the vertex of a loop (n, 2), solid on its left, is: 0 up to SMOOTH_DEG of turn, from SHARP_DEG on 1 where
+    it is an inner one and -1 where it is an outer one."""
+    px, py = _arm(loop, i, -1)
+    qx, qy = _arm(loop, i, 1)
+    bx, by, cx, cy = loop[i, 0] - px, loop[i, 1] - py, qx - loop[i, 0], qy - loop[i, 1]
+    cross, dot = bx * cy - by * cx, bx * cx + by * cy
+    if dot > SMOOTH_COSINE * np.hypot(bx, by) * np.hypot(cx, cy):
+        return 0.0
+    turn = np.degrees(np.arctan2(abs(cross), dot))
+    strength = min((turn - SMOOTH_DEG) / (SHARP_DEG - SMOOTH_DEG), 1.0)
+    return float(strength if cross < 0.0 else -strength)
+
+
+@helper
+def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
+    """The point ARM_MM along the loop from a vertex, forward or backward."""
+    n, left, at = len(loop), ARM_MM, i
+    for _ in range(n):
+        ax, ay = loop[at % n, 0], loop[at % n, 1]
+        dx, dy = loop[(at + sense) % n, 0] - ax, loop[(at + sense) % n, 1] - ay
+        step = np.hypot(dx, dy)
+        if step >= left:
+            return ax + left / step * dx, ay + left / step * dy
+        left -= step
+        at += sense
+    return loop[at % n, 0], loop[at % n, 1]
+
+
+@kernel
+def keeps_clear(places: Floats, limits: SeamLimits) -> Mask:
+    """(n,) whether (n, 2) places are clear of the limits."""
+    clear = np.ones(len(places), np.bool_)
+    for k in range(len(places)):
+        clear[k] = is_clear(limits, places[k, 0], places[k, 1])
+    return clear
+
+
+@helper
+def is_clear(interfaces: SeamLimits, x: float, y: float) -> bool:
+    """Whether a place at their height keeps clear of all interface edges."""
+    for e in range(len(interfaces.edges)):
+        begin, end = interfaces.edges[e, :3], interfaces.edges[e, 3:]
+        if squared_distance_in_space((x, y, interfaces.z), begin, end) < interfaces.keep_mm[e] * interfaces.keep_mm[e]:
+            return False
+    return True
 
 
 def light_at(layer: int, asked: Floats, cuts_mm: Floats, levels: Indices, samples: Sequence[Floats]) -> Floats:

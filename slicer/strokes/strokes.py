@@ -15,20 +15,19 @@ from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from profiles.process import Process
-from slicer.bead import EVEN_MM, Bead
-from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
-from slicer.geometry.polygons import Polygons, offset
-from slicer.geometry.polyline import PATH_RESOLUTION_MM, lengths_mm, mark_corners
+from slicer.bead import EVEN_MM, NOISE_MM, Bead, hanging_area
+from slicer.geometry.clip import cut_into
+from slicer.geometry.edge_index import EdgeIndex, index_edges
+from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import lengths_mm
 from slicer.geometry.segments import Segment, nearest_share
 from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 Buffers = tuple[Floats, Indices, Indices, Mask]
-SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
 SHORTEST_HANGING = 2.0  # line widths: no stretch is split off for less, the speed would flicker
-NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
 SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
 MOST_SPREAD_MM, LEAST_MM = 0.03, 0.045  # but for one where they change by that much, which is no shorter than this
@@ -99,11 +98,6 @@ class Strokes:
             approach=self.approach,
             approach_starts=np.append(self.approach_starts[source + ~first], len(self.approach)),
         )
-
-    def simplified(self) -> "Strokes":
-        """The strokes without points that lie within PATH_RESOLUTION_MM of the line between those that stay."""
-        corners = mark_corners(self.points, self.starts, PATH_RESOLUTION_MM)
-        return replace(self, points=self.points[corners], starts=np.append(0, np.cumsum(corners))[self.starts])
 
 
 def strokes_of(
@@ -195,7 +189,7 @@ def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, short
         a, b = starts[k], starts[k + 1]
         size = 0
         if wanted[k]:
-            size = _cut_into(points[a:b], area, cut, within)
+            size = cut_into(points[a:b], area, cut, within)
             if size < 0:
                 return -1
             _steady(cut, within, size, shortest_mm)
@@ -246,52 +240,6 @@ def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None
             a = b
 
 
-def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
-    """The polyline (n, 2) with the places added where it enters and leaves an area, and which steps lie within."""
-    index, size, room = index_edges(area), -1, 2 * len(points) + 64
-    while size < 0:
-        out, marks = np.empty((room, 2)), np.empty(room, np.bool_)
-        size = _cut(points, index, out, marks)
-        room *= 4
-    return out[:size], marks[: size - 1]
-
-
-@kernel
-def _cut(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
-    return _cut_into(points, area, out, marks)
-
-
-@helper
-def _cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
-    """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
-
-    points, out: (n, 2 or more), further columns are interpolated.
-    """
-    shares, crossed = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0)
-    columns, n = points.shape[1], 1
-    for axis in range(columns):
-        out[0, axis] = points[0, axis]
-    for k in range(len(points) - 1):
-        step = Segment(points[k, 0], points[k, 1], points[k + 1, 0], points[k + 1, 1])
-        many = crossings(area, step, shares[:-1], crossed)
-        if n + many + 1 > len(out):
-            return -1
-        shares[many] = 1.0
-        since = 0.0
-        for s in range(many + 1):
-            if s < many and not SNAP < shares[s] < 1.0 - SNAP:
-                continue
-            # Tested for every piece: where a line leaves the area exactly at one of its points, no step crosses an edge.
-            middle = 0.5 * (since + shares[s])
-            is_within = within(area, step.x0 + middle * (step.x1 - step.x0), step.y0 + middle * (step.y1 - step.y0))
-            for axis in range(columns):
-                end = points[k + 1, axis]
-                out[n, axis] = end if s == many else points[k, axis] + shares[s] * (end - points[k, axis])
-            marks[n - 1], since = is_within, shares[s]
-            n += 1
-    return n
-
-
 def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None, process: Process) -> Strokes:
     """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic.
 
@@ -315,11 +263,6 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
             kind = np.where(within, NUMBER[Kind.OVERHANG], kind)
         strokes = replace(strokes, kind=kind.astype(np.int8), overhang=overhang.astype(np.int8))
     return strokes
-
-
-def hanging_area(section: Polygons, below: Polygons, share: float, width_mm: float) -> Polygons:
-    """Where the centreline of a bead has less than a share of its width on what is below."""
-    return section - offset(below, (0.5 - share) * width_mm + NOISE_MM)
 
 
 def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:

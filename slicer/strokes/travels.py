@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
@@ -38,14 +37,14 @@ ROUND = 4.0  # a path whose ends lie nearer than its width, and that is longer t
 
 def travels(
     since: Floats, to: Floats, section: Polygons, support: Polygons, process: Process, skin: Polygons | None = None
-) -> tuple[NDArray[np.bool_], dict[int, Floats]]:
+) -> tuple[Mask, dict[int, Floats]]:
     """Which of the n travels, (n, 2) by two, retract, and the detours (k, 2) of some others, by the travel's number.
 
     Those no shorter than process.retract_travel_mm retract that leave the inside both of the section and of its support and
     find no short detour inside either. skin: outer walls beside an edge of an interface; short ones retract as well where they
     would pass over it, unless they begin or end on it.
     """
-    retracts: NDArray[np.bool_] = np.hypot(*(to - since).T) >= process.retract_travel_mm
+    retracts: Mask = np.hypot(*(to - since).T) >= process.retract_travel_mm
     detours: dict[int, Floats] = {}
     widths_mm = (
         min(process.line_width_mm, outer_wall_width_mm(process)),
@@ -98,7 +97,7 @@ class Combing:
     def _among(self) -> EdgeIndex:
         return index_edges(offset(self._area, -AMONG * self._width_mm))
 
-    def leaves(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
+    def leaves(self, since: Floats, to: Floats) -> Mask:
         """(n, 2) by two whether the travels between these points leave the safe inside."""
         return ~lie_within(self.safe, since) | crosses(self.safe, since, to)
 

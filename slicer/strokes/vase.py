@@ -13,7 +13,7 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.fill.region import shell_layers
+from slicer.bead import outer_wall_width_mm
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
@@ -25,18 +25,12 @@ PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
 
 
-def bottom_layers(process: Process) -> int:
-    """How many layers are printed as usual before the wall begins to climb."""
-    return max(1, shell_layers(process)[1])
-
-
-def vase_layers(sections: Sections, supported: Sequence[Polygons], tip: Floats) -> list[Layer]:
-    """The layers above the bottom; supported: where each layer's support is; tip: (2,) where the bottom ends.
+def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, tip: Floats) -> list[Layer]:
+    """The layers above the bottom; supported: where each layer's support is; first: the lowest; tip: (2,) where the bottom ends.
 
     Raises SliceError where the model needs support or one of its layers is not one area without holes.
     """
     profile, heights, outlines = sections.profile, sections.heights, sections.outlines
-    first = bottom_layers(profile.process)
     hanging = next((k for k, area in enumerate(supported) if not area.is_empty()), None)
     if hanging is not None:
         raise SliceError(
@@ -56,7 +50,7 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], tip: Floats) 
 
 def _loop(outline: Polygons, z_mm: float, process: Process) -> Floats:
     """(n, 2) the wall's centreline, closed."""
-    width = process.outer_wall_line_width_mm or process.line_width_mm
+    width = outer_wall_width_mm(process)
     loops, holes = contours(offset(outline, -0.5 * width)), sum(len(loop) > 2 for loop in outline.to_polygons())
     if holes != 1 or len(loops) != 1:
         instead = f"{holes} outlines" if holes != 1 else "a place too narrow for a wall"
@@ -83,7 +77,7 @@ def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floa
     """One turn, climbing to its layer's height; shares: of the plastic at equal distances, None: all everywhere."""
     process, material = profile.process, profile.material
     z_mm, height_mm = float(heights.tip_mm[k]), float(heights.height_mm[k])
-    width = process.outer_wall_line_width_mm or process.line_width_mm
+    width = outer_wall_width_mm(process)
     fastest = min(
         process.outer_wall_speed_mm_s, material.volumetric_limit_mm3_s / bead_area_mm2(width, height_mm) / material.flow
     )

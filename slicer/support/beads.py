@@ -12,11 +12,15 @@ from math import ceil
 import numpy as np
 
 from mdp.cost.footing import tips_over
-from mdp.mesh import Floats
+from mdp.kernels.arrays import flags, longs, table
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats, Indices
 from profiles.process import Process
 from slicer.bead import OUTSIDE, Bead, spacing_mm, with_line_width
-from slicer.fill.lines import zigzag_lines
+from slicer.fill.lines import clip_pattern, parallel_lines
 from slicer.fill.skin import SolidLines, skin_beads
+from slicer.geometry.clip import rotation_2d
+from slicer.geometry.edge_index import EdgeIndex, free, index_edges
 from slicer.geometry.polygons import (
     Polygons,
     area_mm2,
@@ -27,6 +31,7 @@ from slicer.geometry.polygons import (
     opening,
     union,
 )
+from slicer.geometry.segments import Segment
 from slicer.paths import Kind
 from slicer.support.support import Supports
 
@@ -87,6 +92,51 @@ def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process:
     joined = offset(area, -0.25 * width)
     lines = [line for angle_deg in angles_deg for line in zigzag_lines(inner, joined, angle_deg, apart, JOIN * apart)]
     return lines if lines or process.support_walls else [close_loop(loop) for loop in contours(inner)]
+
+
+def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: float, reach_mm: float) -> list[Floats]:
+    """Lines (n, 2) on the grid of parallel_lines that end on the border of an area.
+
+    Ends of neighbouring lines nearer than reach_mm are joined unless the fence lies between them.
+    """
+    pieces = clip_pattern(index_edges(area), *parallel_lines(angle_deg, apart_mm))
+    if not len(pieces.ends):
+        return []
+    number = np.rint((pieces.points[::2] @ rotation_2d(angle_deg))[:, 1] / apart_mm - 0.5)
+    following = np.column_stack([np.searchsorted(number, number + 1.0, side) for side in ("left", "right")])
+    points, starts = _join(pieces.points.reshape(-1, 4), following, index_edges(fence), reach_mm)
+    return np.split(points, starts[1:])
+
+
+@kernel
+def _join(lines: Floats, following: Indices, fence: EdgeIndex, reach_mm: float) -> tuple[Floats, Indices]:
+    """Lines (n, 4) joined end to end where one of the next row begins within reach and no edge of the fence lies between.
+
+    following: (n, 2) first of the next row's lines, and first after them. Returns points (n, 2) and the start of each polyline.
+    """
+    points, starts, used = table(2 * len(lines), 2), longs(len(lines), 0), flags(len(lines))
+    n = count = 0
+    for seed in range(len(lines)):
+        if used[seed]:
+            continue
+        starts[count] = n
+        count += 1
+        at, end = seed, 2  # the column at which a line is left
+        while at >= 0:
+            used[at] = True
+            for axis in range(2):
+                points[n, axis], points[n + 1, axis] = lines[at, 2 - end + axis], lines[at, end + axis]
+            x, y = points[n + 1, 0], points[n + 1, 1]
+            n += 2
+            best, best_end, nearest = -1, 0, reach_mm
+            for k in range(following[at, 0], following[at, 1]):
+                for begin in range(0, 0 if used[k] else 4, 2):
+                    to_x, to_y = lines[k, begin], lines[k, begin + 1]
+                    distance = np.hypot(to_x - x, to_y - y)
+                    if distance < nearest and free(fence, Segment(x, y, to_x, to_y)):
+                        best, best_end, nearest = k, 2 - begin, distance
+            at, end = best, best_end
+    return points[:n], starts[:count]
 
 
 def pedestal_beads(outline: Polygons, layer: int, layers: int, process: Process, height_mm: float) -> list[Bead]:

@@ -34,9 +34,7 @@ SLIVER_MM = 0.02  # what is narrower than twice this and has no place has neighb
 EVEN_MM = 1e-6  # heights nearer than this are equal
 SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
 LEAST_MM2 = 1e-5  # places smaller than this are rounding
-STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
 BEYOND = 0.75  # of the radius: how far from plastic the middle of a disc may stand; its inner beads then lie on the edge
-WIDEST = 1.3  # times the distance: how far corners of widened places may reach; sharper ones than 100 degrees are cut off
 SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
 AROUND_MM = 20.0  # support needs no more space around a part than its lean and this
 CELL_MM, COARSER = 0.5, 1.5  # grid on which the height of the tip is computed, and the factor by which it is coarsened
@@ -100,37 +98,10 @@ def dilate(area: Polygons, distance_mm: float) -> Polygons:
     return offset_round(area, distance_mm, SEGMENTS) if distance_mm > 0.0 else area
 
 
-def widen(area: Polygons, distance_mm: float) -> Polygons:
-    """The area grown by at least a distance, with hardly more corners than it has.
-
-    What is grown layer after layer must not get round corners: each of them would be two in the next layer.
-    """
-    return offset(area, distance_mm, WIDEST)
-
-
 def drop_slivers(places: Polygons) -> Polygons:
     """Without slivers."""
     core = Polygons() if places.area() < SPECK_MM2 else offset(places, -SLIVER_MM)
     return core if core.is_empty() else offset(core, 1.5 * SLIVER_MM) ^ places
-
-
-def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, lean_mm: float) -> Polygons:
-    """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it
-    must. What is placeable needs nothing.
-    """
-    straight = places ^ reachable
-    rest = places - reachable
-    if rest.area() >= LEAST_MM2:
-        rest = rest - placeable
-    if rest.area() >= LEAST_MM2:
-        rest = rest - dilate(offset(straight, -SLIVER_MM), lean_mm)
-    if rest.area() < LEAST_MM2:
-        return straight
-    for share in STEPS:
-        aside = widen(rest, share * lean_mm) ^ reachable
-        if share == STEPS[-1] or (rest - dilate(aside, lean_mm)).area() < LEAST_MM2:
-            break
-    return straight + aside
 
 
 def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Polygons | None = None) -> ReachableAreas:

@@ -9,7 +9,7 @@ import numpy as np
 from mdp.clearance import least_tip_height_mm
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, offset, opening, union
-from slicer.overhangs import LEAST_MM2, Overhang, drop_small, seen_from_above
+from slicer.overhangs import LEAST_MM2, Overhang
 from slicer.paths import Unsupported
 from slicer.sectioning import RIM_MM, Sections
 from slicer.support.reachable import (
@@ -23,18 +23,20 @@ from slicer.support.reachable import (
     above_base_planes,
     beside_standing,
     blocked_areas,
-    carrying_area,
     dilate,
     drop_slivers,
     reachable_areas,
     support_reach_mm,
 )
-from slicer.support.tree import JOIN_MM, Branch, add_contact, lower_branches
+from slicer.support.tree import JOIN_MM, Branch, add_contact, carrying_area, lower_branches
 
 SLACK_MM = 0.01  # what rounding may add to the lean
 LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
 MOST = 0.5  # share of a place that one reason has to hold for
+
+
+HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +95,21 @@ def _drop_nearly_held(sections: Sections, overhangs: Sequence[Overhang]) -> list
                 hanging = hanging - union(near)
         free.append(hanging)
     return free
+
+
+def drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
+    """The hanging places without those that, seen from above, are too small to matter."""
+    small = union([island for island in islands(seen_from_above(hanging)) if island.area() < least_mm2])
+    if small.is_empty():
+        return list(hanging)
+    large = [area if area.is_empty() else area - small for area in hanging]
+    return [area if area.area() >= LEAST_MM2 else Polygons() for area in large]
+
+
+def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
+    """The places that hanging layers make up together."""
+    areas = [offset(area, RIM_MM) for area in hanging if not area.is_empty()]
+    return union([union(areas[k : k + HEAP]) for k in range(0, len(areas), HEAP)])
 
 
 def grow(

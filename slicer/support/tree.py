@@ -31,18 +31,7 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons, closing, contours, islands, offset, union
-from slicer.support.reachable import (
-    EVEN_MM,
-    FINE_MM,
-    LEAST_MM2,
-    SLIVER_MM,
-    SMOOTH_MM,
-    ReachableAreas,
-    carrying_area,
-    dilate,
-    drop_slivers,
-    widen,
-)
+from slicer.support.reachable import EVEN_MM, FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
 JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
@@ -53,6 +42,10 @@ FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin re
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
 TIDY_EVERY = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
 INSET = 0.7  # of the lean: then right corners move by the lean
+
+
+STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
+WIDEST = 1.3  # times the distance: how far corners of widened places may reach; sharper ones than 100 degrees are cut off
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,3 +271,30 @@ def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
     rank = np.arange(len(branches))
     inside = (deep >= -1e-9) & (full[None, :] > 0) & ((radius[None, :] > radius[:, None]) | (rank[None, :] < rank[:, None]))
     return [branches[k] for k in np.flatnonzero(~inside.any(axis=1))]
+
+
+def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, lean_mm: float) -> Polygons:
+    """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it
+    must. What is placeable needs nothing.
+    """
+    straight = places ^ reachable
+    rest = places - reachable
+    if rest.area() >= LEAST_MM2:
+        rest = rest - placeable
+    if rest.area() >= LEAST_MM2:
+        rest = rest - dilate(offset(straight, -SLIVER_MM), lean_mm)
+    if rest.area() < LEAST_MM2:
+        return straight
+    for share in STEPS:
+        aside = widen(rest, share * lean_mm) ^ reachable
+        if share == STEPS[-1] or (rest - dilate(aside, lean_mm)).area() < LEAST_MM2:
+            break
+    return straight + aside
+
+
+def widen(area: Polygons, distance_mm: float) -> Polygons:
+    """The area grown by at least a distance, with hardly more corners than it has.
+
+    What is grown layer after layer must not get round corners: each of them would be two in the next layer.
+    """
+    return offset(area, distance_mm, WIDEST)

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_between
 from slicer.geometry.segments import Segment, nearest_share
 from slicer.geometry.triangulation import Triangulation
-from slicer.walls.counts import Counts, Rule, depth_of, loops_of, spacing_of
-from slicer.walls.skeleton import Skeleton, after, before
+from slicer.walls.skeleton import Counts, Rule, Skeleton, after, before, depth_of, loops_of, spacing_of
 
 MITRE = 100.0  # deg: round a sharper corner of a hole the loop is cut off
 SMOOTH = 0.05  # radians: no mitre for less
@@ -39,14 +38,14 @@ class _Ribs(NamedTuple):
     reach: Floats
     depth: Floats
     spacing: Floats
-    starts: NDArray[np.int64]
-    node: NDArray[np.int64]
+    starts: Indices
+    node: Indices
 
 
 @kernel
 def lay_loops(
     triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int
-) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Floats, Indices, Indices]:
     """All loops of a level, 0 outermost, their widths smoothed where counts change.
 
     Returns courses (n, 3) of x, y and width, the first point of each loop repeated at its end, where each loop begins (k + 1,)

@@ -25,7 +25,6 @@ from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
@@ -34,9 +33,19 @@ from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
-from slicer.walls.counts import FEATURE, Counts, Rule, count_beads, depth_of, loops_of, middle_width, spacing_of
 from slicer.walls.loops import TRANSITION, corners, lay_loops, smoothed
-from slicer.walls.skeleton import Skeleton, skeleton_of
+from slicer.walls.skeleton import (
+    FEATURE,
+    Counts,
+    Rule,
+    Skeleton,
+    count_beads,
+    depth_of,
+    loops_of,
+    middle_width,
+    skeleton_of,
+    spacing_of,
+)
 
 STEP = 0.42  # nominal spacings: sampling of the boundary
 DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
@@ -98,10 +107,10 @@ class Chains(NamedTuple):
     """
 
     courses: Floats
-    starts: NDArray[np.int64]
-    levels: NDArray[np.int64]
-    ends: NDArray[np.int64]
-    forks: NDArray[np.int64]
+    starts: Indices
+    levels: Indices
+    ends: Indices
+    forks: Indices
     taken: Floats
 
 

@@ -13,11 +13,18 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, bulge_flow, least_width_mm, mean_width_mm, outer_wall_width_mm, spacing_mm, varying
-from slicer.geometry.polygons import Polygons, contours, islands, offset, offset_round, opening, strips
+from slicer.bead import (
+    Bead,
+    least_width_mm,
+    mean_width_mm,
+    outer_wall_width_mm,
+    spacing_mm,
+    varying,
+)
+from slicer.geometry.polygons import Polygons, contours, islands, larger, offset, offset_round, opening, strips
 from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm, simplify
 from slicer.paths import Kind
-from slicer.walls.counts import ROOM, SPLIT, Rule
+from slicer.walls.skeleton import ROOM, SPLIT, Rule
 from slicer.walls.variable import Wall, variable_walls
 
 WIDEST = 2.0  # diameters of the nozzle
@@ -32,6 +39,9 @@ MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie be
 ROUNDS = 50  # beads round a place at most: as many as walls
 SHORTEST = 0.25  # of the line width: what is shorter is no bead
 MOST_WIDER = 1.3  # times as wide as its place is a bead, at most, to make up for the tips of the place that it does not reach
+
+
+FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,29 +138,6 @@ def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polyg
     return inside if inside.is_empty() else opening(inside, 0.5 * rule.inner)
 
 
-def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
-    """The walls as beads; all ranks are at most 0, so that walls come before gaps, skin and infill.
-
-    Outer beads make up for what their outer round side leaves out of the section.
-    """
-    outer, beads = outer_wall_width_mm(process), []
-    outer_flow = bulge_flow(outer, height_mm, 1, process.outer_bulge * outer)
-    for level, loops in enumerate(walled.loops):
-        kind, width, flow = (Kind.INNER_WALL, process.line_width_mm, 1.0) if level else (Kind.OUTER_WALL, outer, outer_flow)
-        beads += [Bead(kind, loop, width, wall_rank(level, process), flow) for loop in loops]
-    for wall in walled.varying:  # one that fills a place from side to side bulges on both
-        kind, width = Kind.INNER_WALL if wall.level else Kind.OUTER_WALL, mean_width_mm(wall.course)
-        flow = bulge_flow(width, height_mm, wall.free, process.outer_bulge * process.line_width_mm)
-        rank, course = wall_rank(wall.level, process), varying(wall.course)
-        beads.append(Bead(kind, wall.points, width, rank, flow, line=not wall.closed, course=course))
-    return beads
-
-
-def wall_rank(level: int, process: Process) -> int:
-    """Rank of a wall counted from outside."""
-    return -level if process.wall_order == "inner-first" else level - process.walls
-
-
 def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> list[Bead]:
     """Beads that fill places between other beads, which cover their round sides, with their area times height of plastic.
 
@@ -169,3 +156,10 @@ def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> 
             points = simplify(np.ascontiguousarray(course[:, :2]))
             beads.append(Bead(Kind.GAP, points, mean_width_mm(course), RANK, course=varying(course)))
     return beads
+
+
+def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> Polygons:
+    """What of an area lines of that width do not cover, as far as plastic fits into it."""
+    few_mm2 = FEW_MM2 * width_mm**2
+    rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
+    return larger(opening(larger(rest, few_mm2), 0.5 * LEAST_GAP * width_mm), few_mm2)

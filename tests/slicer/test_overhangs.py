@@ -13,8 +13,9 @@ from mdp.overhang import risky_upright
 from mdp.support_need.need import needs_support
 from mdp.zone import Marked, Zone
 from slicer.geometry.polygons import Polygons
-from slicer.overhangs import Overhang, drop_small, find_overhangs, seen_from_above
+from slicer.overhangs import Overhang, find_overhangs
 from slicer.sectioning import section_part
+from slicer.support.support import drop_small, seen_from_above
 from tests.shapes import ball, branch, standing, tee
 from tests.slicer.hand import cut, profile, whole
 

@@ -42,7 +42,7 @@ from mdp.search.orient import orient_and_decompose
 from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
-from slicer.interface.interlock import pin_width_mm, room_around_mm
+from slicer.interface.interface import pin_width_mm, room_around_mm
 from slicer.paths import SlicedPart
 from slicer.slice import SlicingProgress, slice_parts
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from shapely.affinity import rotate
 
 from mdp.mesh import Mesh
-from slicer.fill.bridge import Bridge, find_bridge, find_bridges
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, offset
+from slicer.overhangs import Bridge, find_bridge, find_bridges
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
 from tests.shapes import box, standing

@@ -7,9 +7,9 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from slicer.fill.lines import zigzag_lines
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
+from slicer.support.beads import zigzag_lines
 from tests.slicer.fill.areas import STARS
 from tests.slicer.hand import as_shapely, ragged
 

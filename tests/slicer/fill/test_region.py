@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from profiles.process import Process
-from slicer.fill.region import Cover, Region, regions, shell_layers
+from slicer.fill.region import Cover, Region, regions
 from slicer.geometry.polygons import Polygons, offset, opening
+from slicer.heights import shell_layers
 from tests.slicer.hand import as_shapely, profile
 
 WIDTH = 0.45

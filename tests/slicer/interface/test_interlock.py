@@ -6,7 +6,7 @@ import pytest
 from mdp.decomposition import Part
 from profiles.errors import ProfileError
 from slicer.geometry.polygons import Polygons
-from slicer.interface.interlock import cut_grooves, grooves
+from slicer.interface.interface import cut_grooves, grooves
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from tests.shapes import box, branch

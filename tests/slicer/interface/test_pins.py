@@ -16,7 +16,7 @@ from mdp.mesh import Floats
 from profiles.errors import ProfileError
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, with_part_settings
-from slicer.interface.interlock import plan_pins
+from slicer.interface.interface import plan_pins
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import Sections, section_part
 from slicer.slice import fill_pins, slice_part

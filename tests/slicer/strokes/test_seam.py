@@ -16,7 +16,8 @@ from slicer.bead import Bead
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import slice_part
-from slicer.strokes.seam import Surroundings, place_seams, rear_of, seam_limits
+from slicer.strokes.seam import Surroundings, place_seams
+from slicer.strokes.seam_plan import rear_of, seam_limits
 from tests.shapes import box, branch, standing
 from tests.slicer.hand import BARE, cut, profile, shared, whole
 

@@ -11,8 +11,7 @@ from mdp.mesh import Floats
 from slicer.geometry.polygons import contours
 from slicer.sectioning import Sections, section_part
 from slicer.slice import slice_part
-from slicer.strokes.seam import seam_limits
-from slicer.strokes.seam_plan import JUMP, SHIFT, choose, light_at, light_samples, plan_seams
+from slicer.strokes.seam_plan import JUMP, SHIFT, choose, light_at, light_samples, plan_seams, seam_limits
 from tests.shapes import standing
 from tests.slicer.hand import BARE, cut, profile, whole
 from tests.slicer.strokes.test_seam import distance_mm, outer_seams

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from slicer.bead import Bead
+from slicer.geometry.clip import cut_line
 from slicer.geometry.polygons import Polygons, of_contours
 from slicer.paths import NUMBER, Kind
-from slicer.strokes.strokes import Strokes, cut_line, split, strokes_of
+from slicer.strokes.strokes import Strokes, split, strokes_of
 from tests.slicer.hand import Row, as_shapely, ragged, rows_of
 
 seeds = st.integers(0, 10**6)

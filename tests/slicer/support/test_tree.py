@@ -6,7 +6,7 @@ import pytest
 
 from mdp.mesh import Mesh
 from slicer.geometry.polygons import Polygons, offset
-from slicer.support.reachable import carrying_area
+from slicer.support.tree import carrying_area
 from tests.shapes import standing
 from tests.slicer.hand import as_shapely, cut, ragged
 from tests.slicer.support.laws import assert_sound, supported

@@ -17,13 +17,13 @@ from slicer.geometry.polygons import Polygons, close_loop
 from slicer.geometry.polyline import length_mm
 from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
+from slicer.shells import wall_beads
 from slicer.slice import slice_part
 from slicer.strokes.strokes import in_pieces, strokes_of
-from slicer.walls.counts import FEATURE, count_beads
 from slicer.walls.loops import lay_loops
-from slicer.walls.skeleton import skeleton_of
+from slicer.walls.skeleton import FEATURE, count_beads, skeleton_of
 from slicer.walls.variable import STEP, Wall, variable_walls
-from slicer.walls.walls import bead_rule, layer_walls, wall_beads
+from slicer.walls.walls import bead_rule, layer_walls
 from tests.shapes import from_manifold
 from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, rows_of, volume_mm3, whole
 

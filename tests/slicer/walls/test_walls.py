@@ -12,7 +12,8 @@ from slicer.bead import spacing_mm
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import PATH_RESOLUTION_MM
 from slicer.paths import Kind, bead_area_mm2
-from slicer.walls.walls import wall_beads, walls
+from slicer.shells import wall_beads
+from slicer.walls.walls import walls
 from tests.slicer.hand import distances_mm, profile, section_at, shared
 
 WIDTH, HEIGHT = 0.45, 0.2
