@@ -7,11 +7,9 @@ from math import pi
 import numpy as np
 
 from machine.firmware import dialect_of
-from machine.gcode.blocks import check_blocks, cold_block
+from machine.gcode.blocks import check_blocks, cold_block, fill_block, placeholders
 from machine.gcode.commands import COMMANDS, TOOL, command_in
-from machine.gcode.pen import Pen, number
-from machine.gcode.placeholders import fill_block, placeholders
-from machine.gcode.turning import turn
+from machine.gcode.pen import Pen, number, turn
 from machine.gcode.writer import BLOCKS
 from machine.kinematics.table import machine_points
 from machine.planning.limits import turn_speed

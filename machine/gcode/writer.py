@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
-from machine.gcode.blocks import check_blocks
+from machine.gcode.blocks import check_blocks, fill_block, placeholders
 from machine.gcode.lines import Lines
 from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, Texts, Z, as_bytes
-from machine.gcode.pen import UNKNOWN, Pen, angle, number
-from machine.gcode.placeholders import fill_block, placeholders
+from machine.gcode.pen import UNKNOWN, Pen, angle, number, turn
 from machine.gcode.settings import totals_comment
-from machine.gcode.turning import turn
 from machine.gcode.words import PAUSE_REMARK
 from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, straight_moves
 from machine.planning.timing import move_times

@@ -1,4 +1,9 @@
-"""Layer: a layer's strokes as moves, each as fast as axes, extruder and hot end can, and the ways of the tip between them."""
+"""Layer: a layer's strokes as moves, each as fast as axes, extruder and hot end can, and the ways of the tip between them.
+
+Filament that makes up for what oozed while the table turned is pushed during a stroke inside, not at standstill. How much oozed
+is not known. Pushed at the beginning of a wall, what did not ooze would be a drop on the seam; spread over the first stretch of
+infill or support it makes that a little thicker, where nobody sees or feels it.
+"""
 
 from itertools import pairwise
 from math import inf, pi
@@ -6,18 +11,21 @@ from math import inf, pi
 import numpy as np
 
 from machine.planning.limits import Speeds, path_speeds
-from machine.planning.moves import POINTS, RETRACT, Moves, add_point, add_row
-from machine.planning.priming import run_in
+from machine.planning.moves import POINTS, RETRACT, SPEED, Moves, add_point, add_row
 from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
 from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
-from slicer.paths import KINDS, Layer, bead_area_mm2
+from profiles.profile import Profile
+from slicer.paths import KINDS, Kind, Layer, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
 from slicer.strokes.travels import STANDING_MM
 
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
+RUN_MM = 20.0  # the filament of a turn is spread over so much of a stroke
+MOST_FULL = 1.5  # of what the width and the height of a bead need: what did not ooze shall not fill the room twice
+SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN)
 
 
 def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_plate: bool) -> None:
@@ -109,6 +117,34 @@ def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> 
             add_point(out, done, here[0], here[1], here[2], pushed if pushes else 0.0)
         first = end
     return Moves(out.ways[: done[0]], out.rows)
+
+
+def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> float:
+    """Add filament that is still to be pushed after a turn to the strokes of a layer; how much they take, mm.
+
+    A stroke takes half more than its width and height need, the next one some of the rest; one that is seen takes it only in a
+    layer that has no other.
+    """
+    if more_mm <= 0.0:
+        return 0.0
+    seen, taken_mm = layer.is_of(*SEEN), 0.0
+    filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
+    fastest = min(profile.material.volumetric_limit_mm3_s / filament_mm2, profile.machine.extruder_speed_mm_s)
+    needed_mm = bead_area_mm2(layer.width_mm, layer.height_mm) * profile.material.flow / filament_mm2  # for a millimetre
+    ends = np.cumsum(strokes.rows[:, POINTS].astype(np.int64))
+    for k in np.flatnonzero(~seen | seen.all()).tolist():
+        if taken_mm >= more_mm:
+            break
+        way = strokes.ways[ends[k] - int(strokes.rows[k, POINTS]) : ends[k]]
+        length, pushed = np.linalg.norm(np.diff(way[:, :3], axis=0), axis=1), way[1:, 3]
+        run = np.where(np.cumsum(length) - length < RUN_MM, length, 0.0)
+        more = min(more_mm - taken_mm, float((MOST_FULL * needed_mm[k] * length - pushed)[run > 0.0].sum()))
+        if more > 0.0:
+            taken_mm += more
+            pushed += more * run / run.sum()
+            densest = float((pushed[length > 0.0] / length[length > 0.0]).max())
+            strokes.rows[k, SPEED] = min(strokes.rows[k, SPEED], fastest / densest)
+    return taken_mm
 
 
 @kernel

@@ -74,6 +74,11 @@ def obstacle_top_mm(machine: Machine, printed: Printed | None, pose: Pose) -> fl
     return max(float(reach_of(UP[None])[0]) for _, reach_of in solids(machine, pose, printed))
 
 
+def over_print_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
+    """Z at which the tip clears all that is printed, wherever it goes at a pose."""
+    return float(printed.reach(machine, pose, UP[None])[0]) + machine.clearance_mm
+
+
 def _corners(machine: Machine) -> list[tuple[float, float]]:
     (left, right), (front, back) = machine.x.limits_mm, machine.y.limits_mm
     return [(x, y) for x in (left + ASIDE_MM, right - ASIDE_MM) for y in (front + ASIDE_MM, back - ASIDE_MM)]

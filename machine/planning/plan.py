@@ -9,13 +9,12 @@ from machine.kinematics.collision import Printed, hull, join_hulls
 from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
 from machine.planning.layer import print_layer
-from machine.planning.lift import over_print_mm, standing_beads
 from machine.planning.moves import TRAVEL, BeginLayer, BeginPart, MachineProgram, Pause, Reorient
-from machine.planning.park_position import beside, find_park_position, obstacle_top_mm
+from machine.planning.park_position import beside, find_park_position, obstacle_top_mm, over_print_mm
 from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Turn, route
 from machine.planning.stops import Stop, stops_by_layer
-from machine.planning.travel import Tip, go, retract
+from machine.planning.travel import Tip, go, retract, standing_beads
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import Pose, level

@@ -1,29 +1,35 @@
-"""Travel: how the tip gets about between strokes: pulling back with a wipe, lifting, crossing."""
+"""Travel: how the tip gets about between strokes: pulling back with a wipe, lifting, crossing; and how high it must be for the
+head to clear what stands beside a limb that is being printed.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf, nan
+from math import inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning.lift import clear_height_mm
 from machine.planning.limits import Speeds, path_speed, path_speeds, speeds_of
 from machine.planning.moves import MARK, REORIENT, RETRACT, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
-from mdp.clearance import Standing
+from mdp.clearance import Standing, highest_in_cells
+from mdp.decomposition import Part
 from mdp.kernels.arrays import longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.pose import Pose
 from profiles.errors import MoveError
+from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.geometry.polyline import length_between
+from slicer.interface.interface import frame_change
+from slicer.paths import SlicedPart
 from slicer.strokes.travels import STANDING_MM, distance, first_length, runs_round, wipe_trail
 
 TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
 NOWHERE = np.zeros((0, 3))
+STEP_MM = 0.5  # between the points that sample ways and beads, and size of the cells in which only the highest point counts
 
 
 @dataclass
@@ -232,3 +238,38 @@ def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
                 trail[i, axis] = trail[2 * (count - 1) - i, axis]
         count += once - 1
     return trail[:count]
+
+
+def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> Standing:
+    """The printed beads that stand above the base plane of a limb, in its frame.
+
+    Beads less than their width above the plane are left out: they are the steps of the cut face on which the limb stands.
+    """
+    tops, widest_mm = [np.zeros((0, 3))], 0.0
+    for part, piece in printed:
+        turn, shift = frame_change(part, limb)
+        for layer in piece.layers:
+            placed = layer.points_mm @ turn.T + shift
+            for a, b, width_mm in zip(
+                layer.starts[:-1].tolist(), layer.starts[1:].tolist(), layer.width_mm.tolist(), strict=True
+            ):
+                if placed[a:b, 2].max() > width_mm:
+                    points = _resampled(placed[a:b])
+                    tops.append(points[points[:, 2] > width_mm])
+                    widest_mm = max(widest_mm, width_mm)
+    slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of way and of bead, half a cell's diagonal
+    return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
+
+
+def clear_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> float:
+    """The least height of at least height_mm at which the tip may go along a way (n, 2) in the limb's frame."""
+    return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm), height_mm).max()))
+
+
+def _resampled(way_mm: Floats) -> Floats:
+    """A way (n, d) with points added so that they are at most STEP_MM apart."""
+    steps = np.diff(way_mm, axis=0)
+    counts = np.maximum(np.ceil(np.linalg.norm(steps, axis=1) / STEP_MM), 1).astype(np.int64)
+    share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / np.repeat(counts, counts)
+    points: Floats = np.repeat(way_mm[:-1], counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
+    return np.concatenate([points, way_mm[-1:]])

@@ -36,7 +36,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     program, profile = loaded.program, loaded.profile
     mesh = None if program.decomposition is None else program.decomposition.mesh
     if reference is not None:
-        from machine.planning.arrange import mesh_moved
+        from machine.planning.fit import mesh_moved
         from mdp.read import read_mesh
 
         mesh, _ = read_mesh(locate(reference), profile.process.scale, profile.process.rotate_deg)

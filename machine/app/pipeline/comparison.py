@@ -9,7 +9,7 @@ from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
 from machine.dryrun.dryrun import DryRun
-from machine.planning.arrange import standing_at
+from machine.planning.fit import standing_at
 from machine.program import Alternative, Program, joints_of_print
 from machine.quantities import duration, filament_g
 from mdp.cost.cost import weight_of_stairs

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from machine.planning.arrange import Place, places_on_plate
+from machine.planning.fit import Place, places_on_plate
 from mdp.cost.footing import tips_over
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh

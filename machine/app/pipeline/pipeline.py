@@ -22,8 +22,7 @@ from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
 from machine.gcode.blocks import check_blocks
 from machine.gcode.writer import write_gcode
-from machine.planning.arrange import standing_at
-from machine.planning.fit import check_parts, check_standing
+from machine.planning.fit import check_parts, check_standing, standing_at
 from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from machine.planning.purge import has_purge

@@ -8,14 +8,12 @@ import numpy as np
 
 from machine.firmware import dialect_of
 from machine.firmware.klipper import stepper_name
-from machine.gcode.pen import Pen
-from machine.gcode.placeholders import fill_block, resume_placeholders
-from machine.gcode.turning import turn
+from machine.gcode.blocks import fill_block, resume_placeholders
+from machine.gcode.pen import Pen, turn
 from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
-from machine.planning.lift import over_print_mm
 from machine.planning.limits import speeds_of
-from machine.planning.park_position import obstacle_top_mm
+from machine.planning.park_position import obstacle_top_mm, over_print_mm
 from machine.planning.reorient import Turn, route
 from mdp.pose import Pose
 from profiles.errors import JournalError

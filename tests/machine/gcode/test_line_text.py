@@ -13,8 +13,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from machine.firmware import dialect_of, dialects
+from machine.gcode.blocks import fill_block
 from machine.gcode.line_text import plain_line, read_line, to_ascii
-from machine.gcode.placeholders import fill_block
 from machine.link.protocol.framing import command_of, frame
 from machine.network.gcode_upload import GcodeUpload
 from machine.reader.parse import parse_gcode

@@ -8,7 +8,7 @@ import pytest
 from machine.kinematics.collision import hull
 from machine.link.pause.return_path import return_moves
 from machine.planning import travel
-from machine.planning.arrange import standing_at
+from machine.planning.fit import standing_at
 from machine.planning.limits import speeds_of
 from machine.planning.moves import Pause
 from machine.planning.plan import plan

@@ -5,8 +5,8 @@ from math import pi
 import numpy as np
 import pytest
 
+from machine.planning.layer import RUN_MM, run_in
 from machine.planning.moves import SPEED, Moves
-from machine.planning.priming import RUN_MM, run_in
 from profiles.profile import Profile, load
 from slicer.bead import Bead
 from slicer.paths import Kind, Layer, Path

@@ -14,7 +14,7 @@ from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
 from machine.app.workbench.work.walls import walls
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
-from machine.planning.arrange import standing_at
+from machine.planning.fit import standing_at
 from machine.program import Alternative
 from machine.view.page import print_page, with_comparison
 from mdp.decomposition import Decomposition

@@ -10,7 +10,7 @@ from machine.app.workbench.bench.model import mesh_blocks
 from machine.app.workbench.bench.values import vector_of
 from machine.app.workbench.work.cutting import turned_mesh
 from machine.app.workbench.work.pieces import out_of_reach
-from machine.planning.arrange import Place
+from machine.planning.fit import Place
 from mdp.kernels.workers import Tell
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright

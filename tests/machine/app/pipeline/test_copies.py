@@ -10,7 +10,7 @@ import shapely
 
 from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
-from machine.planning.arrange import places_on_plate
+from machine.planning.fit import places_on_plate
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
 from mdp.zone import Grown, Marked, Zone

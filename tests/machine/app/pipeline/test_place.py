@@ -9,7 +9,7 @@ from machine.app.pipeline.comparison import compare_with_one_part
 from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
 from machine.dryrun.conformity.agreement import agreement
-from machine.planning.arrange import places_on_plate, standing_at
+from machine.planning.fit import places_on_plate, standing_at
 from mdp.decomposition import Decomposition
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.by_plan import cut_by_plan
