@@ -50,9 +50,8 @@ class Bead:
 
     rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
     each outer wall, what is below all ranks of walls comes before them. over_infill: a bridge over the sparse infill of the
-    layer below, which has a speed and a fan of its own. follows: printed right after the bead before it in the list. overhang:
-    of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or nothing of it lies on plastic. line: a wall that does not run
-    round. course: (k, 3) x, y and width where the width varies; width_mm is then their mean, and the points lie on the course.
+    layer below, which has a speed and a fan of its own. follows: printed right after the bead before it in the list. line: a
+    wall that does not run round. course: (k, 3) x, y and width where the width varies; width_mm is then their mean, and the points lie on the course.
     """
 
     kind: Kind
@@ -62,7 +61,6 @@ class Bead:
     flow: float = 1.0
     over_infill: bool = False
     follows: bool = False
-    overhang: int = 0
     line: bool = False
     course: Floats | None = None
 
@@ -89,11 +87,6 @@ def spacing_mm(width_mm: float, height_mm: float) -> float:
     0.407
     """
     return width_mm - height_mm * ROUND_SIDES
-
-
-def width_for_mm(spacing: float, height_mm: float) -> float:
-    """Width of the bead that fills a strip of that width between two others: the inverse of spacing_mm."""
-    return spacing + height_mm * ROUND_SIDES
 
 
 def least_width_mm(nozzle_mm: float, height_mm: float) -> float:

@@ -14,6 +14,7 @@ from mdp.kernels.processes import parallel_map
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import (
+    ROUND_SIDES,
     WALLS,
     Bead,
     bulge_flow,
@@ -25,7 +26,6 @@ from slicer.bead import (
     spacing_mm,
     varying,
     wall_rank,
-    width_for_mm,
     with_line_width,
 )
 from slicer.fill.infill import infill_beads, pattern_density
@@ -157,15 +157,12 @@ def strengthen_overhangs(
     """
     if all(process.overhang_extra_walls == 0 for process in processes):
         return list(processes)
-    lower = [first_below, *sections[:-1]]
-    return [_strengthened(*row) for row in zip(processes, sections, lower, strict=True)]
-
-
-def _strengthened(process: Process, section: Polygons, below: Polygons | None) -> Process:
-    width = process.line_width_mm
-    if below is None or not process.walls or hanging_area(section, below, process.overhang_share, width).area() < width**2:
-        return process
-    return process.model_copy(update={"walls": process.walls + process.overhang_extra_walls})
+    stronger = []
+    for process, section, below in zip(processes, sections, [first_below, *sections[:-1]], strict=True):
+        width, extra = process.line_width_mm, process.overhang_extra_walls if process.walls else 0
+        hangs = below is not None and hanging_area(section, below, process.overhang_share, width).area() >= width**2
+        stronger.append(process.model_copy(update={"walls": process.walls + extra}) if hangs and extra else process)
+    return stronger
 
 
 def model_sections(sections: Sections) -> list[Polygons | None]:
@@ -360,7 +357,7 @@ def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Be
         return []
     spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
     flow = process.ironing_flow * spacing * height_mm / bead_area_mm2(width, height_mm)
-    dense = SolidLines(skin.angle_deg + 90.0, width_for_mm(spacing, height_mm), height_mm, in_order=True)
+    dense = SolidLines(skin.angle_deg + 90.0, spacing + height_mm * ROUND_SIDES, height_mm, in_order=True)
     beads, _ = skin_lines(area, Kind.IRONING, dense)
     return [replace(bead, width_mm=width, flow=flow, rank=IRONED) for bead in beads]
 

@@ -136,7 +136,8 @@ def region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_pl
     empty, width_mm = Polygons(), process.line_width_mm
     if inside.is_empty():
         return Region(empty, empty, empty, empty, empty)
-    wholly = on_plastic and layer < solid_bottom_layers(process)
+    # on plastic grooves are filled by skin, and pins hang on it
+    wholly = on_plastic and layer < max(process.interface_bottom_layers, 0 if process.interlock == "none" else 1)
     sparse = empty if wholly else _beside_cuts(inside, uncut, cover, layer, process)
     if not sparse.is_empty() and abs(sparse.area() - inside.area()) < 1e-6:
         return Region(empty, empty, empty, sparse, uncut)
@@ -148,11 +149,6 @@ def region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_pl
     # A top's lines go on under the walls around it and as far as its anchor: a frame of its own there would be all line ends.
     under = opening(solid - offset(bare, (process.walls + ANCHOR) * width_mm), width_mm)
     return Region(bare, solid - under, under, sparse, uncut)
-
-
-def solid_bottom_layers(process: Process) -> int:
-    """Solid layers of a part on plastic: grooves are filled by skin, and pins hang on it."""
-    return max(process.interface_bottom_layers, 0 if process.interlock == "none" else 1)
 
 
 def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:

@@ -156,14 +156,16 @@ def _rows(height_mm: Floats, spacing_mm: float) -> Indices:
 
 def _order_lines(by_cell: Sequence[list[Floats]], before: Sequence[set[int]], turned: Floats) -> list[Floats]:
     """Cell after cell, of those that wait for none the nearest; upward inside each."""
-    rising, waits = [_rising(lines, turned) for lines in by_cell], [len(earlier) for earlier in before]
+    upward = [[line if (line[-1] - line[0]) @ turned[:, 1] > -SINGLE_MM else line[::-1] for line in lines] for lines in by_cell]
+    rising = [sorted(lines, key=lambda line: float(line[0] @ turned[:, 1])) for lines in upward]
+    waits = [len(earlier) for earlier in before]
     after: list[list[int]] = [[] for _ in rising]
     for cell, earlier in enumerate(before):
         for first in earlier:
             after[first].append(cell)
     ready, out = [cell for cell, count in enumerate(waits) if not count], list[Floats]()
     while ready:
-        cell = min(ready, key=lambda cell: _travel_mm(out, rising[cell])) if out else ready[0]
+        cell = min(ready, key=lambda cell: float(np.hypot(*(rising[cell][0][0] - out[-1][-1])))) if out else ready[0]
         ready.remove(cell)
         for line in rising[cell]:
             out.append(_nearer_end_first(line, out, turned))
@@ -172,15 +174,6 @@ def _order_lines(by_cell: Sequence[list[Floats]], before: Sequence[set[int]], tu
             if not waits[later]:
                 ready.append(later)
     return out
-
-
-def _rising(lines: Sequence[Floats], turned: Floats) -> list[Floats]:
-    upward = [line if (line[-1] - line[0]) @ turned[:, 1] > -SINGLE_MM else line[::-1] for line in lines]
-    return sorted(upward, key=lambda line: float(line[0] @ turned[:, 1]))
-
-
-def _travel_mm(out: Sequence[Floats], lines: Sequence[Floats]) -> float:
-    return float(np.hypot(*(lines[0][0] - out[-1][-1])))
 
 
 def _nearer_end_first(line: Floats, out: Sequence[Floats], turned: Floats) -> Floats:

@@ -43,12 +43,12 @@ def order_beads(
     beside an edge of an interface, which no travel passes over.
     """
     support = Polygons() if support is None else support
-    placed, retracts, detours = list[tuple[Bead, Floats]](), np.zeros(0, np.bool_), dict[int, Floats]()
+    placed, retracts, detours = list[Bead](), np.zeros(0, np.bool_), dict[int, Floats]()
     if beads:
         first = beads[0].points[0] if tip is None else tip
         placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
-        to = np.array([points[0] for _, points in placed])
-        since = np.array([first, *(points[-1] for _, points in placed[:-1])])
+        to = np.array([bead.points[0] for bead in placed])
+        since = np.array([first, *(bead.points[-1] for bead in placed[:-1])])
         retracts, detours = travels(since, to, section, support, process, skin)
         retracts[0] = retracts[0] or tip is None
     return strokes_of(placed, retracts, detours, process.small_wall_mm)
@@ -85,18 +85,18 @@ def _pieces_around(starts: Floats, area: Polygons) -> Ints:
     return pieces
 
 
-def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first: bool) -> list[tuple[Bead, Floats]]:
-    """The beads in order, each with its points as printed."""
+def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first: bool) -> list[Bead]:
+    """The beads in order, with their points as they are printed."""
     groups: defaultdict[int, list[Bead]] = defaultdict(list)
     for bead, island in zip(beads, islands.tolist(), strict=True):
         groups[island].append(bead)
     order = _island_order(groups, first, support_first)
-    tip, placed = first, list[tuple[Bead, Floats]]()
+    tip, placed = first, list[Bead]()
     for island, after in zip(order, [*order[1:], order[-1]], strict=True):
         phases = _phases(groups[island])
         goal = NOWHERE if after == island and len(phases) == 1 else _middle(groups[after])[None]
         placed += _in_phases(phases, tip, goal)
-        tip = placed[-1][1][-1]
+        tip = placed[-1].points[-1]
     return placed
 
 
@@ -150,14 +150,14 @@ def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]
     which = np.repeat(np.arange(len(leaders)), [len(leader.points) for leader in leaders])
     inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
     members: list[list[Bead]] = [[] for _ in leaders]
-    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, _starts(inner))]
+    near = (
+        np.zeros(len(inner), np.int64)
+        if len(leaders) == 1
+        else which[_nearest(points, np.array([bead.points[0] for bead in inner]).reshape(-1, 2))]
+    )
     for bead, k in zip(inner, near, strict=True):
         members[k].append(bead)
     return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]
-
-
-def _starts(beads: Sequence[Bead]) -> Floats:
-    return np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
 
 
 @kernel
@@ -209,30 +209,25 @@ def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
         yield from _chains(others[0], others[1:])
 
 
-def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], tip: Floats, goal: Floats) -> list[tuple[Bead, Floats]]:
+def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], tip: Floats, goal: Floats) -> list[Bead]:
     """The phases of an island one after the other, each once more when it is known where the next one begins."""
     goals = [NOWHERE] * (len(phases) - 1) + [goal]
     for _ in range(min(len(phases), ROUNDS)):
-        runs, at = list[list[tuple[Bead, Floats]]](), tip
+        runs, at = list[list[Bead]](), tip
         for phase, end in zip(phases, goals, strict=True):
             runs.append(_short_order(phase, at, end))
-            at = runs[-1][-1][1][-1]
-        goals = [*(np.ascontiguousarray(run[0][1][:1]) for run in runs[1:]), goal]
-    return [placed for run in runs for placed in run]
+            at = runs[-1][-1].points[-1]
+        goals = [*(np.ascontiguousarray(run[0].points[:1]) for run in runs[1:]), goal]
+    return [bead for run in runs for bead in run]
 
 
-def _short_order(items: Sequence[Sequence[Bead]], tip: Floats, goal: Floats) -> list[tuple[Bead, Floats]]:
-    """Chains of beads in a short order from the tip on, each bead with its points as printed."""
+def _short_order(items: Sequence[Sequence[Bead]], tip: Floats, goal: Floats) -> list[Bead]:
+    """Chains of beads in a short order from the tip on, with their points as they are printed."""
     lines = [item[0].points if len(item) == 1 else np.array([item[0].points[0], item[-1].points[-1]]) for item in items]
     fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
-    placed: list[tuple[Bead, Floats]] = []
+    placed: list[Bead] = []
     for k, pieces in order_lines(lines, fixed, [_freedom(item) for item in items], tip, goal):
-        if len(items[k]) > 1:
-            placed += [(bead, bead.points) for bead in items[k]]
-        elif len(pieces) > 1:
-            placed += [(replace(items[k][0], points=piece), piece) for piece in pieces]
-        else:
-            placed.append((items[k][0], pieces[0]))
+        placed += items[k] if len(items[k]) > 1 else [replace(items[k][0], points=piece) for piece in pieces]
     return placed
 
 

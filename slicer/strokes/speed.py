@@ -45,38 +45,24 @@ def _by_kind(speeds: Mapping[Kind, float]) -> Floats:
 
 def _of_strokes(strokes: Strokes, usual: Floats, process: Process) -> Floats:
     """The kind's speed, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
-    hanging = np.array([np.inf, *_overhang_mm_s(process)])[strokes.overhang]
+    by_share = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
+    hanging = np.array([np.inf, *(getattr(process, key) for key in by_share)])[strokes.overhang]
     small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
     lowered = np.minimum(usual, np.where(strokes.overhang > 0, hanging, small))
     return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
 
 
-def _overhang_mm_s(process: Process) -> tuple[float, ...]:
-    return (
-        process.overhang_75_speed_mm_s,
-        process.overhang_50_speed_mm_s,
-        process.overhang_25_speed_mm_s,
-        process.overhang_0_speed_mm_s,
-    )
-
-
 def travel_time_s(strokes: Strokes, profile: Profile) -> float:
     """What a layer's travels and retractions take at least."""
-    material = profile.material
-    pulls = int(strokes.retract.sum()) * 2.0 * material.retract_mm / material.retract_speed_mm_s
-    return _travels_mm(strokes) / profile.process.travel_speed_mm_s + pulls
-
-
-def _travels_mm(strokes: Strokes) -> float:
-    """Length of all ways between strokes."""
-    steps = strokes.first_points[1:] - strokes.last_points[:-1]
+    steps, passes = strokes.first_points[1:] - strokes.last_points[:-1], strokes.approach_starts
     lengths = np.hypot(steps[:, 0], steps[:, 1])
-    passes = strokes.approach_starts
     for k in np.flatnonzero(np.diff(passes)).tolist():
         if k:
             way = [strokes.last_points[k - 1 : k], strokes.approach[passes[k] : passes[k + 1]], strokes.first_points[k : k + 1]]
             lengths[k - 1] = length_mm(np.concatenate(way))
-    return float(lengths.sum())
+    material = profile.material
+    pulls = int(strokes.retract.sum()) * 2.0 * material.retract_mm / material.retract_speed_mm_s
+    return float(lengths.sum()) / profile.process.travel_speed_mm_s + pulls
 
 
 def layer_time_s(strokes: Strokes, speeds: Floats, profile: Profile) -> float:

@@ -39,7 +39,8 @@ class Strokes:
 
     points: (n, 3) mm, x, y and the width of the bead there; starts: (k + 1,) where the points of each stroke begin.
     approach: (m, 2) points that the travels to strokes pass; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS;
-    width_mm: mean; flow, overhang, over_infill: as in Bead; small: a closed wall no longer than process.small_wall_mm, also the
+    width_mm: mean; flow, over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or nothing
+    of it lies on plastic; small: a closed wall no longer than process.small_wall_mm, also the
     pieces of one whose width varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back.
     """
 
@@ -100,17 +101,14 @@ class Strokes:
         )
 
 
-def strokes_of(
-    placed: Sequence[tuple[Bead, Floats]], retract: Mask, approaches: Mapping[int, Floats], small_wall_mm: float
-) -> Strokes:
-    """The table of beads in order, each with its points (n, 2) as printed; approaches: by number of the stroke."""
-    beads = [bead for bead, _ in placed]
-    counts = [len(points) for _, points in placed]
+def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Floats], small_wall_mm: float) -> Strokes:
+    """The table of beads in order, with their points (n, 2) as they are printed; approaches: by number of the stroke."""
+    counts = [len(bead.points) for bead in beads]
     starts = np.cumsum([0, *counts])
     kind = np.array([NUMBER[bead.kind] for bead in beads], dtype=np.int8)
     width_mm = np.array([bead.width_mm for bead in beads])
     points = np.empty((int(starts[-1]), 3))
-    points[:, :2] = np.concatenate([np.zeros((0, 2)), *(points for _, points in placed)])
+    points[:, :2] = np.concatenate([np.zeros((0, 2)), *(bead.points for bead in beads)])
     points[:, 2] = np.repeat(width_mm, counts)
     for k, bead in enumerate(beads):
         if bead.course is not None:
@@ -126,7 +124,7 @@ def strokes_of(
         kind=kind,
         width_mm=width_mm,
         flow=np.array([bead.flow for bead in beads]),
-        overhang=np.array([bead.overhang for bead in beads], dtype=np.int8),
+        overhang=np.zeros(len(beads), np.int8),
         over_infill=np.array([bead.over_infill for bead in beads], dtype=np.bool_),
         small=small,
         varies=np.array([bead.course is not None for bead in beads], dtype=np.bool_),

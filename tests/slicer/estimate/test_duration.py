@@ -19,7 +19,7 @@ TIP = np.zeros(2)
 
 def seconds(*lines: Floats, retracts: bool = False, speed: float = 50.0, tip: Floats = TIP) -> float:
     """Of walls along lines (n, 2), without the rise to their layer."""
-    placed = [(Bead(Kind.OUTER_WALL, line, 0.45, 0), line) for line in lines]
+    placed = [Bead(Kind.OUTER_WALL, line, 0.45, 0) for line in lines]
     strokes = strokes_of(placed, np.full(len(lines), retracts), {}, 0.0)
     return strokes_s(strokes, np.full(len(lines), speed), tip, PROFILE, False) - RISE_S
 

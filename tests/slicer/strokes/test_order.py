@@ -115,7 +115,7 @@ def test_slowing_stops_at_the_least_speed() -> None:
 
 def test_beads_at_the_floor_leave_the_waiting_to_the_others() -> None:
     beads = [line(0, 0, 12, 0, kind=Kind.GAP), line(12, 0, 112, 0)]
-    strokes = strokes_of([(bead, bead.points) for bead in beads], np.zeros(2, np.bool_), {}, 0.0)
+    strokes = strokes_of(beads, np.zeros(2, np.bool_), {}, 0.0)
     speeds = dict.fromkeys(Kind, 100.0) | {Kind.GAP: 12.0}
     limits = ("process.least_layer_time_s=6", "process.least_speed_mm_s=10", "material.volumetric_limit_mm3_s=50")
     slowed = speeds_mm_s(strokes, profile(*limits), 0.2, speeds, 1.0)

@@ -25,7 +25,7 @@ WIDTH = 0.45
 
 def placed(points: Any, of: Kind = Kind.OUTER_WALL) -> Strokes:
     bead = Bead(of, np.array(points, dtype=float), WIDTH, 0)
-    return strokes_of([(bead, bead.points)], np.array([True]), {0: np.array([[-1.0, -1.0]])}, 0.0)
+    return strokes_of([bead], np.array([True]), {0: np.array([[-1.0, -1.0]])}, 0.0)
 
 
 def kinds(strokes: Strokes) -> list[Kind]:

@@ -79,7 +79,7 @@ def test_a_layer_takes_its_least_time_unless_all_is_at_the_least_speed(size: flo
 def test_travels_last_as_long_as_their_ways_with_a_pull_back_and_a_push_for_each_retraction() -> None:
     keys = profile("material.retract_mm=2", "material.retract_speed_mm_s=40", "process.travel_speed_mm_s=100")
     lines = [np.array([[x, 0.0], [x + 10.0, 0.0]]) for x in (0.0, 20.0, 36.0)]
-    beads = [(Bead(Kind.INFILL, line, 0.45, 3), line) for line in lines]
+    beads = [Bead(Kind.INFILL, line, 0.45, 3) for line in lines]
     round_about = {1: np.array([[10.0, 5.0], [20.0, 5.0]])}  # 5, 10 and 5 mm to the second line, 6 mm to the third
     strokes = strokes_of(beads, np.array([False, True, False]), round_about, 0.0)
     assert travel_time_s(strokes, keys) == pytest.approx(26.0 / 100.0 + 2.0 * 2.0 / 40.0)

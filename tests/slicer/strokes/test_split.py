@@ -27,7 +27,7 @@ def walk(seed: int, steps: int = 30) -> Floats:
 
 
 def placed(points: Floats, kind: Kind = Kind.OUTER_WALL) -> Strokes:
-    return strokes_of([(Bead(kind, points, 0.45, 0), points)], np.array([True]), {0: np.array([(7.0, 7.0)])}, 0.0)
+    return strokes_of([Bead(kind, points, 0.45, 0)], np.array([True]), {0: np.array([(7.0, 7.0)])}, 0.0)
 
 
 def parted(line: Strokes, area: Polygons, shortest_mm: float) -> list[Row]:

@@ -12,7 +12,7 @@ from tests.slicer.hand import rows_of
 
 def test_the_pieces_of_several_strokes_keep_their_own_travels() -> None:
     lines = [np.array([[0.0, y], [10.0, y]]) for y in (1.0, 2.0, 3.0)]
-    placed = [(Bead(Kind.OUTER_WALL, line, 0.4 + 0.1 * k, 0), line) for k, line in enumerate(lines)]
+    placed = [Bead(Kind.OUTER_WALL, line, 0.4 + 0.1 * k, 0) for k, line in enumerate(lines)]
     approaches = {0: np.array([[-1.0, 1.0]]), 2: np.array([[-1.0, 3.0], [-2.0, 3.0]])}
     strokes = strokes_of(placed, np.array([True, False, True]), approaches, 0.0)
     middle = Polygons.square((4.0, 10.0)).translate((3.0, 0.0))
@@ -28,7 +28,7 @@ def test_the_pieces_of_several_strokes_keep_their_own_travels() -> None:
 def test_pieces_of_a_rich_stroke_hold_what_is_more_of_the_whole() -> None:
     line, widths = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([0.3, 0.6])
     bead = Bead(Kind.OUTER_WALL, line, 0.45, 0, flow=1.2, course=np.column_stack([line, widths]))
-    strokes = strokes_of([(bead, line)], np.array([True]), {}, 0.0)
+    strokes = strokes_of([bead], np.array([True]), {}, 0.0)
     pieces = in_pieces(strokes, 0.2)
     areas_mm2 = bead_area_mm2(pieces.width_mm, 0.2)
     more_mm3 = float(((pieces.flow - 1.0) * areas_mm2 * pieces.lengths_mm).sum())
@@ -38,7 +38,7 @@ def test_pieces_of_a_rich_stroke_hold_what_is_more_of_the_whole() -> None:
 
 def test_a_piece_of_a_small_wall_is_no_small_wall() -> None:
     ring = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0], [0.0, 0.0]])
-    strokes = strokes_of([(Bead(Kind.OUTER_WALL, ring, 0.45, 0), ring)], np.array([True]), {}, 20.0)
+    strokes = strokes_of([Bead(Kind.OUTER_WALL, ring, 0.45, 0)], np.array([True]), {}, 20.0)
     pieces, _ = split(strokes, Polygons.square((10.0, 1.5)).translate((-1.0, -0.5)), np.array([True]), 0.5)
     assert strokes.small.tolist() == [True]
     assert len(pieces) == 3

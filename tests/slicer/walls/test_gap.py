@@ -1,6 +1,7 @@
 """Beads in gaps lie in the middle of their place and fill it with its area times height of plastic."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import manifold3d as m3
 import numpy as np
@@ -22,7 +23,7 @@ WIDTH, HEIGHT = 0.45, 0.2
 
 def strips(beads: Sequence[Bead]) -> list[tuple[shapely.LineString, float]]:
     """The middle of every piece as it is printed, and its cross-section over the height, mm: as wide a place it fills."""
-    placed = [(bead, bead.points if bead.course is None else bead.course[:, :2]) for bead in beads]
+    placed = [bead if bead.course is None else replace(bead, points=bead.course[:, :2]) for bead in beads]
     pieces = in_pieces(strokes_of(placed, np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
     return [(shapely.LineString(row.points), bead_area_mm2(row.width_mm, HEIGHT) / HEIGHT) for row in rows_of(pieces)]
 

@@ -40,7 +40,7 @@ def plate(thickness: float, length: float = 12.0) -> Polygons:
 def plastic(walls: Sequence[Wall]) -> shapely.Geometry:
     """What walls cover, laid in pieces of one width as they are printed."""
     beads = [Bead(Kind.OUTER_WALL, wall.course[:, :2], mean_width_mm(wall.course), 0, course=wall.course) for wall in walls]
-    pieces = in_pieces(strokes_of([(bead, bead.points) for bead in beads], np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
+    pieces = in_pieces(strokes_of(beads, np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
     return shapely.union_all([shapely.LineString(row.points).buffer(0.5 * row.width_mm) for row in rows_of(pieces)])
 
 
