@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdp.head import Head, lowest_of_hot_end
 from mdp.kernels.kernel import no_nrt
 from mdp.mesh import Floats
-from slicer.geometry.segments import Segment, squared_distance
+from slicer.geometry.polyline import Segment, squared_distance
 
 NOTHING = -1e9
 SHIFT = 4

@@ -12,7 +12,7 @@ from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.segments import Segment
+from slicer.geometry.polyline import Segment
 
 SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
 

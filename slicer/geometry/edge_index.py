@@ -1,7 +1,7 @@
 """Edge index: the edges of polygons sorted into a grid of square cells, so that a query meets only the few edges near it.
 
 It finds where a segment crosses edges, whether a point lies inside, the nearest edge, and how deep inside points lie. All queries
-treat a point on an edge alike (slicer.geometry.segments): no crossing is counted twice or missed at a vertex.
+treat a point on an edge alike (slicer.geometry.polyline): no crossing is counted twice or missed at a vertex.
 """
 
 from math import inf, sqrt
@@ -16,7 +16,7 @@ from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.topology.cross_section import loop_edges
 from slicer.geometry.polygons import Polygons, contours
-from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share, squared_distance
+from slicer.geometry.polyline import Segment, crossing, edge, level_crossing, nearest_share, squared_distance
 
 MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
 FARTHEST_MM = 1e7  # where the search for the nearest edge ends

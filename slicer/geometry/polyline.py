@@ -1,4 +1,12 @@
-"""Polylines: their length and their simplification, one by one or a table of them at once."""
+"""Polylines: their length and their simplification, one by one or a table of them at once; and the predicates of segments that
+kernels share: orientation, crossing, nearest point.
+
+A point on a line counts as its right side, and a point at the height of an edge's end as below it, for all that meet there alike:
+no crossing is counted twice or missed at a vertex.
+"""
+
+from math import inf
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -6,9 +14,89 @@ from mdp.kernels.arrays import flags, floats
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
-from slicer.geometry.segments import Segment, squared_distance
 
 PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSlicer's resolution of G-code
+
+
+class Segment(NamedTuple):
+    """A straight line from x0, y0 to x1, y1."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+
+@no_nrt
+def edge(edges: Floats, e: int) -> Segment:
+    """One of (n, 4) edges x0 y0 x1 y1."""
+    return Segment(edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3])
+
+
+@no_nrt
+def orientation(line: Segment, x: float, y: float) -> float:
+    """Twice the signed area of the triangle of a line's two points and a third: positive where that lies to the left."""
+    return float((line.x1 - line.x0) * (y - line.y0) - (line.y1 - line.y0) * (x - line.x0))
+
+
+@no_nrt
+def crossing(segment: Segment, crossed: Segment) -> float:
+    """Where (0..1) a segment crosses another one; -1 where it does not."""
+    if (orientation(segment, crossed.x0, crossed.y0) > 0.0) == (orientation(segment, crossed.x1, crossed.y1) > 0.0):
+        return -1.0
+    start, end = orientation(crossed, segment.x0, segment.y0), orientation(crossed, segment.x1, segment.y1)
+    if (start > 0.0) == (end > 0.0):
+        return -1.0
+    return float(start / (start - end))
+
+
+@no_nrt
+def clamp_projection(along: float, square: float) -> float:
+    """Where (0..1) on a segment its point nearest to another one lies.
+
+    along: product of the vectors from the segment's beginning to the point and to its end; square: its length squared.
+    """
+    return min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+
+
+@no_nrt
+def nearest_share(segment: Segment, x: float, y: float) -> float:
+    """Where (0..1) on a segment the point nearest to x, y lies."""
+    dx, dy = segment.x1 - segment.x0, segment.y1 - segment.y0
+    return clamp_projection((x - segment.x0) * dx + (y - segment.y0) * dy, dx * dx + dy * dy)
+
+
+@no_nrt
+def squared_distance(segment: Segment, x: float, y: float) -> float:
+    """Square of the distance between a point and a segment."""
+    share = nearest_share(segment, x, y)
+    px, py = x - segment.x0, y - segment.y0
+    return float((px - share * (segment.x1 - segment.x0)) ** 2 + (py - share * (segment.y1 - segment.y0)) ** 2)
+
+
+@no_nrt
+def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
+    """Square of the distance between a point and the segment from a to b; each three numbers."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    share = clamp_projection(x * dx + y * dy + z * dz, dx * dx + dy * dy + dz * dz)
+    x, y, z = x - share * dx, y - share * dy, z - share * dz
+    return float(x * x + y * y + z * z)
+
+
+@no_nrt
+def level_crossing(segment: Segment, y: float) -> float:
+    """Where (x) a segment goes through the height y; -inf where it does not. What an even-odd test counts to one side."""
+    if (segment.y0 > y) == (segment.y1 > y):
+        return -inf
+    return float(segment.x0 + (y - segment.y0) / (segment.y1 - segment.y0) * (segment.x1 - segment.x0))
+
+
+def near_height(segments: Floats, z_mm: float, reach_mm: float) -> Floats:
+    """Those of (n, 6) segments in space that come nearer than that to a height."""
+    off = segments[:, [2, 5]] - z_mm
+    near: Floats = segments[(off.min(axis=1) < reach_mm) & (off.max(axis=1) > -reach_mm)]
+    return near
 
 
 def length_mm(points: Floats) -> float:

@@ -10,7 +10,7 @@ from mdp.kernels.arrays import flags, ints, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices, Ints
 from mdp.topology.linked_faces import opposites
-from slicer.geometry.segments import Segment, orientation
+from slicer.geometry.polyline import Segment, orientation
 
 ROUNDING = 1e-14  # of the terms that are added up: ten times their error
 MOST_FLIPS = 2000  # for every side; a straight strip of 2 m needs 500, most polygons one, rounding must not make it endless

@@ -33,7 +33,7 @@ from profiles.profile import Profile
 from slicer.bead import interface_process, outer_wall_width_mm
 from slicer.geometry.edge_index import index_edges, lie_within
 from slicer.geometry.polygons import Polygons, area_mm2, clean, contours, islands, offset, offset_round, union
-from slicer.geometry.segments import near_height
+from slicer.geometry.polyline import near_height
 from slicer.heights import Heights, part_heights
 
 SKIN = 0.8  # line widths inside the section from where on a tip is off the outer wall, whose middle lies at 0.5

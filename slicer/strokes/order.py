@@ -150,11 +150,8 @@ def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]
     which = np.repeat(np.arange(len(leaders)), [len(leader.points) for leader in leaders])
     inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
     members: list[list[Bead]] = [[] for _ in leaders]
-    near = (
-        np.zeros(len(inner), np.int64)
-        if len(leaders) == 1
-        else which[_nearest(points, np.array([bead.points[0] for bead in inner]).reshape(-1, 2))]
-    )
+    starts = np.array([bead.points[0] for bead in inner]).reshape(-1, 2)
+    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, starts)]
     for bead, k in zip(inner, near, strict=True):
         members[k].append(bead)
     return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]

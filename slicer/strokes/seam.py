@@ -17,7 +17,7 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.geometry.polygons import start_at
-from slicer.geometry.segments import Segment, nearest_share
+from slicer.geometry.polyline import Segment, nearest_share
 from slicer.paths import Kind
 from slicer.strokes.seam_plan import (
     NO_LIMITS,

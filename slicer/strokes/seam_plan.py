@@ -24,7 +24,7 @@ from mdp.overhang import Mask
 from mdp.sweep.rays import blocked_shares, triangle_tree
 from profiles.process import Process
 from slicer.geometry.polygons import contours
-from slicer.geometry.segments import near_height, squared_distance_in_space
+from slicer.geometry.polyline import near_height, squared_distance_in_space
 from slicer.sectioning import Sections
 
 SPACING_MM = 1.0  # of the places of an outline

@@ -19,8 +19,7 @@ from slicer.bead import EVEN_MM, NOISE_MM, Bead, hanging_area
 from slicer.geometry.clip import cut_into
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.polyline import lengths_mm
-from slicer.geometry.segments import Segment, nearest_share
+from slicer.geometry.polyline import Segment, lengths_mm, nearest_share
 from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
@@ -39,9 +38,9 @@ class Strokes:
 
     points: (n, 3) mm, x, y and the width of the bead there; starts: (k + 1,) where the points of each stroke begin.
     approach: (m, 2) points that the travels to strokes pass; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS;
-    width_mm: mean; flow, over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or nothing
-    of it lies on plastic; small: a closed wall no longer than process.small_wall_mm, also the
-    pieces of one whose width varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back.
+    width_mm: mean; flow, over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or
+    nothing of it lies on plastic; small: a closed wall no longer than process.small_wall_mm, also the pieces of one whose width
+    varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back.
     """
 
     points: Floats

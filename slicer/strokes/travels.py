@@ -22,8 +22,7 @@ from profiles.process import Process
 from slicer.bead import outer_wall_width_mm
 from slicer.geometry.edge_index import EdgeIndex, crosses, crossings, free, index_edges, lie_within, nearest, within
 from slicer.geometry.polygons import Polygons, offset
-from slicer.geometry.polyline import length_between
-from slicer.geometry.segments import Segment
+from slicer.geometry.polyline import Segment, length_between
 from slicer.strokes.strokes import Strokes
 
 SAFE = 0.4  # line widths inside the area within which travels ooze unseen; centrelines of outer walls lie at 0.5

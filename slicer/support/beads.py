@@ -31,7 +31,7 @@ from slicer.geometry.polygons import (
     opening,
     union,
 )
-from slicer.geometry.segments import Segment
+from slicer.geometry.polyline import Segment
 from slicer.paths import Kind
 from slicer.support.support import Supports
 

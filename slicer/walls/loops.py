@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
-from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_between
-from slicer.geometry.segments import Segment, nearest_share
+from slicer.geometry.polyline import PATH_RESOLUTION_MM, Segment, length_between, nearest_share
 from slicer.geometry.triangulation import Triangulation
 from slicer.walls.skeleton import Counts, Rule, Skeleton, after, before, depth_of, loops_of, spacing_of
 

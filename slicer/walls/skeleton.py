@@ -18,7 +18,7 @@ from mdp.kernels.arrays import flags, floats, ints, longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Indices, Ints
-from slicer.geometry.segments import Segment, nearest_share, orientation
+from slicer.geometry.polyline import Segment, nearest_share, orientation
 from slicer.geometry.triangulation import Triangulation
 
 SLOPE = 0.2164  # sine of 12.5 deg: sides that meet at less than 25 deg enclose a place that narrows, others a corner

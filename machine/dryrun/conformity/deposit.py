@@ -10,7 +10,7 @@ from machine.dryrun.dryrun import DryRun
 from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Mesh
-from slicer.geometry.segments import squared_distance_in_space
+from slicer.geometry.polyline import squared_distance_in_space
 from slicer.paths import Kind
 
 AROUND = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value)

@@ -11,7 +11,7 @@ from mdp.mesh import Floats
 from slicer.geometry import edge_index
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.segments import Segment
+from slicer.geometry.polyline import Segment
 from tests.slicer.hand import as_shapely, ragged
 
 ROOM = 200

@@ -10,8 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numba import njit
 
-from slicer.geometry import segments
-from slicer.geometry.segments import Segment
+from slicer.geometry import polyline
+from slicer.geometry.polyline import Segment
 
 whole = st.integers(-6, 6).map(float)
 places = st.tuples(whole, whole)
@@ -21,22 +21,22 @@ spots = st.tuples(tenths, tenths)
 
 @njit
 def orientation(line: Segment, x: float, y: float) -> float:
-    return segments.orientation(line, x, y)
+    return polyline.orientation(line, x, y)
 
 
 @njit
 def crossing(segment: Segment, crossed: Segment) -> float:
-    return segments.crossing(segment, crossed)
+    return polyline.crossing(segment, crossed)
 
 
 @njit
 def squared_distance(segment: Segment, x: float, y: float) -> float:
-    return segments.squared_distance(segment, x, y)
+    return polyline.squared_distance(segment, x, y)
 
 
 @njit
 def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
-    return segments.squared_distance_in_space(p, a, b)
+    return polyline.squared_distance_in_space(p, a, b)
 
 
 def sides_of(a: tuple[float, float], b: tuple[float, float], p: tuple[float, float]) -> Fraction:
