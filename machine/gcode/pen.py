@@ -142,7 +142,7 @@ def _stepped(to: Pose, tilt_deg: float, turn_deg: float, speed_deg_s: float, pen
 def _followed(to: Pose, seconds: float, pen: Pen) -> Iterator[str]:
     """A turn under a firmware that keeps the tip on the table: small steps whose places keep the head where it is."""
     machine, begin = pen.machine, pen.pose
-    head = _head_mm(pen)
+    head = axis_positions(machine, np.array([[*pen.place_mm, begin.tilt_deg, begin.turn_deg]]))  # the file's places are rounded
     far = max(abs(to.tilt_deg - begin.tilt_deg), abs(to.turn_deg - begin.turn_deg))
     count = max(1, ceil(far / STEP_DEG))
     if pen.dialect.inverse_time:
@@ -162,9 +162,3 @@ def _followed(to: Pose, seconds: float, pen: Pen) -> Iterator[str]:
         yield f"G1{words}{_words(pose, pen)}{feed}"
     if pen.dialect.inverse_time:
         yield "G94"
-
-
-def _head_mm(pen: Pen) -> Floats:
-    """(1, 3) axis positions at which the head stands; the file's places are rounded, the head's own are not needed finer."""
-    row = np.array([[*pen.place_mm, pen.pose.tilt_deg, pen.pose.turn_deg]])
-    return axis_positions(pen.machine, row)

@@ -78,7 +78,8 @@ def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_m
         yield from _moves(program, done, row, last_strokes, profile, pen)
         done = row + 1
         if isinstance(mark, Reorient):
-            ahead = list(_heat_ahead(program.marks[k:], profile, pen))
+            # the heat of the layer after the turn where that is to be hotter: some of it comes in the meantime
+            ahead = list(_set_nozzle(max(_coming_c(program.marks[k:], profile), pen.nozzle_c), pen))
             yield from _ended((*ahead, *_reorient(mark, next_part, pen)))
             if ahead:
                 yield f"{pen.dialect.nozzle_wait.format(number(pen.nozzle_c))}\n"
@@ -109,14 +110,9 @@ def _part_rows(program: MachineProgram) -> list[int]:
     return [*(row for row, mark in marks if isinstance(mark, BeginPart)), len(program)]
 
 
-def _part_strokes(program: MachineProgram) -> Indices:
-    """Rows of the strokes that belong to parts: all but the purge line."""
-    return np.flatnonzero(program.is_stroke & (program.what != NUMBER[Kind.PURGE]))
-
-
 def _last_strokes(program: MachineProgram) -> set[int]:
-    """Rows of the last stroke of each part."""
-    strokes = _part_strokes(program)
+    """Rows of the last stroke of each part; the purge line belongs to none."""
+    strokes = np.flatnonzero(program.is_stroke & (program.what != NUMBER[Kind.PURGE]))
     before = np.searchsorted(strokes, _part_rows(program))
     return set(strokes[before[before > 0] - 1].tolist())
 
@@ -203,14 +199,6 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     yield from _set_nozzle(_nozzle_c(move, profile), pen)
     pen.layer_fan = move.fan
     yield from _set_fan(move.fan, pen)
-
-
-def _heat_ahead(marks: Sequence[Mark], profile: Profile, pen: Pen) -> Iterator[str]:
-    """Before the turn that is the first of the marks, the heat of the layer after it where that is to be hotter: some of it comes
-    in the meantime."""
-    wanted = _coming_c(marks, profile)
-    if wanted > pen.nozzle_c:
-        yield from _set_nozzle(wanted, pen)
 
 
 def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:

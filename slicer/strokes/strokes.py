@@ -23,6 +23,7 @@ from slicer.geometry.polyline import Segment, lengths_mm, nearest_share
 from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
+COLUMNS = ("kind", "width_mm", "flow", "overhang", "over_infill", "small", "varies", "retract")
 Buffers = tuple[Floats, Indices, Indices, Mask]
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
@@ -84,20 +85,10 @@ class Strokes:
         The pieces of a stroke follow each other without a travel: only the first one keeps retraction and approach.
         """
         first = np.diff(source, prepend=-1) > 0
-        return Strokes(
-            points=points,
-            starts=starts,
-            kind=self.kind[source],
-            width_mm=self.width_mm[source],
-            flow=self.flow[source],
-            overhang=self.overhang[source],
-            over_infill=self.over_infill[source],
-            small=self.small[source],
-            varies=self.varies[source],
-            retract=self.retract[source] & first,
-            approach=self.approach,
-            approach_starts=np.append(self.approach_starts[source + ~first], len(self.approach)),
-        )
+        columns = {name: getattr(self, name)[source] for name in COLUMNS}
+        approach_starts = np.append(self.approach_starts[source + ~first], len(self.approach))
+        refined = replace(self, points=points, starts=starts, approach_starts=approach_starts, **columns)
+        return replace(refined, retract=refined.retract & first)
 
 
 def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Floats], small_wall_mm: float) -> Strokes:

@@ -10,7 +10,6 @@ way round, and is then pulled taut. Every segment of it is tested against the bo
 """
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -137,15 +136,6 @@ def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, 
     return n if total <= longest else 0
 
 
-class _Stretch(NamedTuple):
-    """A stretch of a loop's border: from its edge `leaving` to the point x, y of its edge `coming`."""
-
-    leaving: int
-    coming: int
-    x: float
-    y: float
-
-
 @helper
 def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, float, bool]:
     """Where a detour from a point begins: there, or where it reaches the track's inside; and whether it does."""
@@ -180,7 +170,7 @@ def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -
             return 0
         path[n, 0], path[n, 1] = x0 + shares[k] * (x1 - x0), y0 + shares[k] * (y1 - y0)
         back_x, back_y = x0 + shares[last] * (x1 - x0), y0 + shares[last] * (y1 - y0)
-        n, length = _go_round(track, _Stretch(crossed[k], crossed[last], back_x, back_y), left, path, n)
+        n, length = _go_round(track, (crossed[k], crossed[last]), (back_x, back_y), left, path, n)
         if n == 0:
             return 0
         left -= length
@@ -190,34 +180,37 @@ def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -
 
 
 @helper
-def _go_round(track: EdgeIndex, stretch: _Stretch, longest: float, path: Floats, n: int) -> tuple[int, float]:
-    """Appends the shorter of the two stretches of a loop from row n on.
+def _go_round(
+    track: EdgeIndex, sides: tuple[int, int], end: tuple[float, float], longest: float, path: Floats, n: int
+) -> tuple[int, float]:
+    """Appends the shorter of the two stretches of a loop from row n on, from one of its sides to a point on the other.
 
     Returns the new number of rows, 0 when the stretch is too long, and its length.
     """
     least, shorter = np.inf, 1
     for sense in range(1, -2, -2):
-        _, length = _walk(track, stretch, longest, sense, path, n)
+        _, length = _walk(track, sides, end, longest, sense, path, n)
         if length < least:
             least, shorter = length, sense
     if least > longest:
         return 0, least
-    end, least = _walk(track, stretch, longest, shorter, path, n)
-    return end, least
+    return _walk(track, sides, end, longest, shorter, path, n)
 
 
 @helper
-def _walk(track: EdgeIndex, stretch: _Stretch, longest: float, sense: int, path: Floats, n: int) -> tuple[int, float]:
+def _walk(
+    track: EdgeIndex, sides: tuple[int, int], end: tuple[float, float], longest: float, sense: int, path: Floats, n: int
+) -> tuple[int, float]:
     """Appends a stretch forward (1) or backward (-1) until it is too long; the new number of rows and the length."""
-    begin, end = track.begins[track.loop[stretch.leaving]], track.begins[track.loop[stretch.leaving] + 1]
-    side, length, corner = stretch.leaving, 0.0, 1 + sense
-    while side != stretch.coming and length <= longest:
+    first, after = track.begins[track.loop[sides[0]]], track.begins[track.loop[sides[0]] + 1]
+    side, length, corner = sides[0], 0.0, 1 + sense
+    while side != sides[1] and length <= longest:
         path[n + 1, 0], path[n + 1, 1] = track.edges[side, corner], track.edges[side, corner + 1]
         length += np.hypot(path[n + 1, 0] - path[n, 0], path[n + 1, 1] - path[n, 1])
-        side = begin + (side - begin + sense) % (end - begin)
+        side = first + (side - first + sense) % (after - first)
         n += 1
-    path[n + 1, 0], path[n + 1, 1] = stretch.x, stretch.y
-    return n + 2, length + np.hypot(stretch.x - path[n, 0], stretch.y - path[n, 1])
+    path[n + 1, 0], path[n + 1, 1] = end
+    return n + 2, length + np.hypot(end[0] - path[n, 0], end[1] - path[n, 1])
 
 
 @helper

@@ -1,6 +1,4 @@
-"""Walls: closed beads along the outline, what is too narrow for them, and where they begin.
+"""Walls: closed beads along the outline, as wide as the place, and what fills the places that other beads leave.
 
-Public: `layer_walls.layer_walls` makes a layer's walls of its section, `walls.wall_beads` beads of them, `gap.gaps` fills what
-other beads leave; `seam_plan.plan_seams` finds where seams are hidden, `seam.place_seams` begins walls there;
-`overhang.split_overhangs`, `brim.brim`.
+Public: `walls.layer_walls` makes a layer's walls of its section, `walls.gaps` fills places between beads.
 """
