@@ -46,11 +46,12 @@ from slicer.heights import Heights, part_heights, pedestal_layers, shell_layers
 from slicer.interface.interface import (
     Pins,
     cut_grooves,
-    cut_pins,
+    cut_out,
     grooves,
     joints,
     limb_planes,
     near_parts,
+    pin_holes,
     plan_pins,
     plane_in_frame_of,
     plastic_below,
@@ -158,7 +159,7 @@ def section_part(
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
     pins = plan_pins((*earlier, part, *later), of_print) if pins is None else pins
-    ungrooved = cut_pins(outlines, part, later, pins, cuts_mm, of_print)
+    ungrooved = cut_out(outlines, pin_holes(part, later, pins, of_print), cuts_mm)
     outlines = own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
     if pedestal:
         ungrooved = _without_pedestal(ungrooved, mesh, cuts_mm, pedestal_mm, pedestal)
@@ -201,15 +202,13 @@ def vase_profile(profile: Profile) -> Profile:
 
 def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_mm: float) -> Polygons:
     """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
-    least_mm = FEATURE * least_width_mm(nozzle_mm, height_mm)
-    pieces = [] if section.is_empty() else islands(section)
-    solid = [piece for piece in pieces if not _is_hair(piece, least_mm + HAIR_MM)]
+    least_mm = FEATURE * least_width_mm(nozzle_mm, height_mm) + HAIR_MM
+    pieces, solid = [] if section.is_empty() else islands(section), list[Polygons]()
+    for piece in pieces:
+        around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
+        if 2.0 * piece.area() >= least_mm * around_mm or not offset(piece, -0.5 * least_mm).is_empty():
+            solid.append(piece)
     return section if len(solid) == len(pieces) else Polygons.compose(solid) if solid else Polygons()
-
-
-def _is_hair(piece: Polygons, least_mm: float) -> bool:
-    around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
-    return bool(2.0 * piece.area() < least_mm * around_mm and offset(piece, -0.5 * least_mm).is_empty())
 
 
 def lay_on_plate(outlines: Sequence[Polygons], lowest: int, base: Polygons, width_mm: float) -> list[Polygons]:

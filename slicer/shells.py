@@ -103,11 +103,6 @@ class Shells:
         """The layers as outlines."""
         return self.supports.sections
 
-    @property
-    def regions(self) -> list[Region]:
-        """What is skin and what is sparse of each layer."""
-        return [shell.region for shell in self.layers]
-
 
 def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     """The shells of a part with the support that was planned for it."""
@@ -275,8 +270,9 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     lines = SolidLines(angle_deg, width, height_mm, overlap)
     beads = wall_beads(shell.walls, process, height_mm)
     for bridge in shell.bridges:
-        area = bridge_area(bridge, shell.walls.inside, width)
-        if not area.is_empty():
+        wide = opening(bridge.hanging ^ shell.walls.inside, 0.5 * width)
+        if not wide.is_empty():
+            area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
             beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
             region = _without(region, area, width)
     if layer and process.infill_density < DENSE:
@@ -313,12 +309,6 @@ def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
         rank, course = wall_rank(wall.level, process), varying(wall.course)
         beads.append(Bead(kind, wall.points, width, rank, flow, line=not wall.closed, course=course))
     return beads
-
-
-def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
-    """Where the lines of a bridge run: over what hangs of a layer's inside, and onto the anchors as far as the inside reaches."""
-    wide = opening(span.hanging ^ inside, 0.5 * width_mm)
-    return wide if wide.is_empty() else offset(wide, ANCHORED * width_mm) ^ inside
 
 
 def _without(region: Region, area: Polygons, width_mm: float) -> Region:
@@ -362,12 +352,13 @@ def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Be
     return [replace(bead, width_mm=width, flow=flow, rank=IRONED) for bead in beads]
 
 
-def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, float]:
+def interface_mm3(shells: Shells) -> dict[int, float]:
     """Plastic, mm3, that a part has more of than the uncut model in its place, by the part whose base plane is nearest.
 
     Walls and skins on the faces of cuts where there would be sparse infill, and what the flow of its first layer on
     plastic adds to the room that it has.
     """
+    sections, regions = shells.sections, [shell.region for shell in shells.layers]
     part, process, heights = sections.part, sections.process, sections.heights
     planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
     planes |= {upper.index: plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in sections.later}

@@ -36,7 +36,7 @@ from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, la
 from slicer.strokes.order import order_beads
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import plan_seams, rear_of, seam_limits
-from slicer.strokes.speed import fan_share, first_layer_speeds, layer_time_s, own_fans, rising_fan, speeds_mm_s
+from slicer.strokes.speed import fan_share, first_layer_speeds, own_fans, rising_fan, speeds_mm_s, travel_time_s
 from slicer.strokes.strokes import Strokes, in_pieces, split, split_overhangs
 from slicer.strokes.travels import may_wipe_over
 from slicer.strokes.vase import vase_layers
@@ -195,7 +195,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         sections.part.index,
         tuple(layers),
         explain(supports, np.array([layer.z_mm for layer in layers])),
-        interface_mm3(sections, shells.regions),
+        interface_mm3(shells),
         len(too_thin),
         float(sections.heights.tip_mm[too_thin[0]]) if too_thin else 0.0,
         len(sections.pins),
@@ -213,7 +213,8 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     elif index < process.interface_layers:
         fan = process.interface_fan if index else process.interface_first_layer_fan
         add_c = process.interface_temperature_add_c
-    layer_fan = fan * fan_share(material, process, layer_time_s(strokes, speeds, profile))
+    time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)  # at least: accelerations are left out
+    layer_fan = fan * fan_share(material, process, time_s)
     own_fan = own_fans(strokes, material, fan, layer_fan)
     corners = mark_corners(strokes.points, strokes.starts, PATH_RESOLUTION_MM)
     strokes = replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts])

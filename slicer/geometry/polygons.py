@@ -57,7 +57,8 @@ def _moved(polygons: Polygons, distance_mm: float, corners: JoinType, mitre: flo
     beyond it settles the question.
     """
     area_mm2, (x0, y0, x1, y1) = polygons.area(), polygons.bounds()
-    if polygons.is_empty() or (distance_mm < 0.0 and not _has_room(area_mm2, min(x1 - x0, y1 - y0), -distance_mm)):
+    has_room = area_mm2 >= pi * distance_mm**2 and min(x1 - x0, y1 - y0) >= -2.0 * distance_mm  # for a disc, on the way inward
+    if polygons.is_empty() or (distance_mm < 0.0 and not has_room):
         return Polygons()
     moved = polygons.offset(distance_mm, corners, mitre, segments)
     if moved.area() >= (area_mm2 if distance_mm > 0.0 else ROUNDING_MM2) or _is_outer_highest(polygons):
@@ -66,11 +67,6 @@ def _moved(polygons: Polygons, distance_mm: float, corners: JoinType, mitre: flo
     square = Polygons.square((reach, reach)).translate((x0, y1 + 2.0 * reach))
     beyond = Polygons.square((3.0 * reach, 3.0 * reach)).translate((x0 - reach, y1 + reach))
     return (polygons + square).offset(distance_mm, corners, mitre, segments) - beyond
-
-
-def _has_room(area_mm2: float, narrow_mm: float, radius_mm: float) -> bool:
-    """Whether a disc may lie in polygons of that area whose upright rectangle is so narrow."""
-    return bool(area_mm2 >= pi * radius_mm**2 and narrow_mm >= 2.0 * radius_mm)
 
 
 def _is_outer_highest(polygons: Polygons) -> bool:

@@ -277,7 +277,7 @@ def _pins_of(part: Part, parts: Sequence[Part], planned: Pins, profile: Profile)
         keep_mm, change = room_around_mm(below.process), frame_change(part, lower)
         looks = ceil((process.pin_depth_mm + keep_mm) / process.layer_height_mm) + 1  # about as many as there are layers
         depths_mm = -np.linspace(process.pin_depth_mm + keep_mm, BELOW_MM, looks)
-        meshes = [in_frame_of(part, lower), *_holes(part, parts, planned, profile)]
+        meshes = [in_frame_of(part, lower), *pin_holes(part, parts, planned, profile)]
         room = offset_round(base_section(part), -keep_mm - 0.5 * wide_mm)
         for solid, *holes in zip(*(cross_sections(mesh, depths_mm) for mesh in meshes), strict=True):
             if room.is_empty():
@@ -304,7 +304,7 @@ def room_around_mm(process: Process) -> float:
     return (process.walls + 1) * process.line_width_mm
 
 
-def _holes(part: Part, uppers: Sequence[Part], pins: Pins, profile: Profile) -> list[Mesh]:
+def pin_holes(part: Part, uppers: Sequence[Part], pins: Pins, profile: Profile) -> list[Mesh]:
     """The holes of other parts, by their own profiles, as they are cut out of those below, in the frame of a part."""
     holes = []
     for upper in uppers:
@@ -370,14 +370,7 @@ def _taken_mm3(hole: Mesh, heights: Heights) -> float:
     return float(np.dot(areas, heights.height_mm[first:last]))
 
 
-def cut_pins(
-    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], pins: Pins, cuts_mm: Floats, profile: Profile
-) -> list[Polygons]:
-    """The part's outlines without the holes of the parts that will stand on it; profile: of the whole print."""
-    return _cut_out(outlines, _holes(part, later, pins, profile), cuts_mm)
-
-
-def _cut_out(outlines: Sequence[Polygons], cutters: Sequence[Mesh], cuts_mm: Floats) -> list[Polygons]:
+def cut_out(outlines: Sequence[Polygons], cutters: Sequence[Mesh], cuts_mm: Floats) -> list[Polygons]:
     """Outlines at heights without what some solids take of them."""
     left = list(outlines)
     for cutter in cutters:
@@ -396,7 +389,7 @@ def cut_grooves(
         if not area.is_empty():
             solid = m3.Manifold.extrude(area, 2.0 * process.interlock_mm).translate((0.0, 0.0, -process.interlock_mm))
             cutters.append(mesh_of(solid).transform(*frame_change(upper, part)))
-    return _cut_out(outlines, cutters, cuts_mm)
+    return cut_out(outlines, cutters, cuts_mm)
 
 
 def grooves(part: Part, process: Process) -> Polygons:

@@ -65,11 +65,6 @@ def travel_time_s(strokes: Strokes, profile: Profile) -> float:
     return float(lengths.sum()) / profile.process.travel_speed_mm_s + pulls
 
 
-def layer_time_s(strokes: Strokes, speeds: Floats, profile: Profile) -> float:
-    """What a layer takes at least, accelerations left out."""
-    return float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)
-
-
 def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:
     """Speeds by one factor slower so that the lengths take the time, none pushed below the least speed."""
     floor = np.minimum(speeds, least_mm_s)

@@ -68,9 +68,9 @@ CASES = [(shape, normal) for shape in ("cube", "cylinder") for normal in (STRAIG
 def test_no_infill_is_sparse_within_the_shell_s_thickness_of_the_surface(shape: str, normal: tuple[float, ...]) -> None:
     seen = 0.0
     for part, layers in zip(parts(shape, normal), shells(shape, normal), strict=True):
-        for region, z_mm in zip(layers.regions, layers.sections.heights.cut_mm, strict=True):
-            seen += region.sparse.area()
-            for loop in contours(region.sparse):  # in a convex model the least depth of a polygon is a corner's
+        for shell, z_mm in zip(layers.layers, layers.sections.heights.cut_mm, strict=True):
+            seen += shell.region.sparse.area()
+            for loop in contours(shell.region.sparse):  # in a convex model the least depth of a polygon is a corner's
                 assert depth_mm(shape, in_model(part, loop, z_mm)).min() > SHELL_MM
     assert seen > 10000
 
@@ -129,7 +129,7 @@ def test_with_as_many_walls_on_a_cut_as_outside_all_run_round() -> None:
 
 def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
     """A floor of two layers where the walls leave room, and on it a solid layer of 0.1 mm with a tenth more than its room."""
-    under, over = (interface_mm3(both.sections, both.regions) for both in shells("cube", STRAIGHT))
+    under, over = (interface_mm3(both) for both in shells("cube", STRAIGHT))
     inside = (SIDE - 2 * 1.243) ** 2
     floor = 0.8 * 0.4 * inside
     within_wide_walls = (SIDE - 2 * 1.746) ** 2
@@ -138,10 +138,10 @@ def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
 
 
 def test_the_plastic_between_two_cuts_belongs_to_the_nearer_one() -> None:
-    alone = [interface_mm3(both.sections, both.regions)[2] for both in shells("cube", STRAIGHT)]
+    alone = [interface_mm3(both)[2] for both in shells("cube", STRAIGHT)]
     low, middle, high = cut(from_manifold(model("cube")), (STRAIGHT, 24.0), (STRAIGHT, 11.9))
     between = shells_of(section_part(middle, profile(*PLAIN), [low], [high]))
-    assert interface_mm3(between.sections, between.regions) == {
+    assert interface_mm3(between) == {
         2: pytest.approx(alone[1], rel=0.01),
         3: pytest.approx(alone[0], rel=0.01),
     }
@@ -150,4 +150,4 @@ def test_the_plastic_between_two_cuts_belongs_to_the_nearer_one() -> None:
 def test_a_model_in_one_part_has_no_interface() -> None:
     (lower, _) = parts("cube", STRAIGHT)
     alone = shells_of(section_part(lower, profile(*PLAIN)))
-    assert interface_mm3(alone.sections, alone.regions) == {}
+    assert interface_mm3(alone) == {}
