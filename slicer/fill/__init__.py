@@ -1,1 +1,1 @@
-"""Fill: which places are skin and which sparse, and the beads of skins, sparse infill and bridges."""
+"""Fill: which places are skin and which sparse, and the beads of skins and sparse infill."""

@@ -1,1 +1,1 @@
-"""Plane geometry: cross sections of meshes, polygons, lines clipped to them, cells, distances, triangulations."""
+"""Plane geometry: polygons, polylines and segments, lines clipped to polygons, edges near a place, triangulations."""
