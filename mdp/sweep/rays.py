@@ -126,6 +126,15 @@ def first_hit(tree: TriangleTree, origin: Floats, ray: Floats, reach: float, own
     return hit
 
 
+@kernel
+def faces_met(tree: TriangleTree, places: Floats, rays: Floats, reach: float) -> Ints:
+    """(n,) the first face that each place's ray, a unit vector, meets within reach; -1: none."""
+    out = ints(len(places), -1)
+    for k in range(len(out)):
+        out[k] = first_hit(tree, places[k], rays[k], reach, -1, ANY_FACE)
+    return out
+
+
 def blocked_shares(
     tree: TriangleTree, places: Floats, frames: Floats, rays: Floats, reach_mm: float, in_turn: bool = False
 ) -> Floats:

@@ -6,8 +6,9 @@ costs by the millimetre, up to a jump. The outlines are a forest, each on the ne
 choice of all is found exactly: from the top down every place sums up the best that can stand on it, from the bottom up each
 outline takes its best one.
 
-What is seen of a place is the share of the light over the surface there that nothing of the whole model keeps from it. It is
-worked out by rays for samples that lie farther apart than seams may, and looked up among those that face the same way.
+What is seen of a place is the share of the light over the surface there that nothing of its body keeps from it; other bodies on
+the plate do not count, for they are taken apart when they are printed. It is worked out by rays for samples that lie farther
+apart than seams may, and looked up among those that face the same way.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,8 @@ from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices, Mesh
 from mdp.overhang import Mask
-from mdp.sweep.rays import blocked_shares, triangle_tree
+from mdp.sweep.rays import blocked_shares, faces_met, triangle_tree
+from mdp.topology.components import vertex_components
 from profiles.process import Process
 from slicer.geometry.polygons import contours
 from slicer.geometry.polyline import near_height, squared_distance_in_space
@@ -29,7 +31,7 @@ from slicer.sectioning import Sections
 
 SPACING_MM = 1.0  # of the places of an outline
 FEWEST = 8  # places of an outline
-INNER, OUTER = 0.7, 0.1  # what sharp inner and outer corners are worth; a place in full sight costs 1
+INNER, OUTER = 0.7, 0.4  # what sharp inner and outer corners are worth; a place in full sight costs 1
 TO_REAR = 5e-4  # what a mm to the rear costs: among places that are seen alike, people look at the front
 SHIFT, JUMP = 0.14, 2.4  # what a mm of way between two layers costs, and a jump at most
 FORBIDDEN = 1e3  # more than all that a part's seams can cost otherwise
@@ -39,6 +41,8 @@ FEWEST_SAMPLES = 6  # samples of an outline
 RAYS = 24
 LIFT_MM = 0.1  # of a ray's beginning beside the outline
 FAR_MM = 1e5
+INWARD_MM = 1.0  # within which a place meets the face that it lies on
+ROUNDED = 4  # decimals, in mm, of a vertex that two parts have in common
 BLUR_MM = 1.0  # samples so near count alike
 ASIDE = 1e-3  # what a sample that faces another way counts
 ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise is none
@@ -108,8 +112,15 @@ def light_samples(sections: Sections, outlines: Sequence[Sequence[Floats]]) -> t
     lifted = np.hstack([places + LIFT_MM * outward, heights_mm]) @ of.rotation
     along = np.hstack([-outward[:, 1:], outward[:, :1], level])
     frames = np.stack([along, np.hstack([level, level, up]), np.hstack([outward, level])], axis=1) @ of.rotation
-    tree = triangle_tree(_together([*sections.earlier, of, *sections.later]))
-    blocked = blocked_shares(tree, lifted, frames, spread_like_light(RAYS), FAR_MM, in_turn=True)
+    mesh = _together([*sections.earlier, of, *sections.later])
+    bodies = _bodies(mesh)
+    own, blocked = np.full(len(lifted), bodies[0]), np.zeros(len(lifted))
+    if (bodies != bodies[0]).any():
+        met = faces_met(triangle_tree(mesh), lifted, np.ascontiguousarray(-frames[:, 2]), INWARD_MM)
+        own = np.where(met >= 0, bodies[met], own)
+    for body in np.unique(own):
+        tree, rows = triangle_tree(Mesh(mesh.vertices, mesh.faces[bodies == body])), np.flatnonzero(own == body)
+        blocked[rows] = blocked_shares(tree, lifted[rows], frames[rows], spread_like_light(RAYS), FAR_MM, in_turn=True)
     seen = np.column_stack([places, outward, 1.0 - blocked])
     return levels, np.split(seen, np.cumsum(counts)[:-1])
 
@@ -135,6 +146,15 @@ def _together(parts: Sequence[Part]) -> Mesh:
     first = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
     faces = [part.mesh.faces + begin for part, begin in zip(parts, first, strict=False)]
     return Mesh(np.concatenate([part.mesh.vertices for part in parts]), np.concatenate(faces).astype(parts[0].mesh.faces.dtype))
+
+
+def _bodies(mesh: Mesh) -> Indices:
+    """(m,) the body that each face belongs to, a number. Parts that a cut has made have the vertices of its rim in common."""
+    label = vertex_components(len(mesh.vertices), mesh.faces)
+    if (label != label[0]).any():
+        _, same = np.unique(np.round(mesh.vertices, ROUNDED), axis=0, return_inverse=True)
+        label = vertex_components(len(mesh.vertices), same[mesh.faces])[same]
+    return label[mesh.faces[:, 0]]
 
 
 @kernel

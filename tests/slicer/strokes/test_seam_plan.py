@@ -52,12 +52,30 @@ def test_the_seam_of_a_disc_lies_below_the_groove_at_the_front_of_what_stands_on
     assert (places[:, 1] < -4.0).all()
 
 
-def test_the_seam_of_a_cylinder_lies_where_it_faces_a_wall() -> None:
+def beside_a_wall(*more: m3.Manifold) -> Part:
+    """A cylinder whose middle is at x = -2, a wall at x = 9, and what joins them."""
     wall = m3.Manifold.cube((2, 60, 20), True).translate((11, 0, 0))
-    mesh = standing(m3.Manifold.cylinder(20, 8, 8, 90, True) + wall)  # the middle of the cylinder is moved to x = -2
-    for of_layer in planned(whole(mesh)):
+    return whole(standing(m3.Manifold.batch_boolean([m3.Manifold.cylinder(20, 8, 8, 90, True), wall, *more], m3.OpType.Add)))
+
+
+def test_the_seam_of_a_cylinder_lies_where_it_faces_a_wall_of_its_own_body() -> None:
+    plate = m3.Manifold.cube((20, 60, 2), True).translate((2, 0, -9))
+    for of_layer in planned(beside_a_wall(plate))[15:]:
         (of_cylinder,) = of_layer[of_layer[:, 0] < 7.0]
         assert of_cylinder[0] > 5.0
+
+
+def test_another_body_on_the_plate_hides_no_seam() -> None:
+    for of_layer in planned(beside_a_wall()):
+        (of_cylinder,) = of_layer[of_layer[:, 0] < 7.0]
+        assert of_cylinder[1] > 7.5  # at the rear
+
+
+def test_cubes_in_a_row_have_their_seams_in_their_corners() -> None:
+    row = m3.Manifold.batch_boolean([m3.Manifold.cube((10, 10, 4)).translate((13 * k, 0, 0)) for k in range(3)], m3.OpType.Add)
+    for of_layer in planned(whole(standing(row))):
+        assert np.abs(of_layer[:, 1]) == pytest.approx([5.0] * 3, abs=0.05)
+        assert np.abs((of_layer[:, 0] + 18.0) % 13.0 - 5.0) == pytest.approx([5.0] * 3, abs=0.05)
 
 
 def test_seams_beside_a_joint_keep_clear_of_its_edge_and_lie_in_the_groove_that_both_parts_have() -> None:
