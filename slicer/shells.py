@@ -28,9 +28,10 @@ from slicer.bead import (
     wall_rank,
     with_line_width,
 )
-from slicer.fill.infill import infill_beads, pattern_density
+from slicer.fill.infill import infill_beads, infill_cell_mm, pattern_density
+from slicer.fill.over_infill import ANCHORED, anchored, infill_bridges
 from slicer.fill.region import Cover, Region, ironed_areas, regions
-from slicer.fill.skin import SolidLines, skin_beads, skin_lines
+from slicer.fill.skin import SolidLines, skin_lines
 from slicer.geometry.clip import cut_line
 from slicer.geometry.polygons import (
     CLOSING_MM,
@@ -65,12 +66,6 @@ REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cu
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
-
-
-NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges
-ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
-
-
 IRONED = 100  # after all else of an island
 
 
@@ -127,14 +122,37 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
     ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process)
     bridges = bridges_of_layers(sections, overhangs, supports.areas)
     infill = with_line_width(process, process.infill_line_width_mm)
+    density = pattern_density([region.sparse for region in filled], infill, process.layer_height_mm)
+    filled = anchor_skins(filled, processes, density, sections)
     return Shells(
         supports,
         [
             Shell(own, walls, ending, region, spans, smooth)
             for own, (walls, ending, _), region, spans, smooth in zip(processes, walled, filled, bridges, ironed, strict=True)
         ],
-        pattern_density([region.sparse for region in filled], infill, process.layer_height_mm),
+        density,
     )
+
+
+def lines_angle_deg(process: Process, layer: int) -> float:
+    """Direction of the solid lines of a layer: neighbouring layers cross at right angles."""
+    return process.infill_angle_deg + 90.0 * (layer % 2)
+
+
+def anchor_skins(filled: Sequence[Region], processes: Sequence[Process], density: float, sections: Sections) -> list[Region]:
+    """The regions of all layers with skins that end on infill or on what is solid; density: of the infill's pattern."""
+    done, z_mm, heights_mm = list(filled), sections.heights.tip_mm.tolist(), sections.heights.height_mm.tolist()
+    for layer in range(1, len(filled)):
+        region, below, process = filled[layer], done[layer - 1].sparse, processes[layer - 1]
+        if below.is_empty() or process.infill_density >= DENSE or ((region.solid + region.top) ^ below).is_empty():
+            continue
+        infill = with_line_width(process, process.infill_line_width_mm)
+        beads = infill_beads(
+            below, infill, density=density, layer=layer - 1, z_mm=z_mm[layer - 1], height_mm=heights_mm[layer - 1]
+        )
+        lines, angle_deg = [bead.points for bead in beads], lines_angle_deg(process, layer)
+        done[layer] = anchored(region, below, lines, angle_deg, process.line_width_mm, infill_cell_mm(process))
+    return done
 
 
 def layer_processes(process: Process, on_platform: bool, layers: int) -> list[Process]:
@@ -266,8 +284,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     shell, heights = shells.layers[layer], shells.sections.heights
     process, region, height_mm = shell.process, shell.region, float(heights.height_mm[layer])
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
-    angle_deg = process.infill_angle_deg + 90.0 * (layer % 2)  # neighbouring layers cross at right angles
-    lines = SolidLines(angle_deg, width, height_mm, overlap)
+    lines = SolidLines(lines_angle_deg(process, layer), width, height_mm, overlap)
     beads = wall_beads(shell.walls, process, height_mm)
     for bridge in shell.bridges:
         wide = opening(bridge.hanging ^ shell.walls.inside, 0.5 * width)
@@ -276,7 +293,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
             region = _without(region, area, width)
     if layer and process.infill_density < DENSE:
-        area = infill_bridge_area(region.solid, shells.layers[layer - 1].region.sparse, width)
+        area = infill_bridges(region, shells.layers[layer - 1].region.sparse, width)
         if not area.is_empty():
             beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
             region = _without(region, area, width)
@@ -323,22 +340,10 @@ def _without(region: Region, area: Polygons, width_mm: float) -> Region:
 
 def bridge_beads(area: Polygons, lines: SolidLines, flow: float, over_infill: bool = False) -> list[Bead]:
     """The lines of a bridge with its own flow. over_infill: the first solid ones over sparse infill, across the lines below
-    wherever those have one direction."""
-    return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in skin_beads(area, Kind.BRIDGE, lines)]
-
-
-def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float) -> Polygons:
-    """Where solid lines span the sparse infill of the layer below, and as far beyond as they hold on to what is solid there.
-
-    Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
-    """
-    if solid.is_empty() or sparse_below.is_empty():
-        return Polygons()
-    spanned = solid ^ sparse_below
-    if spanned.area() < (NARROW * width_mm) ** 2:
-        return Polygons()
-    wide = opening(spanned, 0.5 * NARROW * width_mm)
-    return wide if wide.is_empty() else offset(wide, ANCHORED * width_mm) ^ solid
+    wherever those have one direction; places beside them stay empty, what would fill these would lie on nothing."""
+    beads, rests = skin_lines(area, Kind.BRIDGE, lines)
+    beads += [] if over_infill else gaps(rests, lines.width_mm, lines.height_mm)
+    return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in beads]
 
 
 def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:

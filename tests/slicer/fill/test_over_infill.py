@@ -1,0 +1,90 @@
+"""Skins over sparse infill end on infill or on what is solid."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import shapely
+
+from slicer.fill.over_infill import anchored
+from slicer.fill.region import Region
+from slicer.geometry.polygons import Polygons
+from slicer.paths import Kind
+from slicer.paths import Path as Stroke
+from slicer.slice import slice_part
+from tests.shapes import standing
+from tests.slicer.hand import BARE, profile, whole
+
+WIDTH = 0.4
+CELL = 6.0
+INFILL = [np.array([[x, -15.0], [x, 15.0]]) for x in (-12.0, -6.0, 0.0, 6.0, 12.0)]
+INSIDE = Polygons.square((30.0, 30.0), True)
+SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
+
+
+def block(x: float, y: float, side: float) -> Polygons:
+    return Polygons.square((side, side), True).translate((x, y))
+
+
+def region(solid: Polygons) -> Region:
+    empty = Polygons()
+    return Region(empty, empty, solid, INSIDE - solid, INSIDE - solid)
+
+
+def test_a_skin_between_two_lines_of_infill_grows_to_both_and_no_farther() -> None:
+    grown = anchored(region(block(3.0, 0.0, 2.0)), INSIDE, INFILL, 0.0, WIDTH, CELL)
+    left, low, right, high = grown.solid.bounds()
+    assert (left, right) == pytest.approx((0.0, 6.0), abs=0.2)
+    assert (low, high) == pytest.approx((-1.0, 1.0), abs=0.2)
+    assert grown.solid.area() + grown.sparse.area() == pytest.approx(900.0)
+
+
+def test_a_skin_grows_along_its_lines_whichever_way_these_run() -> None:
+    turned = [line @ np.array([[0.0, 1.0], [-1.0, 0.0]]) for line in INFILL]
+    left, low, right, high = anchored(region(block(0.0, 3.0, 2.0)), INSIDE, turned, 90.0, WIDTH, CELL).solid.bounds()
+    assert (left, right) == pytest.approx((-1.0, 1.0), abs=0.2)
+    assert (low, high) == pytest.approx((0.0, 6.0), abs=0.2)
+
+
+def test_a_skin_on_the_skin_of_the_layer_below_does_not_grow() -> None:
+    solid = block(3.0, 0.0, 2.0)
+    assert anchored(region(solid), INSIDE - solid, INFILL, 0.0, WIDTH, CELL).solid.area() == pytest.approx(4.0)
+
+
+def test_without_infill_a_skin_grows_to_the_walls() -> None:
+    left, _, right, _ = anchored(region(block(3.0, 0.0, 2.0)), INSIDE, [], 0.0, WIDTH, 0.0).solid.bounds()
+    assert (left, right) == pytest.approx((-15.0, 15.0), abs=0.01)
+
+
+def test_skins_that_leave_little_infill_between_them_become_one() -> None:
+    pair = block(-3.0, 4.0, 3.0) + block(-3.0, -4.0, 3.0)  # 5 mm between them, less than two cells
+    one = anchored(region(pair + block(-3.0, 0.0, 14.0) - block(-3.0, 0.0, 13.0)), INSIDE, INFILL, 0.0, WIDTH, CELL).solid
+    assert (block(-3.0, 0.0, 12.0) - one).is_empty()
+
+
+@pytest.mark.parametrize("pattern", ["rectilinear", "grid", "gyroid", "cubic"])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_line_of_skin_under_pockets_ends_over_nothing(pattern: str, seed: int) -> None:
+    part = whole(standing(pocketed(np.random.default_rng(seed))))
+    layers = slice_part(part, profile(*BARE, f"process.infill_pattern={pattern}", "process.infill_density=0.15")).layers
+    assert max(farthest_end_mm(below.paths, layer.paths) for below, layer in pairwise(layers)) < 2.0 * WIDTH
+
+
+def pocketed(random: np.random.Generator) -> m3.Manifold:
+    """A plate 4 mm thick with pockets 0.4 to 1.4 mm deep in its top, square and round."""
+    plate = m3.Manifold.cube((24, 24, 4))
+    for x, y, side, deep, round_ in zip(
+        *random.uniform([[4], [4], [1], [0.4], [0]], [[20], [20], [3], [1.4], [1]], (5, 6)), strict=True
+    ):
+        tool = m3.Manifold.cylinder(2, side / 2, side / 2, 32) if round_ > 0.5 else m3.Manifold.cube((side, side, 2))
+        plate -= tool.translate((x, y, 4.0 - deep))
+    return plate
+
+
+def farthest_end_mm(below: Sequence[Stroke], above: Sequence[Stroke]) -> float:
+    """How far the end of a line of skin lies from the plastic of the layer below, at most."""
+    plastic = shapely.union_all([shapely.LineString(path.points[:, :2]).buffer(0.5 * WIDTH) for path in below])
+    ends = [shapely.Point(point) for path in above if path.kind in SKINS for point in path.points[[0, -1], :2]]
+    return max((end.distance(plastic) for end in ends), default=0.0)
