@@ -15,7 +15,7 @@ from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from slicer.fill.region import Region
 from slicer.geometry.clip import rotation_2d
-from slicer.geometry.polygons import Polygons, closing, edges, larger, offset, opening, union
+from slicer.geometry.polygons import Polygons, closing, edges, larger, of_contours, offset, opening
 
 NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
@@ -41,7 +41,7 @@ def anchored(
         return region
     for _ in range(MOST_ROUNDS):
         added = _extension(skin, sparse_below, infill_below, angle_deg, width_mm) ^ sparse
-        if opening(added, RIM * width_mm).is_empty():
+        if added.area() < width_mm**2:
             break
         left = larger(opening(sparse - added, width_mm), KEPT * cell_mm**2)
         skin, sparse = skin + (sparse - left), left
@@ -82,7 +82,7 @@ def _extension(
     reach = RIM * width_mm
     left, right, low, high = pieces[:, 1] - reach, pieces[:, 2] + reach, middle - half, middle + half
     corners = np.stack([left, low, right, low, right, high, left, high], axis=1).reshape(-1, 4, 2) @ turn.T
-    return closing(union([Polygons([corner]) for corner in corners]), ROWS * width_mm)
+    return closing(of_contours(list(corners)), ROWS * width_mm)
 
 
 def _row_crossings(segments: Floats, kind: int, apart_mm: float) -> tuple[Indices, Floats, Indices]:
