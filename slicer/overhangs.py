@@ -33,7 +33,7 @@ LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
 ADRIFT = 10.0  # and one held nowhere like this
 LINE_RIM_MM = 0.02  # neighbouring lines overlap by this so that they unite
-GAIN = 0.01  # a direction is better only by this share, more than where the lines happen to lie; else the place's own sides win
+GAIN = 0.1  # lines must sag less by this share in another direction than along the place's own sides: in corners all are short
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +133,9 @@ def _sort_islands(
 def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
     """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
 
-    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The sum of squared spans is
-    least, a line held at one end counting as 2.63 times its length: where all lines reach over, that is the direction of the
-    shortest spans.
+    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The sum of the fourth
+    powers of the spans is least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach
+    over, that is the direction of the shortest spans.
     """
     if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):
         return None
@@ -166,7 +166,7 @@ def _least_sag(sides: Floats, anchors: EdgeIndex, angles: Floats, width_mm: floa
         for k in range(len(lines)):
             held, span = lines[k, 3], lines[k, 1] - lines[k, 0]
             total, longest, any_held = total + span, max(longest, span), any_held or held > 0.0
-            sagging += (1.0 if held == 2.0 else LOOSE**2 if held == 1.0 else ADRIFT**2) * span * span
+            sagging += (1.0 if held == 2.0 else LOOSE**4 if held == 1.0 else ADRIFT**4) * span**4
             free += span if held < 2.0 else 0.0
         if total - free > most_mm:
             holding, most_mm = angle, total - free

@@ -290,6 +290,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         wide = opening(bridge.hanging ^ shell.walls.inside, 0.5 * width)
         if not wide.is_empty():
             area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
+            area += _moat(area, region.sparse, infill_cell_mm(process))
             beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
             region = _without(region, area, width)
     if layer and process.infill_density < DENSE:
@@ -308,6 +309,12 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     beads += ironing_beads(shell.ironed, lines, process)
     sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
     return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
+
+
+def _moat(bridge: Polygons, sparse: Polygons, cell_mm: float) -> Polygons:
+    """What a bridge leaves of the sparse infill around it that is narrower than a cell: its lines go on to the walls there."""
+    left = sparse - bridge
+    return (left - opening(left, 0.5 * cell_mm)) ^ offset(bridge, cell_mm)
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:

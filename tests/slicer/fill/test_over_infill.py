@@ -72,6 +72,14 @@ def test_no_line_of_skin_under_pockets_ends_over_nothing(pattern: str, seed: int
     assert max(farthest_end_mm(below.paths, layer.paths) for below, layer in pairwise(layers)) < 2.0 * WIDTH
 
 
+def test_the_bridge_over_a_hollow_goes_on_to_the_walls_around_it() -> None:
+    hollow = m3.Manifold.cube((26, 20, 10)) - m3.Manifold.cube((20, 14, 6)).translate((3, 3, 2))
+    ceiling = slice_part(whole(standing(hollow)), profile(*BARE)).layers[40]
+    lines = np.concatenate([path.points for path in ceiling.paths if path.kind == Kind.BRIDGE])
+    assert np.abs(lines[:, 0]).max() > 13.0 - 4.0 * WIDTH  # three walls, and half a line
+    assert np.abs(lines[:, 1]).max() > 10.0 - 4.0 * WIDTH
+
+
 def pocketed(random: np.random.Generator) -> m3.Manifold:
     """A plate 4 mm thick with pockets 0.4 to 1.4 mm deep in its top, square and round."""
     plate = m3.Manifold.cube((24, 24, 4))
