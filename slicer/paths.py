@@ -188,8 +188,9 @@ class SlicedPart:
 
     unsupported: the places of it that no support could be given, reported as findings, the largest first, their layers
     counted from 1. interface_mm3: plastic that there would not be if the model were not cut, by the index of the part whose
-    base lies there. too_thin: how many layers below its last one hold something, but nothing that a line is narrow enough for;
-    too_thin_mm: where the first of them lies above the base plane. pins: how many it fills.
+    base lies there. too_thin: how many layers below its last one hold something, but nothing that a line is narrow enough for,
+    of a vase those above its last one; too_thin_mm: where the first of them lies above the base plane, where a vase ends.
+    pins: how many it fills.
     """
 
     index: int

@@ -186,18 +186,20 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         if on_layer is not None:
             on_layer(i + 1, count)
     if usual < count:
-        layers += vase_layers(sections, supports.areas, usual, tip)
+        turns = vase_layers(sections, supports.areas, usual, tip)
+        layers += turns
+        bare, last = [*range(usual + len(turns), count)], count
     _check_not_empty(sections, layers)
     if sections.on_platform and process.walls:
         _check_on_plate(sections.part, layers, process)
-    too_thin = [i for i in bare if i < last and usual == count]
+    too_thin = [i for i in bare if i < last]
     return SlicedPart(
         sections.part.index,
         tuple(layers),
         explain(supports, np.array([layer.z_mm for layer in layers])),
         interface_mm3(shells),
         len(too_thin),
-        float(sections.heights.tip_mm[too_thin[0]]) if too_thin else 0.0,
+        float((sections.heights.tip_mm if usual == count else sections.heights.bottom_mm)[too_thin[0]]) if too_thin else 0.0,
         len(sections.pins),
     )
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.errors import SliceError
-from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import outer_wall_width_mm
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
@@ -21,12 +20,14 @@ from slicer.paths import Kind, Layer, Path, bead_area_mm2
 from slicer.sectioning import Sections
 from slicer.strokes.speed import fan_share, rising_fan
 
+TIP = 4.0  # half widths of the wall: a cone ends where its turns would be no wider than the wall itself
 PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
 
 
 def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, tip: Floats) -> list[Layer]:
-    """The layers above the bottom; supported: where each layer's support is; first: the lowest; tip: (2,) where the bottom ends.
+    """The layers above the bottom, as far up as the model is wide enough for a wall; supported: where each layer's support is;
+    first: the lowest; tip: (2,) where the bottom ends.
 
     Raises SliceError where the model needs support or one of its layers is not one area without holes.
     """
@@ -37,7 +38,10 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
             f"process.spiral_vase prints no support, and at {heights.tip_mm[hanging]:.2f} mm some is needed: "
             "process.support = none leaves it out"
         )
-    loops = [_loop(outlines[k], float(heights.tip_mm[k]), profile.process) for k in range(first, len(outlines))]
+    half_mm, end = 0.5 * outer_wall_width_mm(profile.process), len(outlines)
+    while end > first and offset(outlines[end - 1], -TIP * half_mm).is_empty():
+        end -= 1
+    loops = [_loop(outlines[k], float(heights.tip_mm[k]), half_mm) for k in range(first, end)]
     layers: list[Layer] = []
     for k, loop in enumerate(loops, start=first):
         turn = _begun_near(loop, tip, joined=k > first)
@@ -48,10 +52,9 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
     return layers
 
 
-def _loop(outline: Polygons, z_mm: float, process: Process) -> Floats:
-    """(n, 2) the wall's centreline, closed."""
-    width = outer_wall_width_mm(process)
-    loops, holes = contours(offset(outline, -0.5 * width)), sum(len(loop) > 2 for loop in outline.to_polygons())
+def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
+    """(n, 2) the wall's centreline, closed; half_mm: half of its width."""
+    loops, holes = contours(offset(outline, -half_mm)), sum(len(loop) > 2 for loop in outline.to_polygons())
     if holes != 1 or len(loops) != 1:
         instead = f"{holes} outlines" if holes != 1 else "a place too narrow for a wall"
         raise SliceError(

@@ -25,6 +25,15 @@ def cup() -> Mesh:
     return standing(m3.Manifold.cylinder(6, 10, 13, 96))
 
 
+@pytest.mark.parametrize("sides", [4, 96])
+def test_a_cone_ends_where_its_tip_is_no_wider_than_two_walls(sides: int) -> None:
+    cone = standing(m3.Manifold.cylinder(30, 12, 0, sides))
+    sliced = slice_part(whole(cone), profile(*VASE))
+    top_mm = 30.0 * (1.0 - 2.0 * 0.45 / (12.0 * np.cos(np.pi / sides)))  # where the inscribed circle is as wide as two walls
+    assert sliced.too_thin_mm == pytest.approx(top_mm, abs=0.5)
+    assert sliced.layers[-1].z_mm == pytest.approx(sliced.too_thin_mm, abs=0.21)
+
+
 def test_the_wall_climbs_evenly_from_the_bottom_to_the_top() -> None:
     sliced = slice_part(whole(cup()), profile(*VASE))
     assert [Kind.SKIN in {path.kind for path in layer.paths} for layer in sliced.layers[:5]] == [True] * 4 + [False]
