@@ -1,6 +1,7 @@
 """Overhangs: what of each layer needs support, what is a ledge that carries itself, and what bridges from anchor to anchor, in
 the direction in which its lines sag least."""
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
@@ -197,16 +198,17 @@ def _lines_across(sides: Floats, anchors: EdgeIndex, angle: float, width_mm: flo
 
 
 def bridges_of_layers(
-    sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons]
+    sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons], layers: Sequence[int]
 ) -> list[tuple[Bridge, ...]]:
-    """The bridges of every layer: those that carry themselves, and what hangs over no support, as well as it can be.
+    """The bridges of some layers, in rising order: those that carry themselves, and what hangs over no support, as it best can.
 
     Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
     supported: where each layer's support is.
     """
     process, heights, outlines = sections.process, sections.heights, sections.outlines
     bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
-    for i, overhang in enumerate(overhangs):
+    for i in layers[: bisect_left(layers, len(overhangs))]:
+        overhang = overhangs[i]
         free, below = overhang.hanging + overhang.ledges, sections.below(i)
         if free.is_empty() or below is None:
             continue

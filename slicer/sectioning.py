@@ -127,23 +127,27 @@ class Sections:
         return self.outlines[layer - 1] if layer else self.plastic_below
 
 
+def section_parts(parts: Sequence[Part], profile: Profile) -> list[Sections]:
+    """The sections of all parts of a print, in print order. Raises SliceError as section_part."""
+    pins = plan_pins(parts, profile)
+    return [section_part(part, profile, parts[:k], parts[k + 1 :], pins) for k, part in enumerate(parts)]
+
+
 def section_part(
     part: Part,
     profile: Profile,
     earlier: Sequence[Part] = (),
     later: Sequence[Part] = (),
     pins: Pins | None = None,
-    heights: Heights | None = None,
 ) -> Sections:
     """The sections of a part that is printed after `earlier` and before `later` parts.
 
-    profile: of the whole print; pins: of all its parts, planned here if they are not given; heights: of some of the part's
-    layers, with the lowest and the highest, all if they are not given. Raises SliceError when the part's mesh is not closed, or
-    too high to be meant.
+    profile: of the whole print; pins: of all its parts, planned here if they are not given. Raises SliceError when the part's
+    mesh is not closed, or too high to be meant.
     """
     of_print, profile = profile, vase_profile(profile.of_part(part.index))
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
-    heights = part_heights(part, later, profile) if heights is None else heights
+    heights = part_heights(part, later, profile)
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
     whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]

@@ -99,16 +99,23 @@ class Shells:
         return self.supports.sections
 
 
-def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
-    """The shells of a part with the support that was planned for it."""
+def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequence[int] | None = None) -> Shells:
+    """The shells of a part with the support that was planned for it.
+
+    layers: those that are asked for, all where None; of the others there is what these need, or nothing.
+    """
     sections = supports.sections
     process, nozzle_mm = sections.process, sections.profile.machine.head.nozzle_mm
     processes = layer_processes(process, sections.on_platform, len(sections.outlines))
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
     model = model_sections(sections)
-    heights_mm = sections.heights.height_mm.tolist()
+    heights_mm, count = sections.heights.height_mm.tolist(), len(processes)
+    # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
+    runs = [range(count)] if layers is None else [range(max(k - 1, 0), k + 1) for k in layers]
+    needed = sorted({layer for run in runs for layer in run})
 
-    def contours_of(layer: int) -> Contours:
+    def contours_of(place: int) -> Contours:
+        layer = needed[place]
         own, usual = processes[layer], process.walls
         walls, ending, inside = cut_walls(
             sections.own[layer], model[layer], own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=usual
@@ -116,11 +123,13 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang]) -> Shells:
         areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
         return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
 
-    walled = [_walls_from(*found) for found in parallel_map(contours_of, len(processes), FEWEST_LAYERS)]
+    walled = [_walls_from((), (), (), [[], []])] * count
+    for layer, found in zip(needed, parallel_map(contours_of, len(needed), FEWEST_LAYERS), strict=True):
+        walled[layer] = _walls_from(*found)
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
-    filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process)
+    filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs)
     ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process)
-    bridges = bridges_of_layers(sections, overhangs, supports.areas)
+    bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     infill = with_line_width(process, process.infill_line_width_mm)
     density = pattern_density([region.sparse for region in filled], infill, process.layer_height_mm)
     filled = anchor_skins(filled, processes, density, sections)

@@ -28,10 +28,10 @@ from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm, mark_corners
 from slicer.heights import shell_layers
-from slicer.interface.interface import pin_width_mm, plan_pins, skin_beside
+from slicer.interface.interface import pin_width_mm, skin_beside
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, bead_area_mm2
-from slicer.sectioning import Sections, section_part
+from slicer.sectioning import Sections, section_part, section_parts
 from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, lay_beads
 from slicer.strokes.order import order_beads
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
@@ -89,8 +89,7 @@ def slice_parts(
         raise SliceError(
             f"process.spiral_vase climbs round a model in one part, this one is in {len(parts)}: --parts 1 prints it in one piece"
         )
-    pins = plan_pins(parts, profile)
-    sections = [section_part(part, profile, parts[:k], parts[k + 1 :], pins) for k, part in enumerate(parts)]
+    sections = section_parts(parts, profile)
     overhangs = [find_overhangs(layers) for layers in sections]
     supports = plan_supports([own_supports(*pair) for pair in zip(sections, overhangs, strict=True)])
     expected = [len(support.areas) for support in supports]

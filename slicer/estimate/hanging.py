@@ -1,141 +1,97 @@
-"""Hanging: the support of a part from few thick layers, by the rules of the real ones."""
+"""Hanging: the support of a print from few thick layers, by the rules of the real ones.
+
+A thick layer stands for several of the real ones. What hangs in any of these hangs in it, and its section is that of its middle
+one: so small places that hang are not lost between two sections, and what carries itself is known from the real layers.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from mdp.decomposition import Part
-from mdp.mesh import Floats, Indices
-from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
-from mdp.support_need.need import needs_support
-from mdp.topology.cross_section import cross_sections
-from profiles.process import Process
-from profiles.profile import Profile
+from mdp.mesh import Floats
 from slicer.bead import spacing_mm
-from slicer.geometry.polygons import Polygons, clean, edges
-from slicer.heights import Heights, part_heights
-from slicer.interface.interface import plastic_below
-from slicer.overhangs import find_overhangs
-from slicer.sectioning import Sections, no_support_areas, plate_outline, vase_profile
-from slicer.support.handed_down import plan_supports
-from slicer.support.support import Supports, own_supports
+from slicer.geometry.polygons import Polygons, edges, union
+from slicer.heights import Heights
+from slicer.overhangs import Overhang
+from slicer.sectioning import Sections
+from slicer.support.handed_down import plan_supports, up_to
+from slicer.support.support import Supports, own_supports, wanted_places
 
-LAYERS = 36  # thick layers at most, and one above what hangs
-COARSE_MM = 0.05  # sections are simplified by this
-LEAST_MM = 0.4  # of a thick layer
+STEP = 3  # layers that a thick one stands for: growing support from so few takes a third of the time
+FEW = 40  # layers up to the highest place that hangs whose support is grown as it is
 
 
-@dataclass(frozen=True, eq=False)
-class ThickSupport:
-    """The support of a part's layers, which go up as far as it does: which of the areas stands in each, the last one, which is
-    empty, where none does; and whether it is dense there, as far as the part is near."""
-
-    heights: Heights
-    which: Indices
-    closed: Mask
-    areas: Sequence[Polygons]
-    dense: Sequence[Polygons]
-
-
-def thick_supports(parts: Sequence[Part], profile: Profile) -> list[ThickSupport]:
-    """The support of every part of a print. Raises SliceError where a part is too high to be meant."""
-    profiles = [vase_profile(profile.of_part(part.index)) for part in parts]
-    heights = [part_heights(part, parts[k + 1 :], own) for k, (part, own) in enumerate(zip(parts, profiles, strict=True))]
-    tops = [_hanging_up_to_mm(part, own.process) for part, own in zip(parts, profiles, strict=True)]
-    plain = [
-        ThickSupport(own, np.zeros(len(own.tip_mm), np.int64), np.zeros(len(own.tip_mm), np.bool_), [Polygons()], [Polygons()])
-        for own in heights
-    ]
-    if not any(tops):
-        return plain
-    reach = len(parts) if any(tops[1:]) else 1  # of a later part's support some may have to be printed with an earlier one
-    sections = []
-    for k, (own, top_mm) in enumerate(zip(profiles[:reach], tops, strict=False)):
-        top_mm = float(heights[k].tip_mm[-1]) if any(tops[k + 1 :]) else top_mm
-        thick = _thick_layers(float(heights[k].tip_mm[0]), top_mm, 0.5 * float(heights[k].height_mm.min()))
-        sections.append(_thick_sections(parts, k, own, thick))
-    planned = plan_supports([own_supports(layers, find_overhangs(layers)) for layers in sections])
-    return [_of_layers(*row) for row in zip(heights, planned, profiles, strict=False)] + plain[reach:]
+def rough_supports(sections: Sequence[Sections], overhangs: Sequence[Sequence[Overhang]]) -> list[Supports]:
+    """The support of all parts of a print, in print order: of every layer that of the thick one it belongs to."""
+    wanted = [wanted_places(*pair) for pair in zip(sections, overhangs, strict=True)]
+    tops = [max((k + 1 for k, area in enumerate(places) if not area.is_empty()), default=0) for places in wanted]
+    thick = []
+    for k, (layers, hanging) in enumerate(zip(sections, overhangs, strict=True)):
+        top = len(layers.outlines) if any(tops[k + 1 :]) else tops[k]  # a later part's support may be printed with this one
+        thick.append(own_supports(layers, hanging) if top < FEW else _grown(layers, wanted[k]))
+    return [_of_layers(*pair) for pair in zip(sections, plan_supports(thick), strict=True)]
 
 
-def _thick_sections(parts: Sequence[Part], k: int, profile: Profile, thick: Heights) -> Sections:
-    part, process = parts[k], profile.process
-    mesh = part.in_part_frame()
-    outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in cross_sections(mesh, thick.cut_mm)]
-    # A thick layer stands for what hangs anywhere in it: the gaps, less than half a thick layer, are lost in that.
+def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
+    """The support that a part has of its own, in thick layers; the first layer stands for itself."""
+    process, heights = sections.process, sections.heights
+    begins = np.array([0, *range(1, len(heights.tip_mm), STEP)])
+    ends = np.append(begins[1:], len(heights.tip_mm))
+    middles = (begins + ends - 1) // 2
+    # Hanging places lie anywhere in a thick layer, and support ends below it: the gaps are lost in that.
     coarse = {
-        "layer_height_mm": float(thick.height_mm[-1]),
-        "support_interface_layers": 2,
-        "support_bottom_interface_layers": 1,
+        "layer_height_mm": STEP * process.layer_height_mm,
+        "support_interface_layers": -(-process.support_interface_layers // STEP),
+        "support_bottom_interface_layers": -(-process.support_bottom_interface_layers // STEP),
         "support_gap_mm": 0.0,
         "support_bottom_gap_mm": 0.0,
     }
-    return Sections(
-        part=part,
-        earlier=parts[:k],
-        later=parts[k + 1 :],
-        profile=profile.model_copy(update={"process": process.model_copy(update=coarse)}),
-        mesh=mesh,
-        heights=thick,
-        outlines=outlines,
-        own=outlines,
-        ungrooved=outlines,
-        beside=[Polygons()] * len(outlines),
-        plastic_below=plastic_below(part, parts[:k], outlines[0]),
-        plate=plate_outline(profile.machine.table),
-        no_support=no_support_areas(part, mesh, thick.cut_mm),
+
+    def of_middles(places: Sequence[Polygons]) -> list[Polygons]:
+        return [places[k] for k in middles.tolist()] if places else []
+
+    thick = replace(
+        sections,
+        profile=sections.profile.model_copy(update={"process": process.model_copy(update=coarse)}),
+        heights=Heights(heights.tip_mm[ends - 1], heights.tip_mm[ends - 1] - heights.bottom_mm[begins], heights.cut_mm[middles]),
+        outlines=of_middles(sections.outlines),
+        own=of_middles(sections.own),
+        ungrooved=of_middles(sections.ungrooved),
+        beside=of_middles(sections.beside),
+        above=(),
+        standing=of_middles(sections.standing),
+        no_support=of_middles(sections.no_support),
     )
+    hanging = [Overhang(union([area for area in wanted[a:b] if not area.is_empty()])) for a, b in zip(begins, ends, strict=True)]
+    return own_supports(thick, hanging)
 
 
-def _of_layers(heights: Heights, support: Supports, profile: Profile) -> ThickSupport:
-    """The support of layers from that of thick ones."""
-    process, tips_mm = profile.process, support.sections.heights.tip_mm
-    standing = [float(tips_mm[k]) for k, area in enumerate(support.areas) if not area.is_empty()]
-    heights = heights.up_to(max(standing, default=0.0), process.layer_height_mm)
-    which = np.searchsorted(tips_mm, heights.cut_mm)
-    closed = np.append(tips_mm, np.inf)[which] - heights.cut_mm < process.support_interface_layers * process.layer_height_mm
-    return ThickSupport(heights, which, closed, [*support.areas, Polygons()], [*support.dense, Polygons()])
+def _of_layers(sections: Sections, thick: Supports) -> Supports:
+    """The support of real layers from that of thick ones."""
+    tips_mm = thick.sections.heights.tip_mm
+    standing = [float(tips_mm[k]) for k, area in enumerate(thick.areas) if not area.is_empty()]
+    sections = up_to(sections, max(standing, default=0.0))
+    which = np.searchsorted(tips_mm, sections.heights.cut_mm).tolist()
+    areas, dense = ([[*places, Polygons()][k] for k in which] for places in (thick.areas, thick.dense))
+    nothing = [Polygons()] * len(which)
+    return Supports(sections, areas, dense, nothing, nothing, nothing)
 
 
-def support_lengths_mm(support: ThickSupport, process: Process, on_platform: bool) -> Floats:
+def support_lengths_mm(supports: Supports) -> Floats:
     """(n, 2) sparse and dense lines of the support of every layer of a part."""
-    extents = np.array(
-        [(area.area(), _around_mm(area), dense.area()) for area, dense in zip(support.areas, support.dense, strict=True)]
-    )
-    area, around, close = extents[support.which].T
-    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
+    sections, process = supports.sections, supports.sections.support_process
+    extents = [(area.area(), _around_mm(area), dense.area()) for area, dense in zip(supports.areas, supports.dense, strict=True)]
+    area, around, close = np.array(extents).T
+    spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
     walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
-    if on_platform:
+    if sections.on_platform:
         density[0] = process.support_foot_density
     inside = np.maximum(area - walls_mm * spacing, 0.0)
-    dense = np.minimum(np.where(support.closed, close, 0.0), inside)
+    dense = np.minimum(close, inside)
     return np.column_stack([walls_mm + (inside - dense) * density / spacing, dense * process.support_interface_density / spacing])
 
 
 def _around_mm(area: Polygons) -> float:
     sides = edges(area)
     return float(np.hypot(sides[:, 2] - sides[:, 0], sides[:, 3] - sides[:, 1]).sum())
-
-
-def _hanging_up_to_mm(part: Part, process: Process) -> float:
-    """The height of the highest risky face of a part that needs support and does not rest on its base plane; 0: there is none."""
-    if process.support == "none":
-        return 0.0
-    mesh, on_platform = part.in_part_frame(), part.index == 1
-    lifted = mesh.vertices[mesh.faces, 2].max(axis=1) > PLATFORM_TOLERANCE_MM
-    down = mesh.normals[:, 2] < threshold(process.self_supporting_angle_deg)
-    risky = down & lifted & needs_support(mesh, process, on_platform)
-    hanging_mm2 = -float((mesh.normals[risky, 2] * mesh.areas_mm2[risky]).sum())
-    return float(mesh.vertices[mesh.faces[risky], 2].max()) if hanging_mm2 > process.support_least_mm2 else 0.0
-
-
-def _thick_layers(first_mm: float, top_mm: float, over_mm: float) -> Heights:
-    """Few equal layers over the first one up to a height, and one that is cut so much above it, where what hangs there begins."""
-    count = int(np.clip((top_mm - first_mm) / LEAST_MM, 1, LAYERS)) if top_mm > first_mm else 0
-    tips = first_mm + (top_mm - first_mm) * np.arange(count + 2 if count else 1) / max(count, 1)
-    thick = np.diff(tips, prepend=0.0)
-    cuts = tips - 0.5 * thick
-    if count:
-        cuts[-1] = min(cuts[-1], top_mm + over_mm)
-    return Heights(tips, thick, cuts)

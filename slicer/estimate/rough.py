@@ -10,19 +10,20 @@ import numpy as np
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
 from mdp.kernels.sorting import rank
-from mdp.mesh import Floats, Indices, Ints, Mesh
-from profiles.process import Process
+from mdp.mesh import Floats, Indices, Ints
 from slicer.bead import spacing_mm
-from slicer.heights import Heights, shell_layers
+from slicer.heights import shell_layers
+from slicer.sectioning import Sections
 
 TINY_MM2 = 1e-9
 
 
-def rough_lengths_mm(mesh: Mesh, heights: Heights, process: Process, on_platform: bool) -> Floats:
-    """(n, 3) walls, skin and sparse infill of every layer of a mesh."""
+def rough_lengths_mm(sections: Sections) -> Floats:
+    """(n, 3) walls, skin and sparse infill of every layer of a part."""
+    mesh, process = sections.mesh, sections.process
     (top, bottom), width = shell_layers(process), process.line_width_mm
-    area, around, over, under = _measure(mesh.vertices, mesh.faces, heights.cut_mm)
-    if not on_platform:
+    area, around, over, under = _measure(mesh.vertices, mesh.faces, sections.heights.cut_mm)
+    if not sections.on_platform:
         under[0] = 0.0
     seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
     bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]

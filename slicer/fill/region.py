@@ -52,21 +52,27 @@ class Cover:
         return self.sections[layer] if 0 <= layer < count else beyond[k] if k < len(beyond) else Polygons()
 
 
-def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process: Process) -> list[Region]:
-    """Regions of every layer of a part from what its walls enclose.
+def regions(
+    insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process: Process, runs: Sequence[range] | None = None
+) -> list[Region]:
+    """Regions of every layer of a part from what its walls enclose; runs: of layers that are asked for, all where None.
 
     A place is solid when one of the model's next top_layers sections above or bottom_layers below does not cover it: so every
     vertical line meets that many layers of wall or skin below a surface, on slopes too. It is also solid where a later part
     will lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
     """
     top, bottom = shell_layers(process)
-    stacked = [*reversed(cover.below), *cover.sections, *cover.above]
-    first = len(cover.below)
-    above = _common(stacked, top)[first + 1 :] if top else insides
-    below = _common(stacked[::-1], bottom)[::-1][first - 1 :] if bottom else insides
-    sparse_areas = [sparse_area(*row, process) for row in zip(cover.insides, above, below, strict=False)]
-    hollow = _without_footings(sparse_areas, cover, process)
-    return [region_of(inside, hollow[i], cover, i, on_plastic, process) for i, inside in enumerate(insides)]
+    found = [Region(*[Polygons()] * 5)] * len(insides)
+    for run in [range(len(insides))] if runs is None else runs:
+        inner = cover.insides[run.start : run.stop]
+        stacked = [cover.section(layer) for layer in range(run.start - bottom, run.stop + top)]
+        above = _common(stacked, top)[bottom + 1 :] if top else inner
+        below = _common(stacked[::-1], bottom)[::-1][bottom - 1 :] if bottom else inner
+        sparse_areas = [sparse_area(*row, process) for row in zip(inner, above, below, strict=False)]
+        hollow = _without_footings(sparse_areas, cover.sections[run.start + 1 : run.stop], inner[1:], process)
+        for layer, uncut in zip(run, hollow, strict=True):
+            found[layer] = _region_of(insides[layer], uncut, cover, layer, on_plastic, process)
+    return found
 
 
 def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
@@ -113,15 +119,18 @@ def _large(sparse: Polygons, process: Process) -> Polygons:
     return larger(sparse, process.solid_below_mm2) if process.infill_density > 0.0 else sparse
 
 
-def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process) -> list[Polygons]:
+def _without_footings(
+    sparse: Sequence[Polygons], sections: Sequence[Polygons], insides: Sequence[Polygons], process: Process
+) -> list[Polygons]:
     """The sparse places without those under walls which begin on them: a pocket's on its floor, a pillar's on its plate.
 
+    sections, insides: of the layers over those of the sparse places, but for the last one, over which nothing is known.
     The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill.
     """
     width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
     footings = [
         opening((area ^ section) - inside, 0.5 * BESIDE * width_mm) if not area.is_empty() else area
-        for area, section, inside in zip(sparse, cover.sections[1:], cover.insides[1:], strict=False)
+        for area, section, inside in zip(sparse, sections, insides, strict=False)
     ]
     left = list(sparse)
     for i, area in enumerate(sparse):
@@ -131,7 +140,7 @@ def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process
     return left
 
 
-def region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process) -> Region:
+def _region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process) -> Region:
     """The region of one layer; uncut: what would be sparse there if the model were in one piece."""
     empty, width_mm = Polygons(), process.line_width_mm
     if inside.is_empty():

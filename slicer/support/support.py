@@ -63,10 +63,9 @@ class Supports:
 def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     """The support that stands on the platform, on the part itself and on what lies below its base plane."""
     process, nothing = sections.support_process, [Polygons()] * len(sections.outlines)
-    wanted = unwanted = nothing
+    wanted, unwanted = wanted_places(sections, overhangs), nothing
     if process.support != "none":
         unwanted = drop_small([overhang.unwanted for overhang in overhangs], process.support_least_mm2)
-        wanted = drop_small(_drop_nearly_held(sections, overhangs), process.support_least_mm2)
     count = max((k for k, area in enumerate(wanted) if not area.is_empty()), default=-1)
     if count < 0:
         return Supports(sections, nothing, nothing, nothing, nothing, unwanted)
@@ -80,13 +79,16 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     return Supports(sections, [*printed, *rest], [*dense, *rest], wanted, missed, unwanted)
 
 
-def _drop_nearly_held(sections: Sections, overhangs: Sequence[Overhang]) -> list[Polygons]:
-    """The hanging places without those that have plastic or the platform no farther below than support would be."""
-    heights, outlines = sections.heights, sections.outlines
+def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Polygons]:
+    """The hanging places of every layer that want support: large enough, and without plastic or the platform no farther below
+    than support would be."""
+    heights, outlines, process = sections.heights, sections.outlines, sections.process
+    if process.support == "none":
+        return [Polygons()] * len(outlines)
     free = []
     for k, hanging in enumerate(overhang.hanging for overhang in overhangs):
         if not hanging.is_empty():
-            drop = float(heights.bottom_mm[k]) - sections.process.support_gap_mm
+            drop = float(heights.bottom_mm[k]) - process.support_gap_mm
             near = list(outlines[int(np.searchsorted(heights.tip_mm, drop - EVEN_MM)) : max(k - 1, 0)])
             if k and drop <= EVEN_MM:
                 below = sections.plastic_below
@@ -94,7 +96,7 @@ def _drop_nearly_held(sections: Sections, overhangs: Sequence[Overhang]) -> list
             elif near:
                 hanging = hanging - union(near)
         free.append(hanging)
-    return free
+    return drop_small(free, process.support_least_mm2)
 
 
 def drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:

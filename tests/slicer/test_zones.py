@@ -9,7 +9,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.zone import AnyZone, Grown, Marked, Zone
 from profiles.frozen import Vector
-from slicer.estimate.hanging import thick_supports
+from slicer.estimate.estimate import estimate
 from slicer.heights import Heights
 from slicer.paths import Kind, SlicedPart
 from slicer.sectioning import no_seam_segments, no_support_areas
@@ -89,10 +89,7 @@ def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zon
     assert support_x_mm(without).min() == pytest.approx(support_x_mm(free).min(), abs=0.5)
     ((mm2, why),) = [(missed.mm2, missed.reason) for missed in without.unsupported]
     assert (why, mm2) == ("no support is wanted there", pytest.approx(150.0, rel=0.05))
-    counted = [
-        sum(area.area() for support in thick_supports([variant], SUPPORTED) for area in support.areas)
-        for variant in (part, bare(part))
-    ]
+    counted = [estimate(variant, SUPPORTED).support_mm3 for variant in (part, bare(part))]
     assert (counted[0] > 0, counted[1]) == (True, 0)
     assert volume_mm3(without, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
 

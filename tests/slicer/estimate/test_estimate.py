@@ -139,21 +139,42 @@ def comb() -> Mesh:
     return standing(m3.Manifold.batch_boolean([m3.Manifold.cube((32.0, 16.0, 4.0)), *teeth], m3.OpType.Add))
 
 
+def tower() -> Mesh:
+    """A column with a wide head whose underside, far above the plate, stands on support."""
+    head = m3.Manifold.cube((30.0, 26.0, 5.0), True).translate((6.0, 0.0, 42.0))
+    return standing(m3.Manifold.cylinder(40.0, 6.0, 6.0, 48) + head)
+
+
+def thin_box() -> Mesh:
+    """A box without a lid, whose walls have hardly room for two lines."""
+    return standing(m3.Manifold.cube((40.0, 30.0, 24.0)) - m3.Manifold.cube((38.2, 28.2, 24.0)).translate((0.9, 0.9, 1.0)))
+
+
 LEANING, LEVEL = ((0.3, 0.1, 0.95), 9.0), ((0.0, 0.0, 1.0), 9.0)
 
 
 @pytest.mark.parametrize(
-    ("mesh", "planes"),
-    [(star(), ()), (star(), (LEVEL,)), (vase(), ()), (vase(), (LEANING,)), (comb(), ()), (comb(), (LEANING,))],
-    ids=["star", "cut star", "vase", "cut vase", "comb", "cut comb"],
+    ("mesh", "planes", "share"),
+    [
+        (tower(), (), 0.04),
+        (thin_box(), (), 0.04),
+        (box(24, 20, 40), (((0.3, 0.1, 0.95), 18.0),), 0.04),
+        (vase(), (), 0.04),
+        (vase(), (LEANING,), 0.04),
+        (comb(), (), 0.04),
+        (comb(), (LEANING,), 0.04),
+        (star(), (), 0.06),  # its many small places that hang get less support in thick layers
+        (star(), (LEVEL,), 0.06),
+    ],
+    ids=["tower on support", "thin box", "cut box", "vase", "cut vase", "comb", "cut comb", "star", "cut star"],
 )
-def test_an_estimate_is_within_6_percent_of_the_dry_run(mesh: Mesh, planes: tuple[tuple[tuple[float, ...], float], ...]) -> None:
+def test_an_estimate_is_near_the_dry_run(mesh: Mesh, planes: tuple[tuple[tuple[float, ...], float], ...], share: float) -> None:
     parts = tuple(cut(mesh, *planes)) if planes else (whole(mesh),)
     decomposition = Decomposition("shape", mesh, parts, 1, "classic", 0.0, 0.0, 0, 0, 0.0)
     run = build(decomposition, profile()).run
     expected = estimate(parts, profile())
-    assert expected.time_s == pytest.approx(run.time_s, rel=0.06)
-    assert expected.filament_mm == pytest.approx(float(run.program.filament_mm.max()), rel=0.06)
+    assert expected.time_s == pytest.approx(run.time_s, rel=share)
+    assert expected.filament_mm == pytest.approx(float(run.program.filament_mm.max()), rel=share)
 
 
 def test_the_same_parts_are_always_estimated_alike() -> None:

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from slicer.bead import spacing_mm
 from slicer.estimate.rough import choose_layers, rough_lengths_mm
-from slicer.heights import layer_heights
+from slicer.sectioning import section_part
 from tests.shapes import box, standing
-from tests.slicer.hand import profile
+from tests.slicer.hand import profile, whole
 
 PROFILE = profile()
 SPACING = spacing_mm(0.45, 0.2)
@@ -18,7 +18,7 @@ SPACING = spacing_mm(0.45, 0.2)
 
 def test_a_box_is_walls_around_skin_at_its_ends_and_infill_between() -> None:
     mesh = box(30, 30, 20)
-    walls, skin, sparse = rough_lengths_mm(mesh, layer_heights(mesh, PROFILE, True), PROFILE.process, True).T
+    walls, skin, sparse = rough_lengths_mm(section_part(whole(mesh), PROFILE)).T
     inside = 900.0 - 3.0 * SPACING * 120.0
     assert walls == pytest.approx(np.full(100, 360.0))
     solid = np.isin(np.arange(100), [0, 1, 2, 3, 96, 97, 98, 99])
@@ -28,7 +28,7 @@ def test_a_box_is_walls_around_skin_at_its_ends_and_infill_between() -> None:
 
 def test_a_ledge_half_way_up_has_skin_below_it() -> None:
     mesh = standing(m3.Manifold.cube((40, 40, 10)) + m3.Manifold.cube((20, 20, 20)))
-    _, skin, _ = rough_lengths_mm(mesh, layer_heights(mesh, PROFILE, True), PROFILE.process, True).T
+    _, skin, _ = rough_lengths_mm(section_part(whole(mesh), PROFILE)).T
     assert np.flatnonzero(skin > 0.0).tolist() == [0, 1, 2, 3, 46, 47, 48, 49, 96, 97, 98, 99]
 
 
