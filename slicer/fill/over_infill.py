@@ -22,7 +22,7 @@ ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
 HOLDS = 0.75  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
-KEPT = 4.0  # of the square of an infill cell: smaller places that skins leave of the sparse infill become solid
+KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid
 MOST_ROUNDS = 4  # what becomes solid so may have ends in the air, too
 SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
 

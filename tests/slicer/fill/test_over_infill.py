@@ -58,10 +58,9 @@ def test_without_infill_a_skin_grows_to_the_walls() -> None:
     assert (left, right) == pytest.approx((-15.0, 15.0), abs=0.01)
 
 
-def test_skins_that_leave_little_infill_between_them_become_one() -> None:
-    pair = block(-3.0, 4.0, 3.0) + block(-3.0, -4.0, 3.0)  # 5 mm between them, less than two cells
-    one = anchored(region(pair + block(-3.0, 0.0, 14.0) - block(-3.0, 0.0, 13.0)), INSIDE, INFILL, 0.0, WIDTH, CELL).solid
-    assert (block(-3.0, 0.0, 12.0) - one).is_empty()
+def test_a_place_smaller_than_a_cell_of_infill_between_skins_becomes_solid() -> None:
+    one = anchored(region(block(-3.0, 0.0, 8.0) - block(-3.0, 0.0, 5.0)), INSIDE, INFILL, 0.0, WIDTH, CELL).solid
+    assert (block(-3.0, 0.0, 8.0) - one).is_empty()
 
 
 @pytest.mark.parametrize("pattern", ["rectilinear", "grid", "gyroid", "cubic"])
