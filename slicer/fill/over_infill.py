@@ -45,7 +45,10 @@ def anchored(
             break
         left = larger(opening(sparse - added, width_mm), KEPT * cell_mm**2)
         skin, sparse = skin + (sparse - left), left
-    return region if sparse is region.sparse else replace(region, solid=region.solid + (region.sparse - sparse), sparse=sparse)
+    if sparse is region.sparse:
+        return region
+    grown = region.sparse - sparse  # a model in one piece would have it, too
+    return replace(region, solid=region.solid + grown, sparse=sparse, uncut=region.uncut - grown)
 
 
 def infill_bridges(region: Region, sparse_below: Polygons, width_mm: float) -> Polygons:

@@ -39,6 +39,7 @@ def test_a_skin_between_two_lines_of_infill_grows_to_both_and_no_farther() -> No
     assert (left, right) == pytest.approx((0.0, 6.0), abs=0.2)
     assert (low, high) == pytest.approx((-1.0, 1.0), abs=WIDTH)
     assert grown.solid.area() + grown.sparse.area() == pytest.approx(900.0)
+    assert grown.uncut.area() == pytest.approx(grown.sparse.area())  # what skins grow is no plastic that a cut costs
 
 
 def test_a_skin_grows_along_its_lines_whichever_way_these_run() -> None:
