@@ -134,8 +134,8 @@ def _sort_islands(
 def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
     """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
 
-    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The sum of the fourth
-    powers of the spans is least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach
+    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The mean fourth
+    power of the spans is least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach
     over, that is the direction of the shortest spans.
     """
     if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):

@@ -63,6 +63,7 @@ FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several pr
 # and, where it differs, of what the walls of the uncut model enclose: Polygons cannot go from one process to another.
 Contours: TypeAlias = tuple[tuple[tuple[Floats, ...], ...], tuple[Wall, ...], tuple[Bead, ...], list[list[Floats]]]
 REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cut overlaps it by this
+TOUCHING_MM = 0.01  # places so near to each other are one
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
@@ -160,7 +161,7 @@ def anchor_skins(filled: Sequence[Region], processes: Sequence[Process], density
             below, infill, density=density, layer=layer - 1, z_mm=z_mm[layer - 1], height_mm=heights_mm[layer - 1]
         )
         lines, angle_deg = [bead.points for bead in beads], lines_angle_deg(process, layer)
-        done[layer] = anchored(region, below, lines, angle_deg, process.line_width_mm, infill_cell_mm(process))
+        done[layer] = anchored(region, below, lines, angle_deg, processes[layer].line_width_mm, infill_cell_mm(process))
     return done
 
 
@@ -322,8 +323,9 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
 
 def _moat(bridge: Polygons, sparse: Polygons, cell_mm: float) -> Polygons:
     """What a bridge leaves of the sparse infill around it that is narrower than a cell: its lines go on to the walls there."""
-    left = sparse - bridge
-    return (left - opening(left, 0.5 * cell_mm)) ^ offset(bridge, cell_mm)
+    left, touched = sparse - bridge, offset(bridge, TOUCHING_MM)
+    narrow = (left - opening(left, 0.5 * cell_mm)) ^ offset(bridge, cell_mm)
+    return union([piece for piece in islands(narrow) if not (piece ^ touched).is_empty()])
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
@@ -356,7 +358,7 @@ def _without(region: Region, area: Polygons, width_mm: float) -> Region:
 
 def bridge_beads(area: Polygons, lines: SolidLines, flow: float, over_infill: bool = False) -> list[Bead]:
     """The lines of a bridge with its own flow. over_infill: the first solid ones over sparse infill, across the lines below
-    wherever those have one direction; places beside them stay empty, what would fill these would lie on nothing."""
+    wherever those have one direction; gaps beside them stay empty: whatever filled them would lie on nothing."""
     beads, rests = skin_lines(area, Kind.BRIDGE, lines)
     beads += [] if over_infill else gaps(rests, lines.width_mm, lines.height_mm)
     return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in beads]

@@ -1,4 +1,4 @@
-"""Skins over sparse infill: they grow along their lines until these end on infill or on what is solid, as bridges do.
+"""Skins over sparse infill: they grow along their lines until these end on infill or on something solid.
 
 The lines of a layer are taken as rows. Where a row of skin ends over a void of the layer below, farther than HOLDS from what
 holds it, it goes on to the next line of infill or to the end of the void.
@@ -15,7 +15,7 @@ from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from slicer.fill.region import Region
 from slicer.geometry.clip import rotation_2d
-from slicer.geometry.polygons import Polygons, closing, edges, larger, of_contours, offset, opening
+from slicer.geometry.polygons import Polygons, closing, edges, islands, of_contours, offset, opening, union
 
 NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
@@ -23,7 +23,7 @@ HOLDS = 0.75  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
 KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid
-MOST_ROUNDS = 4  # what becomes solid so may have ends in the air, too
+MOST_ROUNDS = 4  # what becomes solid this way may itself end in mid-air
 SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
 
 Indices = NDArray[np.int64]
@@ -43,7 +43,14 @@ def anchored(
         added = _extension(skin, sparse_below, infill_below, angle_deg, width_mm) ^ sparse
         if added.area() < width_mm**2:
             break
-        left = larger(opening(sparse - added, width_mm), KEPT * cell_mm**2)
+        beside = offset(added, 2.0 * width_mm)
+        left = union(
+            [
+                piece
+                for piece in islands(opening(sparse - added, width_mm))
+                if piece.area() >= KEPT * cell_mm**2 or (piece ^ beside).is_empty()
+            ]
+        )
         skin, sparse = skin + (sparse - left), left
     if sparse is region.sparse:
         return region
@@ -121,7 +128,12 @@ def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
                 if kinds[at] == SKIN:
                     in_skin = not in_skin
                     if in_skin:
-                        begun = begun if lacking else here  # the void between two skins is no end
+                        if lacking:  # the void between two skins
+                            out[n, 0] = rows[at]
+                            out[n, 1], out[n, 2] = (begun, here) if side == 0 else (-here, -begun)
+                            n += 1
+                        else:
+                            begun = here
                         lacking = False
                     elif in_void and here - held > holds:
                         lacking, ended = True, here

@@ -114,7 +114,7 @@ def light_samples(sections: Sections, outlines: Sequence[Sequence[Floats]]) -> t
     frames = np.stack([along, np.hstack([level, level, up]), np.hstack([outward, level])], axis=1) @ of.rotation
     mesh = _together([*sections.earlier, of, *sections.later])
     bodies = _bodies(mesh)
-    own, blocked = np.full(len(lifted), bodies[0]), np.zeros(len(lifted))
+    own, blocked = np.full(len(lifted), bodies[sum(len(part.mesh.faces) for part in sections.earlier)]), np.zeros(len(lifted))
     if (bodies != bodies[0]).any():
         met = faces_met(triangle_tree(mesh), lifted, np.ascontiguousarray(-frames[:, 2]), INWARD_MM)
         own = np.where(met >= 0, bodies[met], own)

@@ -20,7 +20,7 @@ from slicer.paths import Kind, Layer, Path, bead_area_mm2
 from slicer.sectioning import Sections
 from slicer.strokes.speed import fan_share, rising_fan
 
-TIP = 4.0  # half widths of the wall: a cone ends where its turns would be no wider than the wall itself
+TIP = 4.0  # widths of the wall: a cone ends where its outline is no larger than a square with such a side
 PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
 
@@ -39,7 +39,7 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
             "process.support = none leaves it out"
         )
     half_mm, end = 0.5 * outer_wall_width_mm(profile.process), len(outlines)
-    while end > first and offset(outlines[end - 1], -TIP * half_mm).is_empty():
+    while end > first and outlines[end - 1].area() < (2.0 * TIP * half_mm) ** 2:
         end -= 1
     loops = [_loop(outlines[k], float(heights.tip_mm[k]), half_mm) for k in range(first, end)]
     layers: list[Layer] = []

@@ -59,6 +59,13 @@ def test_without_infill_a_skin_grows_to_the_walls() -> None:
     assert (left, right) == pytest.approx((-15.0, 15.0), abs=0.01)
 
 
+def test_skins_that_face_each_other_over_a_void_without_infill_become_one() -> None:
+    void = block(0.0, 0.0, 10.0)
+    skins = block(-5.0, 0.0, 4.0) + block(5.0, 0.0, 4.0)  # each begins on what is solid and ends 3 mm from the other's middle
+    one = anchored(Region(Polygons(), Polygons(), skins, void - skins, void - skins), void, [], 0.0, WIDTH, 0.0).solid
+    assert (Polygons.square((10.0, 3.9), True) - one).is_empty()
+
+
 def test_a_place_smaller_than_a_cell_of_infill_between_skins_becomes_solid() -> None:
     one = anchored(region(block(-3.0, 0.0, 8.0) - block(-3.0, 0.0, 5.0)), INSIDE, INFILL, 0.0, WIDTH, CELL).solid
     assert (block(-3.0, 0.0, 8.0) - one).is_empty()

@@ -26,12 +26,18 @@ def cup() -> Mesh:
 
 
 @pytest.mark.parametrize("sides", [4, 96])
-def test_a_cone_ends_where_its_tip_is_no_wider_than_two_walls(sides: int) -> None:
+def test_a_cone_ends_where_its_tip_is_no_wider_than_four_walls(sides: int) -> None:
     cone = standing(m3.Manifold.cylinder(30, 12, 0, sides))
     sliced = slice_part(whole(cone), profile(*VASE))
-    top_mm = 30.0 * (1.0 - 2.0 * 0.45 / (12.0 * np.cos(np.pi / sides)))  # where the inscribed circle is as wide as two walls
+    top_mm = 30.0 * (1.0 - 2.0 * 0.45 / (12.0 * np.cos(np.pi / sides)))  # where the inscribed circle is as wide as four walls
     assert sliced.too_thin_mm == pytest.approx(top_mm, abs=0.5)
     assert sliced.layers[-1].z_mm == pytest.approx(sliced.too_thin_mm, abs=0.21)
+
+
+def test_a_slab_that_is_hardly_wider_than_two_walls_is_climbed_to_its_top() -> None:
+    sliced = slice_part(whole(box(40, 1.5, 8)), profile(*VASE))
+    assert sliced.too_thin == 0
+    assert sliced.layers[-1].z_mm == pytest.approx(8.0)
 
 
 def test_the_wall_climbs_evenly_from_the_bottom_to_the_top() -> None:
