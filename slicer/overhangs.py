@@ -34,7 +34,7 @@ LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
 ADRIFT = 10.0  # and one held nowhere like this
 LINE_RIM_MM = 0.02  # neighbouring lines overlap by this so that they unite
-GAIN = 0.1  # lines must sag less by this share in another direction than along the place's own sides: in corners all are short
+GAIN = 0.1  # share by which lines must sag less than in the directions tried before; the place's own sides come first
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +245,7 @@ def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> list
 
 
 def _held_piece(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
-    """What of a place has lines held at both ends in the direction that has most of them; None where that is next to nothing."""
+    """The part of a place whose lines are held at both ends, in the direction with most such lines; None where it is tiny."""
     sides = edges(hanging)
     *_, angle = _least_sag(sides, anchors, _angles(sides), width_mm)
     lines = _lines_across(sides, anchors, angle, width_mm)

@@ -245,7 +245,7 @@ def cut_walls(
 
 
 def _within(loop: Floats, area: Polygons) -> list[Floats]:
-    """What of a loop (n, 2) lies in an area, as open or closed polylines."""
+    """The parts of a loop (n, 2) inside an area, as open or closed polylines."""
     if area.is_empty():
         return []
     points, within = cut_line(close_loop(loop), area)

@@ -45,15 +45,11 @@ from slicer.support.support import Supports, explain, own_supports
 
 FEWEST_IN_ALL = 250  # fewer are sliced sooner than processes are forked and their paths brought back
 LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it
-OnLayer = Callable[[int, int], None]
-
-
 SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
-
-
-RANK = OUTSIDE - 1  # before all else of the layer
-ROUND = 12  # chords of a circle that the tip goes
-MOST_AREA = 3.0  # of a stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
+PIN_RANK = OUTSIDE - 1  # pins come before all else of a layer
+PIN_CHORDS = 12  # of the circle that the tip goes round a pin
+PIN_MOST_AREA = 3.0  # of its stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
+OnLayer = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +67,7 @@ class SlicingProgress:
 
     @property
     def share(self) -> float:
-        """What of all layers is done, 0 to 1, an estimate that never falls: a part that is ready may have fewer than expected."""
+        """Estimated share of all layers that is done, 0 to 1; it never falls, though a part may have fewer than expected."""
         pieces = zip(self.layers, self.expected, self.ready, strict=True)
         return sum(of if piece else min(count, of) for count, of, piece in pieces) / max(sum(self.expected), 1)
 
@@ -268,12 +264,12 @@ def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
     radius = 0.5 * (pin_width_mm(profile) - nozzle_mm)
     beads = []
     for x, y, mm3 in pins.tolist():
-        rounds = max(ceil(mm3 / (MOST_AREA * nozzle_mm**2 * 2.0 * pi * radius)), 1)
-        turn = 2.0 * pi * np.arange(rounds * ROUND + 1) / ROUND
+        rounds = max(ceil(mm3 / (PIN_MOST_AREA * nozzle_mm**2 * 2.0 * pi * radius)), 1)
+        turn = 2.0 * pi * np.arange(rounds * PIN_CHORDS + 1) / PIN_CHORDS
         ring = radius * np.column_stack([np.cos(turn), np.sin(turn)])
         points = np.vstack([np.zeros((1, 2)), ring]) + np.array([x, y])
         bead_mm3 = length_mm(points) * bead_area_mm2(process.line_width_mm, height_mm) * process.interface_flow
-        beads.append(Bead(Kind.GAP, points, process.line_width_mm, RANK, mm3 / bead_mm3))
+        beads.append(Bead(Kind.GAP, points, process.line_width_mm, PIN_RANK, mm3 / bead_mm3))
     return beads
 
 

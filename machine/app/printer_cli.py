@@ -104,7 +104,7 @@ def resume(
     if journal is None:
         return list_resumable()
     if port is None:
-        read_journal(journal)  # one that cannot be read is told first
+        read_journal(journal)  # report an unreadable one first
         raise JournalError(f"journal {journal}: at which port is the printer? --port PORT is expected")
     named = None if machine is None else options.machine_profile(machine)
     printing = PrintRequest(port, baud, 0.0, log, further, options.page_port(watch, watch_port), not no_browser)

@@ -54,8 +54,9 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
 
 
 class Counted(NamedTuple):
-    """The beads that are held against each other, which of (m,) rows they are, and how long all of these are. area_mm2: (k,) that
-    the remarks of a program ask for; diameter_mm: of the filament.
+    """Beads whose plastic is compared with what their remarks ask for: (m,) rows, lengths, and which of them count.
+
+    area_mm2: (k,) cross-section that each remark asks for; diameter_mm: of the filament.
     """
 
     program: ParsedProgram
@@ -108,7 +109,7 @@ def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Pro
 
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:
-    """(k,) cross-section that the told width and height of each remark need, with the factors of the profile and of its parts;
+    """(k,) cross-section that the stated width and height of each remark need, with the factors of the profile and of its parts;
     rows: of beads, the lowest layer of which lies on the plate.
     """
     remarks = program.remarks

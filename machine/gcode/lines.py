@@ -99,7 +99,7 @@ class Lines(Sequence[str]):
 
 
 def _width(size: int) -> type[np.signedinteger[Any]]:
-    """The type of places in so many bytes."""
+    """The integer type for positions in a text of that many bytes."""
     return np.int32 if size < 2**31 else np.int64
 
 

@@ -109,7 +109,7 @@ class Isolation:
 
     def call(self, task: Callable[..., Any], arguments: tuple[Any, ...], retries: int = 0, limit_s: float | None = None) -> Any:
         """What the task returns. task: of a module; retries: how often a call whose process was killed is tried again; limit_s:
-        after so many seconds a call is given up.
+        seconds after which a call is given up.
 
         Raises CallError for what the task raises, too.
         """
@@ -132,6 +132,8 @@ class Isolation:
     def _own(self) -> Worker:
         worker = self._of_threads.get(threading.get_ident())
         if worker is None or not worker.ready:
+            if worker is not None:
+                worker.end()
             worker = self._of_threads[threading.get_ident()] = Worker(one_core=True, idle_s=IDLE_S)
             if self._ended:
                 worker.end()

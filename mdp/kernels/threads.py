@@ -9,17 +9,16 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
-from weakref import WeakSet
 
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 LEAST_ROWS, SHARES = 4, 8  # rows a call, and calls for every core: handing a call over costs as much as a row
 
 Result = TypeVar("Result")
 
+HARMLESS = "harmless"  # the attribute of such threads
 POOLS = "ahead", "sweep"  # what their threads are called
 
 _pools: dict[tuple[str, int], ThreadPoolExecutor] = {}
-_harmless: WeakSet[threading.Thread] = WeakSet()
 
 
 def use_threads(count: int) -> None:
@@ -52,15 +51,16 @@ def ahead(work: Callable[..., Result], *arguments: Any) -> Future[Result]:
 def harmless(thread: threading.Thread) -> threading.Thread:
     """Note that a copy of this process may be made while a thread runs: it imports nothing, and holds no lock that a copy wants.
     Most such threads wait for what comes through a pipe and hand it over."""
-    _harmless.add(thread)
+    setattr(thread, HARMLESS, True)  # of the thread itself: a set could grow while it is walked
     return thread
 
 
 def come_to_rest() -> bool:
     """Whether a copy of this process can be made here: by the main thread, where all others are harmless. Those of our own pools
     do what they have to do and are gone then; others begin with the next work."""
-    others = {*threading.enumerate()} - {threading.main_thread(), *_harmless}
-    if threading.current_thread() is not threading.main_thread() or any(_pool_of(thread) not in POOLS for thread in others):
+    main = threading.main_thread()
+    others = [thread for thread in threading.enumerate() if thread is not main and not hasattr(thread, HARMLESS)]
+    if threading.current_thread() is not main or any(_pool_of(thread) not in POOLS for thread in others):
         return False
     while _pools:
         _pools.pop(min(_pools)).shutdown()  # those for work ahead first, which shares out rows

@@ -60,7 +60,7 @@ def read_frames(pipe: IO[bytes]) -> Iterator[Any]:
 
 
 def _read(pipe: IO[bytes], size: int) -> bytearray:
-    """So many bytes, none where the pipe ends before."""
+    """Exactly size bytes; none where the pipe ends before."""
     content = bytearray()
     while len(content) < size:
         more = pipe.read(size - len(content))
@@ -151,7 +151,7 @@ class Worker(Interpreter):
         raise KilledError(f"its process was ended by {_signal_name(-code)}" if code < 0 else "its process ended")
 
     def call(self, task: Task, *given: Any, limit_s: float | None = None) -> Any:
-        """What a call returns. limit_s: after so many seconds it is given up, and the worker ended.
+        """The result of a call. limit_s: seconds after which it is given up and the worker ended.
 
         Raises CallError for what the call raises, too; KilledError when the worker ends meanwhile.
         """
@@ -221,7 +221,7 @@ def _result(call: bytes) -> bytes:
         task, given = pickle.loads(call)
         work = resolve_name(task) if isinstance(task, str) else task
         return frame((DONE, work(*given)))
-    except Exception as error:  # noqa: BLE001 - it is told to who asked
+    except Exception as error:  # noqa: BLE001 - the caller gets its message
         return frame((FAILED, f"{type(error).__name__}: {error}"))
 
 

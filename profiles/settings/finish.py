@@ -23,7 +23,7 @@ class Finish(Frozen):
     spiral_vase: bool = Field(
         False,
         description="true: above the bottom one wall climbs round without a seam, without inside, top or support; the model is "
-        "in one part, its layers one area without holes",
+        "in one part, its layers one area without holes; a narrow tip at the top is left out",
     )
     ironing: bool = Field(
         False, description="true: the nozzle goes over uppermost skins once more, in dense lines; never where another part comes"

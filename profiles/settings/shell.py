@@ -49,8 +49,8 @@ class Shell(Frozen):
     )
     seam: Literal["aligned", "corner", "rear", "nearest", "random"] = Field(
         "aligned",
-        description="where walls begin: in one line over the layers where it is seen least, inner corners first; in inner then "
-        "outer corners; at the rear; nearest to the tip; or scattered; never on the edge of an interface",
+        description="where walls begin: in one line over the layers where it is seen least, in corners rather than on faces; in "
+        "inner then outer corners; at the rear; nearest to the tip; or scattered; never on the edge of an interface",
     )
     seam_gap: float = Field(
         0.1,

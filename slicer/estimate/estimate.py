@@ -1,9 +1,9 @@
 """Estimate: print time and filament of parts from a few of their layers, sliced as for a print.
 
-A rough length of lines is known for every layer, from the mesh and from the support of thick layers. The layers are divided into
-runs of equal rough time. One layer of each run is sliced by the slicer's own code and timed with the machine's acceleration; the
-whole run differs from its rough figures by the same factor. Seams lie where the layer alone would have them. The estimate is for
-choosing between decompositions; the dry run has the exact figures.
+Sections and overhangs are those of the print, support grows in thick layers, and each layer has a rough length of lines. The
+layers are divided into runs of equal rough time. One layer of each run is sliced by the slicer's own code and timed with the
+machine's acceleration; the whole run differs from its rough figures by the same factor. Seams lie where the layer alone would
+have them. The estimate is for choosing between decompositions; the dry run has the exact figures.
 """
 
 from collections.abc import Sequence

@@ -25,7 +25,7 @@ TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must no
 
 
 def clip_pattern(border: EdgeIndex, angle_deg: float, draw: Draw) -> Pieces:
-    """What of a pattern, drawn in a frame turned by an angle, lies inside a border, in the border's own frame."""
+    """The part of a pattern inside a border, in the border's frame; the pattern is drawn in a frame turned by an angle."""
     if not len(border.edges):
         return NO_PIECES
     turn = rotation_2d(angle_deg)

@@ -108,7 +108,7 @@ def _row_crossings(segments: Floats, kind: int, apart_mm: float) -> tuple[Indice
 
 @kernel
 def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
-    """(n, 3) row, from and to, of skins that lack something to reach what holds them on either side, with what they lack there.
+    """(n, 3) row, from and to, of skins that end over a void on either side, grown to what holds them there.
 
     rows, x and kinds: of the crossings of each row, from left to right.
     """

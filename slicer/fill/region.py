@@ -11,8 +11,6 @@ THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut ne
 BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
 ANCHOR = 2.0  # line widths that solid layers under walls reach into the infill around, as a bridge reaches over its anchors
 FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
-
-
 LEAST_IRONED_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
 
 

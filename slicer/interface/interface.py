@@ -121,7 +121,7 @@ atexit.register(room_of.cache_clear)
 class BasePlane:
     """turn (3, 3) and shift (3,) carry a point of the earlier part's frame into the later part's: turn @ x + shift.
 
-    heights: of the earlier part's layers. Of a layer's two sides the one that comes nearer to the plane from below stands for it.
+    heights: of the earlier part's layers. A layer counts by the side that comes nearer to the plane from below.
     far_mm: how far from the origin of the earlier frame its layers reach. places: the area of the plane that counts, where the
     later part is a limb; None: all of it.
     """
@@ -141,7 +141,7 @@ class BasePlane:
 
     @property
     def cosine(self) -> float:
-        """Of the angle between the two directions."""
+        """The cosine of the angle between the two directions."""
         return float(self.turn[2, 2])
 
     def z_mm(self, layer: int) -> float:
@@ -164,7 +164,7 @@ class BasePlane:
         return range(int(np.searchsorted(self.heights.tip_mm, low)), int(np.searchsorted(self.heights.bottom_mm, high)))
 
     def band(self, layer: int, low_mm: float, high_mm: float) -> Polygons:
-        """What of a layer lies low_mm to high_mm above the plane (below it: negative), over or under the places that count."""
+        """The part of a layer low_mm to high_mm above the plane (negative: below it), over or under the places that count."""
         whole = self._whole_band(layer, low_mm, high_mm)
         if self.places is None or whole.is_empty():
             return whole
@@ -189,7 +189,7 @@ class BasePlane:
         return places.transform(np.column_stack([turn, shift]))
 
     def shadow(self, places: Polygons, layer: int) -> Polygons:
-        """What of a layer lies straight over or under places on the plane."""
+        """The part of a layer straight over or under places on the plane."""
         turn, shift = self._onto_plane(self.z_mm(layer))
         back = np.linalg.inv(turn)
         return places.transform(np.column_stack([back, -back @ shift]))

@@ -273,7 +273,7 @@ def _look_up(asked: Floats, samples: Floats) -> Floats:
 
 @kernel
 def choose(xy: Floats, cost: Floats, first: Indices, layer: Indices) -> Floats:
-    """(k, 2) the place of each outline, of all choices the one that costs least together.
+    """(k, 2) the place of each outline, chosen for the least total cost.
 
     xy: (n, 2) places, outline after outline from the lowest layer up; cost: (n,) of each; first: (k + 1,) where each outline's
     begin; layer: (k,) of each outline.
@@ -311,7 +311,7 @@ def choose(xy: Floats, cost: Floats, first: Indices, layer: Indices) -> Floats:
 
 @helper
 def _cheapest(xy: Floats, best: Floats, first: Indices, outline: int, below: int) -> tuple[int, float]:
-    """The place of an outline that costs least with all on it and the way to it from a place below, and that cost; below -1:
+    """The cheapest place of an outline, counting all that stands on it and the way from a place below, and its cost; below -1:
     there is none."""
     least, taken = np.inf, first[outline]
     for p in range(first[outline], first[outline + 1]):

@@ -30,7 +30,7 @@ AMONG = 0.45  # else as near to its middle as the walls themselves
 TAUT = 3.0  # a detour along the border may be longer than allowed by this factor before it is pulled taut
 NOWHERE = np.zeros((0, 2))
 STANDING_MM = 1e-6
-ROUND = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
+ROUND = 4.0  # a path whose ends lie nearer than its width, and that is longer than this many widths, runs round
 
 
 def travels(

@@ -264,7 +264,7 @@ def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], 
 
 
 def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_mm: float) -> Standing:
-    """What of earlier parts' models stands above a limb's base plane; cell_mm: the grid on which it will be asked."""
+    """The parts of earlier models above a limb's base plane; cell_mm: the grid on which it will be asked."""
     points = [np.zeros((0, 3))]
     for part in earlier:
         mesh = in_frame_of(limb, part)

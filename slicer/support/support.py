@@ -36,7 +36,7 @@ UNWANTED = "no support is wanted there"
 MOST = 0.5  # share of a place that one reason has to hold for
 
 
-HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
+HEAP = 12  # layers united at a time: a sweep over all of them at once meets many more crossings
 
 
 @dataclass(frozen=True, eq=False)

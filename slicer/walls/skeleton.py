@@ -266,7 +266,7 @@ def middle_width(rule: Rule, count: int, radius: float) -> float:
 
 
 class Counts(NamedTuple):
-    """Of every node: beads across it, and the half thickness by which they are laid: its own, or of the axis it belongs to.
+    """For every node: beads across it, and the half thickness by which they are laid, its own or that of its axis.
 
     dots: the middles of round places with room for a single bead.
     """
@@ -369,7 +369,7 @@ def _smooth(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> bool:
 
 @no_nrt
 def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
-    """Whether so many beads fit into places from one half thickness to another with widths that can be printed."""
+    """Whether a number of beads fits places between two half thicknesses with printable widths."""
     if count == 0:
         return False
     rest_low, rest_high = 2.0 * low - rule.round, 2.0 * high - rule.round

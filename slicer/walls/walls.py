@@ -74,7 +74,7 @@ def layer_walls(section: Polygons, count: int, process: Process, height_mm: floa
 
 
 def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) -> Rule:
-    """The rule of so many walls of a process in layers of that height."""
+    """The rule for a number of walls of a process in layers of that height."""
     outer, inner = outer_wall_width_mm(process), process.line_width_mm
     taken = inner - spacing_mm(inner, height_mm)
     least = least_width_mm(nozzle_mm, height_mm)
@@ -159,7 +159,7 @@ def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> 
 
 
 def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> Polygons:
-    """What of an area lines of that width do not cover, as far as plastic fits into it."""
+    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it."""
     few_mm2 = FEW_MM2 * width_mm**2
     rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
     return larger(opening(larger(rest, few_mm2), 0.5 * LEAST_GAP * width_mm), few_mm2)

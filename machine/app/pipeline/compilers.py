@@ -5,7 +5,7 @@ cannot be had or fails, the work compiles by itself what is missing.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Sequence
 from contextlib import nullcontext
 from threading import Condition, Thread
 
@@ -38,7 +38,7 @@ class Compilers:
         self._announced = False
         self._changed = Condition()
 
-    def begin(self, bundles: Iterable[str]) -> None:
+    def begin(self, bundles: Sequence[str]) -> None:
         """Have the bundles compiled that are not cached yet, the first ones first."""
         new = [bundle for bundle in bundles if bundle not in self._asked and not trouble() and not is_cached(bundle)]
         with self._changed:
@@ -49,7 +49,7 @@ class Compilers:
         for _ in range(start):
             harmless(Thread(target=self._work, daemon=True)).start()
 
-    def wait_for(self, bundles: Iterable[str], report: Report | None = None) -> None:
+    def wait_for(self, bundles: Sequence[str], report: Report | None = None) -> None:
         """Return when the bundles are compiled, or cannot be in a process of their own; report: where progress is shown."""
         self.begin(bundles)
         if self._ready(bundles):
@@ -63,7 +63,7 @@ class Compilers:
                 with self._changed:
                     self._changed.wait(LOOK_S)
 
-    def _ready(self, bundles: Iterable[str]) -> bool:
+    def _ready(self, bundles: Sequence[str]) -> bool:
         return not self._working or all(bundle not in self._asked or bundle in self._done for bundle in bundles)
 
     def _work(self) -> None:

@@ -182,7 +182,7 @@ def _tell_kernel() -> None:
 
 
 def compile_bundle(name: str) -> None:
-    """In such a process: compile a bundle; each kernel is told. Raises OSError where nothing that is compiled can be kept."""
+    """In a worker: compile a bundle and report each kernel. Raises OSError where compiled kernels cannot be kept."""
     _prepare()
     BUNDLES[name]()
     if trouble():

@@ -46,11 +46,11 @@ def reporting() -> Iterator[Report]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    before = {*threading.enumerate()}
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        for drawing in {*threading.enumerate()} - before:
-            harmless(drawing)
+        for thread in threading.enumerate():
+            if type(thread).__module__.startswith("rich."):  # it draws the bar, on a stream that a copy of this process reopens
+                harmless(thread)
         task = progress.add_task("", total=None)
 
         def show(text: str, share: float | None = None) -> None:

@@ -569,7 +569,7 @@ def test_the_command_lists_the_prints_that_can_be_resumed_and_no_others(
     assert capsys.readouterr().err.endswith("at which port is the printer? --port PORT is expected\n")
 
 
-def test_a_journal_that_is_not_there_is_told_before_a_port_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_journal_is_reported_before_a_port_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["resume", "not-there.journal"]) == 1
     assert capsys.readouterr().err == "tiltprint: journal not-there.journal cannot be read: no such file or directory\n"
 

@@ -57,7 +57,7 @@ class RunningPrint:
         """Have it printed by a process of its own, to the end."""
         process = Interpreter(MAIN)
         await asyncio.to_thread(process.say, self._order)  # a long one is read when the process has loaded what it needs
-        self._process = process  # and is told more from now on
+        self._process = process  # and follows what it does from now on
         if self._given_up or self._emergency:
             self._kill()
         ended = lost = False

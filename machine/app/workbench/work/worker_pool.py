@@ -11,7 +11,7 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from machine.app.workbench.work.heard import heard
-from mdp.kernels.workers import KilledError, Tell, Worker
+from mdp.kernels.workers import CallError, KilledError, Tell, Worker
 from profiles.errors import UserError
 
 REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
@@ -63,7 +63,9 @@ class WorkerPool:
 
     def _take(self, tasks: "TaskQueue") -> Worker:
         """The process that these tasks had last, else a new one, else the one that has rested longest."""
-        self._idle = [worker for worker in self._idle if worker.ready]
+        for worker in [worker for worker in self._idle if not worker.ready]:
+            self._idle.remove(worker)
+            worker.end()
         own = [worker for worker in self._idle if self._had_by[worker] is tasks]
         if own or not self.may_start:
             worker = (own or self._idle)[0]
@@ -99,7 +101,7 @@ class TaskQueue:
         """Start a process before it is needed, if there may be one more."""
         async with self._lock:
             if self.pool.may_start:
-                with suppress(KilledError):  # whoever asks the next one is told
+                with suppress(CallError):  # whoever asks the next one gets the error
                     await self._ask(LOAD)
 
     async def run(self, task: str, *given: Any, tell: Tell = lambda value: None) -> Any:
