@@ -32,7 +32,7 @@ LENGTH = struct.Struct("<Q")
 TELLS, DONE, FAILED = "tells", "done", "failed"
 SPARE_S = 1.0  # so much longer than we would ask it a worker waits
 ONE_CORE = {"OPENBLAS_NUM_THREADS": "1"}  # numpy's library for products would take all cores
-OOM_SCORE = "/proc/self/oom_score_adj", "500"  # where memory ends, Linux kills a worker and not the one that asks
+OOM_SCORE = "/proc/self/oom_score_adj", "500"  # when memory runs out, Linux kills a worker rather than its parent
 
 
 class CallError(Exception):
@@ -40,7 +40,7 @@ class CallError(Exception):
 
 
 class KilledError(CallError):
-    """The process of a call ended under it, which need not happen again."""
+    """The worker died during the call; another try may succeed."""
 
 
 def frame(value: Any) -> bytes:
@@ -98,7 +98,7 @@ class Interpreter:
         self._in, self._out = self.process.stdin, self.process.stdout
 
     def say(self, value: Any) -> None:
-        """Something to the process; what it does not hear any more is not missed."""
+        """Send a value to the process; ignored if it has already ended."""
         with suppress(OSError, ValueError):  # it has ended, or we have ended it
             self._in.write(frame(value))
             self._in.flush()
@@ -109,7 +109,7 @@ class Interpreter:
         self.process.wait()
 
     def end(self) -> None:
-        """Kill it with all that it has started; it is gone then."""
+        """Kill the process and everything it started, and wait until it is gone."""
         if self.process.poll() is None:
             with suppress(ProcessLookupError, PermissionError):
                 if hasattr(os, "killpg"):
@@ -132,7 +132,7 @@ class Worker(Interpreter):
 
     @property
     def ready(self) -> bool:
-        """Whether it can be asked; one that has rested for long ends, and another one has to be started in its place."""
+        """Whether it can be asked; a worker that has been idle too long ends and must be replaced."""
         return self.process.poll() is None and monotonic() - self._rests_since_s < self._idle_s
 
     def ask(self, task: Task, *given: Any) -> Iterator[tuple[bool, Any]]:
@@ -199,7 +199,7 @@ def _send(message: bytes) -> None:
 
 def serve(one_core: bool, idle_s: float) -> None:
     """In a worker: do what is asked until nobody can ask any more, or nobody does for so long."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asks decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C does
     asked, answers = take_pipes()
     _answers.append(answers)
     with suppress(OSError), open(OOM_SCORE[0], "w") as score:

@@ -32,8 +32,8 @@ from slicer.strokes.seam_plan import NO_LIMITS, rear_of
 from slicer.support.support import Supports
 
 SAMPLES = 12  # layers of a print that are sliced: what they miss is 2 % in the mean, with 7 layers 3 %
-FEWEST = 6  # of them that a part has
-RUN = 15  # layers that one of them stands for at least: of a small print the others would take as long as all
+FEWEST = 6  # samples of a part
+RUN = 15  # layers a sample stands for, at least: with more samples a small print would take as long as slicing all of it
 LAYER_S = 0.3  # for the ways between strokes of even the smallest layer
 SLOWER = 1.4  # strokes with their accelerations and travels than their lengths at their speeds
 TINY_MM3 = 1e-6

@@ -44,7 +44,7 @@ TURN_DEG = 60.0  # a third of the half turn after which lines are themselves aga
 
 
 def infill_cell_mm(process: Process) -> float:
-    """How far apart lines of the sparse infill lie at most, mm: what solid lines laid over it have to span; 0 without infill."""
+    """About how far apart lines of the sparse infill lie, mm: what solid lines laid over it have to span; 0 without infill."""
     width = process.infill_line_width_mm or process.line_width_mm
     spacing, density = spacing_mm(width, process.layer_height_mm), process.infill_density
     return FAMILIES.get(process.infill_pattern, 1) * spacing / density if density > 0.0 else 0.0

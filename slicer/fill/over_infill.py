@@ -23,7 +23,7 @@ HOLDS = 0.75  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
 KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid
-MOST_ROUNDS = 4  # what becomes solid this way may itself end in mid-air
+MOST_ROUNDS = 4  # newly solid places may themselves end over a void
 SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
 
 Indices = NDArray[np.int64]
@@ -34,7 +34,7 @@ def anchored(
 ) -> Region:
     """The region with its skins grown along lines at an angle, so that all of these end on something.
 
-    sparse_below: what is sparse of the layer below; infill_below: the lines (n, 2) in it, at most cell_mm apart.
+    sparse_below: what is sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart.
     """
     skin, sparse = region.solid + region.top, region.sparse
     if (skin ^ sparse_below).area() < width_mm**2:
@@ -76,7 +76,7 @@ def infill_bridges(region: Region, sparse_below: Polygons, width_mm: float) -> P
 def _extension(
     skin: Polygons, sparse_below: Polygons, infill_below: Sequence[Floats], angle_deg: float, width_mm: float
 ) -> Polygons:
-    """What the rows of a skin add to it."""
+    """The area by which a skin grows along its rows."""
     turn, apart_mm = rotation_2d(angle_deg), ROWS * width_mm
     lines = [np.hstack([line[:-1], line[1:]]) for line in infill_below]
     found = [

@@ -5,6 +5,7 @@ with no plastic and ends with all; a last one at the height of the top ends with
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,7 +21,7 @@ from slicer.paths import Kind, Layer, Path, bead_area_mm2
 from slicer.sectioning import Sections
 from slicer.strokes.speed import fan_share, rising_fan
 
-TIP = 4.0  # widths of the wall: a cone ends where its outline is no larger than a square with such a side
+SHRINKS = 0.999  # of the area of the layer below
 PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
 
@@ -39,7 +40,7 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
             "process.support = none leaves it out"
         )
     half_mm, end = 0.5 * outer_wall_width_mm(profile.process), len(outlines)
-    while end > first and outlines[end - 1].area() < (2.0 * TIP * half_mm) ** 2:
+    while end > first + 1 and _is_tip(outlines[end - 1], outlines[end - 2], half_mm):
         end -= 1
     loops = [_loop(outlines[k], float(heights.tip_mm[k]), half_mm) for k in range(first, end)]
     layers: list[Layer] = []
@@ -50,6 +51,12 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
     if loops:
         layers[-1] = _closed(layers[-1], _begun_near(loops[-1], tip, joined=True))
     return layers
+
+
+def _is_tip(outline: Polygons, below: Polygons, half_mm: float) -> bool:
+    """Whether no wall fits into a layer, for the model ends in a point there: it gets narrower from layer to layer."""
+    shrinks = outline.is_empty() or outline.area() < SHRINKS * below.area()
+    return shrinks and offset(outline, -half_mm).is_empty()
 
 
 def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
@@ -88,7 +95,9 @@ def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floa
     slowed = length / least_s if least_s > 0.0 else fastest
     speed = max(min(fastest, slowed), min(fastest, process.least_speed_mm_s))
     fan = rising_fan(material, k) * fan_share(material, process, length / speed)
-    whole = Path(Kind.OUTER_WALL, turn, width, speed, material.flow, NO_APPROACH, shares is not None, below_mm=(height_mm, 0.0))
+    # No wipe goes back down a turn: the tip would plough through the ones below where they are small.
+    climb, pulled = (height_mm, 0.0), shares is not None
+    whole = Path(Kind.OUTER_WALL, turn, width, speed, material.flow, NO_APPROACH, pulled, below_mm=climb, wiped=False)
     return Layer.of(z_mm, height_mm, (whole,) if shares is None else _pieces(whole, shares, height_mm), fan)
 
 
@@ -112,7 +121,5 @@ def _pieces(path: Path, shares: Floats, climb_mm: float) -> tuple[Path, ...]:
         points = np.concatenate([ends[:1], inner, ends[1:]])
         below = (climb_mm * (1.0 - k / (len(shares) - 1)), climb_mm * (1.0 - (k + 1) / (len(shares) - 1)))
         flow = path.flow * 0.5 * float(shares[k] + shares[k + 1])
-        pieces.append(
-            Path(path.kind, points, path.width_mm, path.speed_mm_s, flow, NO_APPROACH, path.retract and k == 0, below_mm=below)
-        )
+        pieces.append(replace(path, points=points, flow=flow, retract=path.retract and k == 0, below_mm=below))
     return tuple(pieces)

@@ -205,7 +205,7 @@ def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
     """Layers that no line is narrow enough for, with what is above them; the tip that a vase ends below."""
     for part in sliced:
         if part.too_thin and profile.process.spiral_vase and part.layers[-1].z_mm <= part.too_thin_mm + 1e-6:
-            yield f"the vase ends at {part.too_thin_mm:.2f} mm: its tip above is too narrow for a wall to climb round"
+            yield f"the vase stops at {part.too_thin_mm:.2f} mm: above that the model is too narrow for a spiral wall"
         elif part.too_thin:
             where = f"of part {part.index} {part.too_thin} layer(s), the first at {part.too_thin_mm:.2f} mm"
             nozzle = f"a line of a {profile.machine.head.nozzle_mm:g} mm nozzle"

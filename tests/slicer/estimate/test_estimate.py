@@ -81,7 +81,7 @@ def test_support_is_told_apart_and_there_only_where_something_hangs() -> None:
 
 @pytest.mark.parametrize("thick_mm", [10.0, 0.8])
 def test_the_support_right_under_a_high_flat_arm_is_estimated(thick_mm: float) -> None:
-    """The estimate's layers are 2 mm high here: one of them has to be cut just above the arm's underside."""
+    """The arm's underside lies inside one of the estimate's thick layers."""
     post, arm = m3.Manifold.cube((12.0, 12.0, 110.0)), m3.Manifold.cube((60.0, 12.0, thick_mm)).translate((0.0, 0.0, 100.0))
     gallows = standing(post + arm)
     printed_mm3 = volume_mm3(slice_part(whole(gallows), profile()), Kind.SUPPORT, Kind.SUPPORT_INTERFACE)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from mdp.mesh import Floats
 from slicer.fill.over_infill import anchored
 from slicer.fill.region import Region
 from slicer.geometry.polygons import Polygons
@@ -69,6 +70,34 @@ def test_skins_that_face_each_other_over_a_void_without_infill_become_one() -> N
 def test_a_place_smaller_than_a_cell_of_infill_between_skins_becomes_solid() -> None:
     one = anchored(region(block(-3.0, 0.0, 8.0) - block(-3.0, 0.0, 5.0)), INSIDE, INFILL, 0.0, WIDTH, CELL).solid
     assert (block(-3.0, 0.0, 8.0) - one).is_empty()
+
+
+def test_small_infill_far_from_a_skin_that_grows_stays_infill() -> None:
+    far = block(-10.0, -10.0, 4.0)  # less than a cell
+    ring = block(-10.0, -10.0, 5.0) - far
+    sparse = INSIDE - ring - block(3.0, 6.0, 2.0)
+    before = Region(Polygons(), Polygons(), block(3.0, 6.0, 2.0), sparse, sparse)
+    grown = anchored(before, INSIDE - ring, INFILL, 0.0, WIDTH, CELL)
+    assert grown.solid.area() > 10.0
+    assert (far - grown.sparse).area() < 0.1
+
+
+def pit() -> m3.Manifold:
+    return m3.Manifold.cube((30, 30, 4)) - m3.Manifold.cube((3, 3, 1)).translate((13.5, 13.5, 3.2))
+
+
+def skin_below_the_pit(*settings: str) -> Floats:
+    """(2,) how far the skin of the layers just below the pit reaches from its middle, along the lines and across."""
+    keys = [f"process.{key}" for key in ("infill_pattern=rectilinear", "top_layers=3", "top_thickness_mm=0", "solid_below_mm2=0")]
+    layers = slice_part(whole(standing(pit())), profile(*BARE, *keys, *settings)).layers
+    paths = [path for layer in layers if 1.5 < layer.z_mm < 3.25 for path in layer.paths if path.kind in SKINS]
+    points = np.concatenate([path.points[:, :2] for path in paths])
+    return np.abs(points @ np.array([[1.0, 1.0], [1.0, -1.0]])).max(axis=0) / 2.0**0.5
+
+
+def test_the_skin_below_a_pit_grows_to_the_next_lines_and_not_to_the_walls() -> None:
+    half_mm, cell_mm = 3.0 / 2.0**0.5, 0.41 / 0.15  # of the pit's diagonal, and between lines
+    assert (skin_below_the_pit("process.infill_density=0.15") < half_mm + cell_mm + 2.0).all()
 
 
 @pytest.mark.parametrize("pattern", ["rectilinear", "grid", "gyroid", "cubic"])

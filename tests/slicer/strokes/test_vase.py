@@ -26,18 +26,34 @@ def cup() -> Mesh:
 
 
 @pytest.mark.parametrize("sides", [4, 96])
-def test_a_cone_ends_where_its_tip_is_no_wider_than_four_walls(sides: int) -> None:
+def test_a_cone_ends_where_no_wall_fits_into_its_tip(sides: int) -> None:
     cone = standing(m3.Manifold.cylinder(30, 12, 0, sides))
     sliced = slice_part(whole(cone), profile(*VASE))
-    top_mm = 30.0 * (1.0 - 2.0 * 0.45 / (12.0 * np.cos(np.pi / sides)))  # where the inscribed circle is as wide as four walls
-    assert sliced.too_thin_mm == pytest.approx(top_mm, abs=0.5)
-    assert sliced.layers[-1].z_mm == pytest.approx(sliced.too_thin_mm, abs=0.21)
+    top_mm = 30.0 * (1.0 - 0.5 * 0.45 / (12.0 * np.cos(np.pi / sides)))  # where the inscribed circle is as wide as a wall
+    assert sliced.too_thin_mm == pytest.approx(top_mm, abs=0.25)
+    assert sliced.layers[-1].z_mm == pytest.approx(sliced.too_thin_mm, abs=0.01)
 
 
-def test_a_slab_that_is_hardly_wider_than_two_walls_is_climbed_to_its_top() -> None:
-    sliced = slice_part(whole(box(40, 1.5, 8)), profile(*VASE))
+@pytest.mark.parametrize("sides", [4, 96])
+def test_the_tip_does_not_plough_through_a_cone_when_its_print_ends(sides: int) -> None:
+    part, settings = whole(standing(m3.Manifold.cylinder(30, 12, 0, sides))), profile(*VASE)
+    decomposition = Decomposition("cone", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    program = plan(decomposition, slice_parts([part], settings), settings)
+    findings = dry_run(tuple(write_gcode(program, settings)), settings).findings
+    assert [finding for finding in findings if finding.severity == "error"] == []
+
+
+@pytest.mark.parametrize("mesh", [box(40, 1.5, 8), box(1, 1, 8), standing(m3.Manifold.cylinder(8, 0.9, 0.9, 48))])
+def test_a_thin_body_without_a_tip_is_climbed_to_its_top(mesh: Mesh) -> None:
+    sliced = slice_part(whole(mesh), profile(*VASE))
     assert sliced.too_thin == 0
     assert sliced.layers[-1].z_mm == pytest.approx(8.0)
+
+
+def test_a_needle_in_which_no_wall_fits_is_refused() -> None:
+    needle = m3.Manifold.cylinder(2, 8, 8, 48) + m3.Manifold.cylinder(12, 0.18, 0.18, 24)
+    with pytest.raises(SliceError, match="a place too narrow for a wall"):
+        slice_part(whole(standing(needle)), profile(*VASE))
 
 
 def test_the_wall_climbs_evenly_from_the_bottom_to_the_top() -> None:
