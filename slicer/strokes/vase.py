@@ -56,7 +56,7 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
 def _is_tip(outline: Polygons, below: Polygons, half_mm: float) -> bool:
     """Whether no wall fits into a layer, for the model ends in a point there: it gets narrower from layer to layer."""
     shrinks = outline.is_empty() or outline.area() < SHRINKS * below.area()
-    return shrinks and offset(outline, -half_mm).is_empty()
+    return bool(shrinks and offset(outline, -half_mm).is_empty())
 
 
 def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
