@@ -273,7 +273,7 @@ def diameter_mm(mesh: Mesh) -> float:
     """The greatest distance between two vertices of the convex hull, of a fine one between some of them."""
     corners = convex_hull(mesh.vertices).vertices
     corners = corners[:: max(1, len(corners) // MOST_CORNERS)]
-    return max(float(np.linalg.norm(corners - corner, axis=1).max()) for corner in corners)
+    return float(np.sqrt(((corners[:, None] - corners) ** 2).sum(axis=2).max()))
 
 
 def centre_of_mass(mesh: Mesh) -> Floats:

@@ -130,12 +130,13 @@ class OrientationForecast:
 
 
 def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[OrientationForecast]:
-    """A model as it stands, then in the first other orientations; infinite where it cannot be printed so."""
+    """A model as it stands, then in the first other orientations; infinite where it cannot be printed so, and where there is no
+    other orientation to compare it with."""
     worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
     footed = _with_footing(mesh, profile, most=FORECAST)
     upright = footed[0][0]
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
-    prices = parallel_map(lambda k: _price_bare(meshes[k], profile, pricing), len(meshes))
+    prices = parallel_map(lambda k: _price_bare(meshes[k], profile, pricing), len(meshes)) if len(meshes) > 1 else [None]
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
     for (orientation, footing), turned, bare in zip(footed, meshes, prices, strict=True):
         footing_mm2 = surface_mm2 * (footing_share(footing) + (0.0 if orientation is upright else TURNED))
