@@ -28,7 +28,7 @@ from slicer.bead import (
     wall_rank,
     with_line_width,
 )
-from slicer.fill.infill import infill_beads, infill_cell_mm, pattern_density
+from slicer.fill.infill import infill_beads, infill_cell_mm, pattern_density, plan_lightning
 from slicer.fill.over_infill import ANCHORED, anchored, infill_bridges
 from slicer.fill.region import Cover, Region, ironed_areas, regions
 from slicer.fill.skin import SolidLines, skin_lines
@@ -88,11 +88,13 @@ class Shell:
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """A part's layers with the support planned for it; density: of the sparse infill's pattern."""
+    """A part's layers with the support planned for it; density: of the sparse infill's pattern; lightning: its lines (n, 2) in
+    every layer, where it is that pattern."""
 
     supports: Supports
     layers: Sequence[Shell]
     density: float
+    lightning: Sequence[Sequence[Floats]]
 
     @property
     def sections(self) -> Sections:
@@ -112,7 +114,8 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     model = model_sections(sections)
     heights_mm, count = sections.heights.height_mm.tolist(), len(processes)
     # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
-    runs = [range(count)] if layers is None else [range(max(k - 1, 0), k + 1) for k in layers]
+    whole = layers is None or process.infill_pattern == "lightning"  # what holds a layer is planned from the top
+    runs = [range(count)] if whole else [range(max(k - 1, 0), k + 1) for k in layers or ()]
     needed = sorted({layer for run in runs for layer in run})
 
     def contours_of(place: int) -> Contours:
@@ -133,7 +136,8 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     infill = with_line_width(process, process.infill_line_width_mm)
     density = pattern_density([region.sparse for region in filled], infill, process.layer_height_mm)
-    filled = anchor_skins(filled, processes, density, sections)
+    lightning = plan_lightning([region.sparse for region in filled], sections.own, infill, sections.heights.height_mm)
+    filled = filled if lightning else anchor_skins(filled, processes, density, sections)  # branches come to the skins' ends
     return Shells(
         supports,
         [
@@ -141,6 +145,7 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
             for own, (walls, ending, _), region, spans, smooth in zip(processes, walled, filled, bridges, ironed, strict=True)
         ],
         density,
+        lightning,
     )
 
 
@@ -318,7 +323,10 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         beads += gaps(around, width_mm, height_mm)
     beads += ironing_beads(shell.ironed, lines, process)
     sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
-    return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
+    lightning = shells.lightning[layer] if shells.lightning else ()
+    return beads + infill_beads(
+        region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm, lightning=lightning
+    )
 
 
 def _moat(bridge: Polygons, sparse: Polygons, cell_mm: float) -> Polygons:

@@ -29,7 +29,7 @@ PATTERNS = {
     **dict.fromkeys(("cubic", "adaptivecubic", "supportcubic"), "cubic"),
     **dict.fromkeys(("triangles", "stars"), "triangles"),
     **dict.fromkeys(("honeycomb", "3dhoneycomb"), "honeycomb"),
-    **{name: name for name in ("grid", "gyroid", "concentric")},
+    **{name: name for name in ("grid", "gyroid", "concentric", "lightning")},
 }
 SEAMS = {"aligned": "aligned", "rear": "rear", "nearest": "nearest", "random": "random"}
 STYLES = {

@@ -46,7 +46,7 @@ FINISH = {
 }
 INFILL = {
     "infill_density": simple("Infill density", "fill density sparse percent"),
-    "infill_pattern": simple("Infill pattern", "fill pattern sparse"),
+    "infill_pattern": simple("Infill pattern", "fill pattern sparse lightning"),
     "infill_angle_deg": advanced("Infill angle", "fill direction"),
     "infill_overlap": advanced("Infill overlap with walls", "perimeters encroachment"),
     "infill_anchor_mm": rare("Infill anchor length", "anchor"),

@@ -11,9 +11,12 @@ class Infill(Frozen):
     """What fills the inside."""
 
     infill_density: float = Field(0.2, ge=0, le=1, description="share of the inside that is filled")
-    infill_pattern: Literal["rectilinear", "grid", "triangles", "cubic", "gyroid", "honeycomb", "concentric"] = Field(
-        "grid",
-        description="pattern of the sparse infill, cubic and gyroid are equally stiff all ways; a density of 1 is always solid",
+    infill_pattern: Literal["rectilinear", "grid", "triangles", "cubic", "gyroid", "honeycomb", "concentric", "lightning"] = (
+        Field(
+            "grid",
+            description="pattern of the sparse infill: cubic and gyroid are equally stiff all ways, lightning only holds what is "
+            "solid above it; a density of 1 is always solid",
+        )
     )
     infill_angle_deg: float = Field(45.0, ge=0, le=360, description="direction of the infill lines in the part's frame, deg")
     infill_overlap: float = Field(

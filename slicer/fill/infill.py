@@ -17,6 +17,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
+from slicer.fill.lightning import clip_chains, lightning_lines
 from slicer.fill.lines import (
     Box,
     LinePattern,
@@ -57,7 +58,7 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     """
     asked = process.infill_density
     filled = [i for i, area in enumerate(areas) if not area.is_empty()]
-    if not filled or asked <= 0:
+    if not filled or asked <= 0 or process.infill_pattern == "lightning":
         return asked
     chosen = sorted({filled[(2 * k + 1) * len(filled) // (2 * SAMPLES)] for k in range(SAMPLES)})
     spacing = spacing_mm(process.line_width_mm, height_mm)
@@ -76,21 +77,55 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     return drawn
 
 
-def infill_beads(area: Polygons, process: Process, *, density: float, layer: int, z_mm: float, height_mm: float) -> list[Bead]:
-    """Beads of the process's pattern in an area of a layer; density (0..1) of the pattern as pattern_density() gives it."""
+def infill_beads(
+    area: Polygons,
+    process: Process,
+    *,
+    density: float,
+    layer: int,
+    z_mm: float,
+    height_mm: float,
+    lightning: Sequence[Floats] = (),
+) -> list[Bead]:
+    """Beads of the process's pattern in an area of a layer; density (0..1) of the pattern as pattern_density() gives it.
+
+    lightning: the layer's lines of that pattern, which are planned for all layers together.
+    """
     width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
-    overlap = process.infill_overlap if process.walls else 0.0
-    inner = area if area.is_empty() else offset(area, -(0.5 * spacing - overlap * width))
+    inner = _inner(area, process, spacing)
     if density <= 0 or inner.is_empty():
         return []
     if process.infill_pattern == "concentric":
         lines = _concentric(inner, spacing, density)
+    elif process.infill_pattern == "lightning":
+        lines = clip_chains(lightning, inner, width)
     else:
         border = index_edges(inner)
         families = pattern_lines(process, layer, z_mm, spacing, density)
         pieces = merge_pieces([clip_pattern(border, angle_deg, draw) for angle_deg, draw in families])
         lines = anchor_lines(pieces, border, process.infill_joint_mm, process.infill_anchor_mm, width)
     return [Bead(Kind.INFILL, line, width, RANK) for line in lines if length_mm(line) > width]
+
+
+def _inner(area: Polygons, process: Process, spacing_mm: float) -> Polygons:
+    """Where the middles of infill lines may be: as near to the walls as lines are apart, and by infill_overlap nearer."""
+    overlap = process.infill_overlap if process.walls else 0.0
+    return area if area.is_empty() else offset(area, -(0.5 * spacing_mm - overlap * process.line_width_mm))
+
+
+def plan_lightning(
+    sparse: Sequence[Polygons], sections: Sequence[Polygons], process: Process, heights_mm: Floats
+) -> list[list[Floats]]:
+    """The lines of the lightning pattern in every layer of a part; none where the process has another pattern.
+
+    sparse: the places of the infill; sections: the part's own.
+    """
+    if process.infill_pattern != "lightning" or process.infill_density <= 0.0:
+        return []
+    solid = [section - area for section, area in zip(sections, sparse, strict=True)]
+    spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
+    insides = [_inner(area, process, spacing) for area in sparse]
+    return lightning_lines(insides, solid, infill_cell_mm(process), heights_mm)
 
 
 def pattern_lines(process: Process, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:

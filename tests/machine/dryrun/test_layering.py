@@ -18,6 +18,7 @@ from tests.slicer.hand import whole
 
 SETTINGS = [
     *((f"process.infill_pattern={pattern}",) for pattern in ("grid", "rectilinear", "triangles", "cubic", "gyroid", "honeycomb")),
+    ("process.infill_pattern=lightning",),
     *((f"process.infill_density={density}",) for density in (0.0, 0.05, 0.1, 0.45, 0.6, 1.0)),
     ("process.walls=1",), ("process.walls=0",), ("process.layer_height_mm=0.3",), ("process.top_layers=1",),
     ("process.layer_height_mm=0.15",),

@@ -1,0 +1,292 @@
+"""Lightning: infill that is there only to hold what is solid above it.
+
+Trees grow out of the walls: every place of the sparse infill under something solid lies near a branch. Planned from the top
+down, a branch gets shorter at its tip and straighter in every layer, by no more than what overhangs may, until nothing of it is
+left; so each layer prints over the one below (Tricard et al., "Ribbed Support Vaults for 3D Printing of Hollowed Objects", 2019).
+"""
+
+from collections.abc import Sequence
+from math import radians, tan
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import flags, floats, longs, table
+from mdp.kernels.kernel import helper, kernel
+from mdp.mesh import Floats, Indices
+from slicer.geometry.clip import cut_line
+from slicer.geometry.edge_index import EdgeIndex, crossings, depths, index_edges, lie_within, nearest, within
+from slicer.geometry.polygons import Polygons, contours
+from slicer.geometry.polyline import Segment, length_mm
+
+LEAN_DEG = 40.0  # from the vertical, by which a tip may go beyond the layer below
+STEP = 0.5  # cells between the nodes of a branch, and between the places that want one
+NEAR = 0.5  # cells within which a branch or a wall holds a place
+ON_WALL_MM = 1e-3  # a node so near to the wall stands on it
+
+
+class Trees(NamedTuple):
+    """The trees of a layer: nodes (n, 2), and the number of each node's parent, which comes before it; -1: it is a root."""
+
+    nodes: Floats
+    parent: Indices
+
+
+NO_TREES = Trees(np.zeros((0, 2)), np.zeros(0, np.int64))
+
+
+def lightning_lines(
+    insides: Sequence[Polygons], solid: Sequence[Polygons], cell_mm: float, heights_mm: Floats
+) -> list[list[Floats]]:
+    """The lines (n, 2), from root to tip, of every layer of a part, the lowest first.
+
+    insides: where a layer's infill may be; solid: what of a layer is not sparse, so that the layer below must hold it; cell_mm:
+    between branches under it; heights_mm: (n,) of the layers.
+    """
+    trees, lines = NO_TREES, []
+    for layer in range(len(insides) - 1, -1, -1):
+        lean_mm = float(heights_mm[layer]) * tan(radians(LEAN_DEG))
+        over = insides[layer] ^ solid[layer + 1] if layer + 1 < len(solid) else Polygons()
+        trees = _lower(trees, insides[layer], _wanting(over, cell_mm), (lean_mm, cell_mm))
+        lines.append(_chains(trees))
+    return lines[::-1]
+
+
+def clip_chains(chains: Sequence[Floats], area: Polygons, least_mm: float) -> list[Floats]:
+    """The pieces of some lines inside an area that are longer than least_mm."""
+    pieces = []
+    for chain in chains:
+        points, inside = cut_line(chain, area)
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
+        pieces += [points[begin : end + 1] for begin, end in ends.reshape(-1, 2).tolist()]
+    return [piece for piece in pieces if length_mm(piece) > least_mm]
+
+
+def _wanting(over: Polygons, cell_mm: float) -> Floats:
+    """(n, 2) places that a branch has to come near to: along the outlines of an area, then on a grid inside."""
+    if over.is_empty():
+        return np.zeros((0, 2))
+    step_mm = STEP * cell_mm
+    outlines = [_every(loop, step_mm) for loop in contours(over)]
+    x0, y0, x1, y1 = over.bounds()
+    x, y = (step_mm * (np.arange(np.floor(low / step_mm), np.ceil(high / step_mm)) + 0.5) for low, high in ((x0, x1), (y0, y1)))
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return np.concatenate([*outlines, grid[lie_within(index_edges(over), grid)]])
+
+
+def _every(loop: Floats, step_mm: float) -> Floats:
+    """Points of a loop (n, 2), at most step_mm apart along it."""
+    steps = np.roll(loop, -1, axis=0) - loop
+    many = np.maximum(np.ceil(np.hypot(*steps.T) / step_mm), 1.0).astype(np.int64)
+    which = np.repeat(np.arange(len(loop)), many)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(many) - many, many)) / many[which]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.T))[:-1]])[which] + share * np.hypot(*steps[which].T)
+    kept = np.concatenate([[True], np.diff(np.floor(way / step_mm)) > 0])
+    points: Floats = (loop[which] + share[:, None] * steps[which])[kept]
+    return points
+
+
+def _lower(trees: Trees, inside: Polygons, wanting: Floats, sizes_mm: tuple[float, float]) -> Trees:
+    """The trees of the layer below some: shorter and straighter, clipped to its inside, with what else is wanted there.
+
+    sizes_mm: by how much a tip may lean, and a cell.
+    """
+    if inside.is_empty() or not len(trees.nodes) + len(wanting):
+        return NO_TREES
+    border, (lean_mm, cell_mm) = index_edges(inside), sizes_mm
+    nodes, parent = _prune(*_straighten(trees, lean_mm), lean_mm)
+    if len(nodes):
+        nodes, parent = _ground(nodes, parent, border, STEP * cell_mm)
+    if len(wanting):
+        deep_mm = depths(wanting, border)
+        wanting = wanting[np.argsort(deep_mm, kind="stable")][np.sort(deep_mm) > NEAR * cell_mm]
+        nodes, parent = _grow(nodes, parent, wanting, border, (NEAR * cell_mm, STEP * cell_mm))
+    return Trees(nodes, parent)
+
+
+@kernel
+def _straighten(trees: Trees, most: float) -> tuple[Floats, Indices]:
+    """The trees with every node that has one child moved towards the middle between its neighbours, by at most a length."""
+    nodes, parent = trees.nodes, trees.parent
+    n = len(nodes)
+    children, child, moved = longs(n, 0), longs(n, 0), nodes.copy()
+    for k in range(n):
+        if parent[k] >= 0:
+            children[parent[k]] += 1
+            child[parent[k]] = k
+    for k in range(n):
+        if parent[k] < 0 or children[k] != 1:
+            continue
+        x = 0.5 * (nodes[parent[k], 0] + nodes[child[k], 0]) - nodes[k, 0]
+        y = 0.5 * (nodes[parent[k], 1] + nodes[child[k], 1]) - nodes[k, 1]
+        share = min(1.0, most / max(np.hypot(x, y), 1e-12))
+        moved[k, 0] += share * x
+        moved[k, 1] += share * y
+    return moved, parent
+
+
+@kernel
+def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indices]:
+    """The trees with a length taken off every tip; roots without branches go."""
+    n = len(nodes)
+    children, cut, keep = longs(n, 0), floats(n, -1.0), flags(n)
+    for k in range(n):
+        if parent[k] >= 0:
+            children[parent[k]] += 1
+    for k in range(n):
+        if children[k] == 0:
+            cut[k] = length
+    for k in range(n - 1, -1, -1):
+        p = parent[k]
+        if children[k] > 0 or p < 0:
+            keep[k] = children[k] > 0
+            continue
+        left = max(cut[k], 0.0)
+        long = np.hypot(nodes[k, 0] - nodes[p, 0], nodes[k, 1] - nodes[p, 1])
+        if left >= long:
+            children[p] -= 1
+            cut[p] = left - long
+            continue
+        keep[k] = True
+        for axis in range(2):
+            nodes[k, axis] += left / long * (nodes[p, axis] - nodes[k, axis])
+    return _kept(nodes, parent, keep)
+
+
+@helper
+def _kept(nodes: Floats, parent: Indices, keep: np.ndarray) -> tuple[Floats, Indices]:
+    """The nodes that are kept; parents of these are, too."""
+    number, n = longs(len(nodes), -1), 0
+    for k in range(len(nodes)):
+        if keep[k]:
+            number[k] = n
+            n += 1
+    out, above = table(n, 2), longs(n, -1)
+    for k in range(len(nodes)):
+        if keep[k]:
+            out[number[k], 0], out[number[k], 1] = nodes[k, 0], nodes[k, 1]
+            above[number[k]] = number[parent[k]] if parent[k] >= 0 else -1
+    return out, above
+
+
+@kernel
+def _ground(nodes: Floats, parent: Indices, border: EdgeIndex, step: float) -> tuple[Floats, Indices]:
+    """The trees clipped to a border: what is cut off stands on the wall where it was cut, and roots that do not get there go
+    on to the nearest wall."""
+    n, room = len(nodes), 0
+    ends = table(n, 2)  # where a node's way to its parent meets the wall, or the place of the wall that a root goes on to
+    inside, cut = flags(n), flags(n)
+    shares, crossed = floats(len(border.edges) + 1, 0.0), longs(len(border.edges) + 1, 0)
+    for k in range(n):
+        x, y, p = nodes[k, 0], nodes[k, 1], parent[k]
+        inside[k] = within(border, x, y)
+        if not inside[k]:
+            continue
+        if p >= 0:
+            many = crossings(border, Segment(x, y, nodes[p, 0], nodes[p, 1]), shares, crossed)
+            cut[k] = many > 0 or not inside[p]
+            share = shares[0] if many > 0 else 1.0
+            ends[k, 0], ends[k, 1] = x + share * (nodes[p, 0] - x), y + share * (nodes[p, 1] - y)
+        else:
+            ends[k, 0], ends[k, 1] = _on_wall(border, x, y)
+            cut[k] = np.hypot(ends[k, 0] - x, ends[k, 1] - y) > ON_WALL_MM
+        if cut[k]:
+            room += 2 + int(np.hypot(ends[k, 0] - x, ends[k, 1] - y) / step)
+    out, above, number, m = table(n + room, 2), longs(n + room, -1), longs(n, -1), 0
+    for k in range(n):
+        if not inside[k]:
+            continue
+        if cut[k]:
+            m = _branch(out, above, m, -1, (ends[k, 0], ends[k, 1]), (nodes[k, 0], nodes[k, 1]), step)
+        else:
+            out[m, 0], out[m, 1] = nodes[k, 0], nodes[k, 1]
+            above[m] = number[parent[k]] if parent[k] >= 0 else -1
+            m += 1
+        number[k] = m - 1
+    return out[:m].copy(), above[:m].copy()
+
+
+@helper
+def _on_wall(border: EdgeIndex, x: float, y: float) -> tuple[float, float]:
+    """The nearest place of a border."""
+    reach = border.grid.size_mm
+    while reach < 1e7:
+        nx, ny, which = nearest(border, x, y, reach)
+        if which >= 0:
+            return nx, ny
+        reach *= 2.0
+    return x, y
+
+
+@helper
+def _branch(
+    out: Floats, above: Indices, m: int, since: int, begin: tuple[float, float], end: tuple[float, float], step: float
+) -> int:
+    """Adds the nodes from a node, or from a root where since is -1, to a place; returns how many nodes there are then."""
+    if since < 0:
+        out[m, 0], out[m, 1], above[m] = begin[0], begin[1], -1
+        since, m = m, m + 1
+    many = 1 + int(np.hypot(end[0] - begin[0], end[1] - begin[1]) / step)
+    for k in range(1, many + 1):
+        for axis in range(2):
+            out[m, axis] = begin[axis] + k / many * (end[axis] - begin[axis])
+        above[m] = since
+        since, m = m, m + 1
+    return m
+
+
+@kernel
+def _grow(
+    nodes: Floats, parent: Indices, wanting: Floats, border: EdgeIndex, sizes: tuple[float, float]
+) -> tuple[Floats, Indices]:
+    """The trees with a branch to every wanted place that none comes near to, from the nearest node or wall.
+
+    sizes: how near a branch has to come, and how far apart nodes are.
+    """
+    near, step = sizes
+    ways = table(len(wanting), 2)
+    room = len(nodes)
+    for k in range(len(wanting)):
+        ways[k, 0], ways[k, 1] = _on_wall(border, wanting[k, 0], wanting[k, 1])
+        room += 2 + int(np.hypot(ways[k, 0] - wanting[k, 0], ways[k, 1] - wanting[k, 1]) / step)
+    out, above, m = table(room, 2), longs(room, -1), len(nodes)
+    for k in range(m):
+        out[k, 0], out[k, 1], above[k] = nodes[k, 0], nodes[k, 1], parent[k]
+    for k in range(len(wanting)):
+        x, y = wanting[k, 0], wanting[k, 1]
+        best, which, held = np.hypot(ways[k, 0] - x, ways[k, 1] - y), -1, False
+        for node in range(m):
+            far = np.hypot(out[node, 0] - x, out[node, 1] - y)
+            held = held or far <= near
+            if far < best:
+                best, which = far, node
+        if held:
+            continue
+        begin = (ways[k, 0], ways[k, 1]) if which < 0 else (out[which, 0], out[which, 1])
+        m = _branch(out, above, m, which, begin, (x, y), step)
+    return out[:m].copy(), above[:m].copy()
+
+
+def _chains(trees: Trees) -> list[Floats]:
+    """The trees as lines from root to tip, the longest first; every other line begins on the one that it leaves."""
+    nodes, parent = trees
+    if not len(nodes):
+        return []
+    long_mm, after = np.zeros(len(nodes)), np.full(len(nodes), -1)
+    for k in range(len(nodes) - 1, -1, -1):
+        p = parent[k]
+        if p >= 0:
+            reach_mm = long_mm[k] + float(np.hypot(*(nodes[k] - nodes[p])))
+            if after[p] < 0 or reach_mm > long_mm[p]:
+                long_mm[p], after[p] = reach_mm, k
+    lines = []
+    for k in range(len(nodes)):
+        p = parent[k]
+        if p >= 0 and after[p] == k:
+            continue
+        chain = [k] if p < 0 else [p, k]
+        while after[chain[-1]] >= 0:
+            chain.append(int(after[chain[-1]]))
+        if len(chain) > 1:
+            lines.append(nodes[chain])
+    return lines
