@@ -10,13 +10,15 @@ layer to layer, so that every side is double in one layer of three.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import cos, pi, sin, sqrt
 
 import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, spacing_mm
+from profiles.settings.infill import Infill
+from slicer.bead import Bead, spacing_mm, with_line_width
 from slicer.fill.lines import (
     Box,
     LinePattern,
@@ -28,10 +30,13 @@ from slicer.fill.lines import (
 )
 from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, close_loop, contours, offset
+from slicer.geometry.polygons import Polygons, close_loop, closing, contours, islands, offset, opening, union
 from slicer.geometry.polyline import length_mm
+from slicer.modifiers import SLIT_MM, Place
 from slicer.paths import Kind
 
+DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
+TOUCHING_MM = 0.01  # places so near to each other are one
 RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}  # of straight families
@@ -41,6 +46,56 @@ MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pa
 GYROID_LENGTH = 2.454
 GYROID_STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
 TURN_DEG = 60.0  # a third of the half turn after which lines are themselves again
+
+
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """A sparse infill: the place that has it, None: all that no later one takes; density: that its pattern is drawn with."""
+
+    place: Place | None
+    density: float
+
+    def process(self, process: Process) -> Process:
+        """The settings of a layer for this infill, with the width of its lines."""
+        own = process if self.place is None else self.place.over(process)
+        return with_line_width(own, own.infill_line_width_mm)
+
+
+def plan_fillings(sparse: Sequence[Polygons], process: Process, places: Sequence[Place]) -> list[Filling]:
+    """The infills of a part, each with the density of its pattern; sparse: what takes infill of each layer."""
+    fillings = [Filling(place, 0.0) for place in (None, *places) if place is None or place.changes(*Infill.model_fields)]
+    areas: list[list[Polygons]] = [[] for _ in fillings]
+    for layer, area in enumerate(sparse):
+        for part, own in zip(divided(area, fillings, layer, process.line_width_mm), areas, strict=True):
+            own.append(part)
+    return [
+        Filling(filling.place, pattern_density(own, filling.process(process), process.layer_height_mm))
+        for filling, own in zip(fillings, areas, strict=True)
+    ]
+
+
+def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, width_mm: float) -> list[Polygons]:
+    """What of a layer's sparse area each infill takes: a later one first, with the strips beside it that are too narrow for lines
+    of an earlier one."""
+    left, parts = sparse, list[Polygons]()
+    for filling in reversed(fillings):
+        if filling.place is None or left.is_empty():
+            parts.append(left)
+            left = Polygons()
+            continue
+        own = filling.place.areas[layer]
+        own = own if own.is_empty() else opening(left ^ own, width_mm)
+        own = own if own.is_empty() else closing(union([own, *strips_beside(own, left, 2.0 * width_mm)]), SLIT_MM)
+        parts.append(own)
+        left = left if own.is_empty() else left - own
+    return parts[::-1]
+
+
+def strips_beside(area: Polygons, whole: Polygons, least_mm: float) -> list[Polygons]:
+    """The strips that an area leaves of what is around it, narrower than least_mm."""
+    left, touched = whole - area, offset(area, TOUCHING_MM)
+    narrow = (left - opening(left, 0.5 * least_mm)) ^ offset(area, least_mm)
+    return [piece for piece in islands(narrow) if not (piece ^ touched).is_empty()]
 
 
 def infill_cell_mm(process: Process) -> float:
@@ -74,6 +129,30 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
             return asked
         drawn = min(max(drawn * asked / got, asked * (1.0 - MOST_SHIFT)), asked * (1.0 + MOST_SHIFT))
     return drawn
+
+
+def filling_beads(
+    sparse: Polygons, fillings: Sequence[Filling], process: Process, *, layer: int, z_mm: float, height_mm: float
+) -> list[Bead]:
+    """Beads of all infills in the sparse area of a layer, whose settings those of the process are."""
+    beads = list[Bead]()
+    for filling, area in zip(fillings, divided(sparse, fillings, layer, process.line_width_mm), strict=True):
+        own = filling.process(process)
+        beads += infill_beads(area, own, density=filling.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
+    return beads
+
+
+def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int) -> Polygons:
+    """What of a layer's sparse area has lines too far apart to carry skin without bridges."""
+    areas = zip(fillings, divided(sparse, fillings, layer, process.line_width_mm), strict=True)
+    wide = [area for filling, area in areas if filling.process(process).infill_density < DENSE]
+    return wide[0] if len(wide) == 1 else union(wide)
+
+
+def widest_cell_mm(fillings: Sequence[Filling], process: Process, layer: int) -> float:
+    """About how far apart the lines of any infill of a layer lie."""
+    there = [filling for filling in fillings if filling.place is None or not filling.place.areas[layer].is_empty()]
+    return max(infill_cell_mm(filling.process(process)) for filling in there)
 
 
 def infill_beads(area: Polygons, process: Process, *, density: float, layer: int, z_mm: float, height_mm: float) -> list[Bead]:
