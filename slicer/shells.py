@@ -237,11 +237,12 @@ def cut_walls(
         return round_, (), fewer.inside
     numbers = {number for count in counts.all for number in (count, count - more)}
     enclosing = {count: walls(whole, count, process, height_mm) for count in numbers}
-    inside, model_inside = (counts.overlaid(lambda count, n=n: enclosing[count - n].inside) for n in (0, more))
+    inside = counts.overlaid(lambda count: enclosing[count].inside)
+    model_inside = counts.overlaid(lambda count: enclosing[count - more].inside) if more else inside
     around = least if model is None else min(process.interface_walls, least)
     round_ = layer_walls(section, around, process, height_mm, nozzle_mm)
     if around == most or round_.inside.is_empty():
-        return round_, (), model_inside
+        return round_, (), round_.inside if model is None else model_inside
     width, short_mm = process.line_width_mm, 0.5 * spacing_mm(process.line_width_mm, height_mm) - REACH * process.line_width_mm
     within, ranked = offset(round_.inside, -short_mm), process.model_copy(update={"walls": most})
     loops, ending = [*round_.loops, *((),) * (around - len(round_.loops))], []

@@ -73,7 +73,8 @@ class _Reader:
         )
         if parts and parts[0] != PlannedPart(None, None):
             raise self._error("part 1 stands on the platform and has no plane: put an empty [[part]] before the first plane")
-        zones = Zones(*(self._zones(table, kind) for kind in ZONE_KINDS), modifiers=self._modifiers(table))
+        kinds: dict[str, Any] = {kind: self._zones(table, kind) for kind in ZONE_KINDS}
+        zones = Zones(**kinds, modifiers=self._modifiers(table))
         rows = [self._row(row, number) for number, row in enumerate(self._list(table, "front", MOST_PARTS), start=1)]
         if len({len(row.parts) for row in rows}) < len(rows):
             raise self._error("two rows of [[front]] have the same number of planes: one is allowed for each")
