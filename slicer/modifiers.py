@@ -4,7 +4,7 @@ Walls, skins and infill are those of the part's own settings outside, of the mod
 walls run on as they are, and no wall is made where only the settings change.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -20,7 +20,7 @@ from profiles.errors import SliceError
 from profiles.part_settings import process_of_part
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, clean, closing, offset, union
-from slicer.heights import shell_layers
+from slicer.heights import SHELL_KEYS, shell_layers
 
 AROUND_MM = 5.0  # beside a part, which is more than its outlines may reach beyond its mesh
 LEAST_MM2 = 0.01  # of a layer: less of it is no place
@@ -38,24 +38,31 @@ class Place:
         """A process with these values in place of its own."""
         return process.model_copy(update=self.settings)
 
-    def changes(self, *keys: str) -> bool:
-        """Whether any of some keys has a value here."""
-        return not self.settings.keys().isdisjoint(keys)
-
 
 def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -> list[Place]:
-    """Where in the layers of a part other settings hold than those of its process; a later place has all that holds in it.
+    """Where in the layers of a part other settings hold than those of its process, those of a later place over an earlier one's.
 
     mesh: the part's, in its frame; cuts_mm: the middles of the layers. Raises SliceError for settings that do not go with the
     process's own.
     """
-    places: list[Place] = []
+    places = []
     for own, modifiers in groupby(part.modifiers, key=lambda modifier: modifier.process):
         settings = process_of_part(process, own).model_dump(include=set(own))
         _check(process, settings)
-        new = Place(settings, _areas(part, [*modifiers], mesh, cuts_mm))
-        places += [new, *(both for old in places if (both := _overlap(old, new)) is not None)]
+        places.append(Place(settings, _areas(part, [*modifiers], mesh, cuts_mm)))
     return [place for place in places if any(not area.is_empty() for area in place.areas)]
+
+
+def combined(places: Sequence[Place], keys: Collection[str]) -> list[Place]:
+    """The places in which some keys have values of their own. Where some meet there is a further one with the values of all: the
+    last place at a point has all that hold there."""
+    found = list[Place]()
+    for place in places:
+        settings = {key: value for key, value in place.settings.items() if key in keys}
+        if settings:
+            new = Place(settings, place.areas)
+            found += [new, *(both for old in found if (both := _overlap(old, new)) is not None)]
+    return found
 
 
 def _check(process: Process, settings: Mapping[str, Any]) -> None:
@@ -76,7 +83,7 @@ def _areas(part: Part, modifiers: Sequence[Modifier], mesh: Mesh, cuts_mm: Float
 
 
 def _overlap(old: Place, new: Place) -> Place | None:
-    """Where two places meet, with the later one's settings over the earlier one's; None where the later one's are all."""
+    """Where two places meet; None where they do not, or the later one's values are all."""
     settings = {**old.settings, **new.settings}
     areas = [] if settings == new.settings else [a ^ b for a, b in zip(old.areas, new.areas, strict=True)]
     return Place(settings, areas) if any(not area.is_empty() for area in areas) else None
@@ -84,7 +91,7 @@ def _overlap(old: Place, new: Place) -> Place | None:
 
 def most_shell_layers(process: Process, places: Sequence[Place]) -> tuple[int, int]:
     """Solid layers under and over a surface, as many as the process or any place has."""
-    counts = [shell_layers(own) for own in (process, *(place.over(process) for place in places))]
+    counts = [shell_layers(own) for own in (process, *(place.over(process) for place in combined(places, SHELL_KEYS)))]
     return max(top for top, _ in counts), max(bottom for _, bottom in counts)
 
 
@@ -123,9 +130,7 @@ class WallCounts:
 def wall_counts(section: Polygons, layer: int, walls: int, more: int, places: Sequence[Place]) -> WallCounts:
     """The walls of a section of a layer: the process's, or those of places; more: all have so many more."""
     usual, others = walls + more, list[tuple[Polygons, int]]()
-    for place in places:
-        if not place.changes("walls"):
-            continue
+    for place in combined(places, ["walls"]):
         count, area_mm2 = place.settings["walls"] + more, (section ^ place.areas[layer]).area()
         if section.area() - area_mm2 < LEAST_MM2:
             usual, others = count, []

@@ -20,6 +20,7 @@ from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Zone, touched
 from profiles.machine import Table
+from profiles.part_settings import SPEEDS_OF_A_PLACE
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import (
@@ -57,7 +58,7 @@ from slicer.interface.interface import (
     plastic_below,
     sections_of,
 )
-from slicer.modifiers import Place, modified_places, most_shell_layers
+from slicer.modifiers import Place, combined, modified_places, most_shell_layers
 from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
@@ -119,6 +120,11 @@ class Sections:
     def process(self) -> Process:
         """The settings of the part."""
         return self.profile.process
+
+    @cached_property
+    def speed_places(self) -> list[Place]:
+        """Where other speeds hold, as slicer.modifiers.combined."""
+        return combined(self.places, SPEEDS_OF_A_PLACE)
 
     @property
     def shell_layers(self) -> tuple[int, int]:

@@ -32,7 +32,7 @@ from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, close_loop, closing, contours, islands, offset, opening, union
 from slicer.geometry.polyline import length_mm
-from slicer.modifiers import SLIT_MM, Place
+from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
@@ -63,7 +63,7 @@ class Filling:
 
 def plan_fillings(sparse: Sequence[Polygons], process: Process, places: Sequence[Place]) -> list[Filling]:
     """The infills of a part, each with the density of its pattern; sparse: what takes infill of each layer."""
-    fillings = [Filling(place, 0.0) for place in (None, *places) if place is None or place.changes(*Infill.model_fields)]
+    fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
     areas: list[list[Polygons]] = [[] for _ in fillings]
     for layer, area in enumerate(sparse):
         for part, own in zip(divided(area, fillings, layer, process.line_width_mm), areas, strict=True):

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, larger, offset, opening, union
-from slicer.heights import shell_layers
-from slicer.modifiers import Place, most_shell_layers, overlaid
+from slicer.heights import SHELL_KEYS, shell_layers
+from slicer.modifiers import Place, combined, most_shell_layers, overlaid
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
 BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
 ANCHOR = 2.0  # line widths that solid layers under walls reach into the infill around, as a bridge reaches over its anchors
 FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
 LEAST_IRONED_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
+SOLID_KEYS = (*SHELL_KEYS, "infill_density", "solid_below_mm2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +68,13 @@ def regions(
     will lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
     """
     found = [Region(*[Polygons()] * 5)] * len(insides)
-    rules = {_solid_rule(own) for own in (process, *(place.over(process) for place in places))}
+    ruled = combined(places, SOLID_KEYS)
+    if len({_solid_rule(own) for own in (process, *(place.over(process) for place in ruled))}) == 1:
+        ruled = []
     tops = most_shell_layers(process, places)[0] > 0
     for run in [range(len(insides))] if runs is None else runs:
         hollow = _hollow(run, cover, process)
-        for place in places if len(rules) > 1 else ():
+        for place in ruled:
             hollow = _hollow_with(hollow, run, cover, place, process)
         for layer, uncut in zip(run, hollow, strict=True):
             found[layer] = _region_of(insides[layer], uncut, cover, layer, on_plastic, process, tops)
@@ -221,7 +224,8 @@ def ironed_areas(
 
     beside: what later parts have of each layer and of the one over the last; places: where other settings hold.
     """
-    if not any(own.ironing for own in (process, *(place.over(process) for place in places))):
+    ironed = combined(places, ["ironing"])
+    if not any(own.ironing for own in (process, *(place.over(process) for place in ironed))):
         return [Polygons()] * len(regions)
     width = process.line_width_mm
     tops = [
@@ -229,6 +233,6 @@ def ironed_areas(
         for region, above in zip(regions, beside[1:], strict=True)
     ]
     for layer, top in enumerate(tops):
-        here = [(place.areas[layer], top if place.over(process).ironing else Polygons()) for place in places]
+        here = [(place.areas[layer], top if place.over(process).ironing else Polygons()) for place in ironed]
         tops[layer] = overlaid(top if process.ironing else Polygons(), here)
     return [larger(opening(top, 0.5 * width), LEAST_IRONED_MM2) for top in tops]
