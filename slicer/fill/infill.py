@@ -66,7 +66,7 @@ def plan_fillings(sparse: Sequence[Polygons], process: Process, places: Sequence
     fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
     areas: list[list[Polygons]] = [[] for _ in fillings]
     for layer, area in enumerate(sparse):
-        for part, own in zip(divided(area, fillings, layer, process.line_width_mm), areas, strict=True):
+        for part, own in zip(divided(area, fillings, layer, process, _apart_mm(process)), areas, strict=True):
             own.append(part)
     return [
         Filling(filling.place, pattern_density(own, filling.process(process), process.layer_height_mm))
@@ -74,10 +74,15 @@ def plan_fillings(sparse: Sequence[Polygons], process: Process, places: Sequence
     ]
 
 
-def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, width_mm: float) -> list[Polygons]:
+def _apart_mm(process: Process) -> float:
+    """Between the areas of two infills, which both reach over their borders as into a wall."""
+    return 2.0 * process.infill_overlap * process.line_width_mm if process.walls else 0.0
+
+
+def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: Process, apart_mm: float = 0.0) -> list[Polygons]:
     """What of a layer's sparse area each infill takes: a later one first, with the strips beside it that are too narrow for lines
     of an earlier one."""
-    left, parts = sparse, list[Polygons]()
+    left, parts, width_mm = sparse, list[Polygons](), process.line_width_mm
     for filling in reversed(fillings):
         if filling.place is None or left.is_empty():
             parts.append(left)
@@ -87,7 +92,7 @@ def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, width_mm:
         own = own if own.is_empty() else opening(left ^ own, width_mm)
         own = own if own.is_empty() else closing(union([own, *strips_beside(own, left, 2.0 * width_mm)]), SLIT_MM)
         parts.append(own)
-        left = left if own.is_empty() else left - own
+        left = left if own.is_empty() else left - offset(own, apart_mm)
     return parts[::-1]
 
 
@@ -136,7 +141,7 @@ def filling_beads(
 ) -> list[Bead]:
     """Beads of all infills in the sparse area of a layer, whose settings those of the process are."""
     beads = list[Bead]()
-    for filling, area in zip(fillings, divided(sparse, fillings, layer, process.line_width_mm), strict=True):
+    for filling, area in zip(fillings, divided(sparse, fillings, layer, process, _apart_mm(process)), strict=True):
         own = filling.process(process)
         beads += infill_beads(area, own, density=filling.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
     return beads
@@ -144,7 +149,7 @@ def filling_beads(
 
 def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int) -> Polygons:
     """What of a layer's sparse area has lines too far apart to carry skin without bridges."""
-    areas = zip(fillings, divided(sparse, fillings, layer, process.line_width_mm), strict=True)
+    areas = zip(fillings, divided(sparse, fillings, layer, process), strict=True)
     wide = [area for filling, area in areas if filling.process(process).infill_density < DENSE]
     return wide[0] if len(wide) == 1 else union(wide)
 
