@@ -1,5 +1,6 @@
 """Reading: a plan's file, each of its values checked; what is wrong is one sentence with file, key, value and what is allowed."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -169,7 +170,7 @@ class _Reader:
             raise self._error(f"{where}mesh is {_show(values['mesh'])}: the name of a model's file is expected")
         file = self.folder / values["mesh"]
         try:
-            return MeshVolume(file.absolute(), read_in_place(file))
+            return MeshVolume(Path(os.path.abspath(file)), read_in_place(file))
         except MeshError as error:
             raise self._error(f"{where}mesh {error}") from None
 
