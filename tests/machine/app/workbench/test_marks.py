@@ -81,7 +81,7 @@ def test_modifiers_go_along_with_a_model_but_for_meshes(tmp_path: Path) -> None:
     assert slab == Zone((-1e5, -1e5, 20.0), (1e5, 1e5, 40.0))
     assert [modifier.process for modifier in larger.zones.modifiers] == [{"walls": 4}, {"infill_density": 0.5}]
     mesh = replace(both, zones=Zones(modifiers=(Modifier(MeshVolume(tmp_path / "a.stl", tee()), {"walls": 4}),)))
-    with pytest.raises(PlanError, match="modifier 1: its mesh lies where a.stl has it and cannot be moved with the model"):
+    with pytest.raises(PlanError, match=r"modifier 1: its mesh lies where a\.stl has it and cannot be moved with the model"):
         with_rotation(mesh, ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)))
 
 
