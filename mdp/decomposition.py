@@ -8,7 +8,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.pose import Pose
-from mdp.zone import UNMARKED, Marked
+from mdp.zone import UNMARKED, Marked, Modifier
 from profiles.errors import DecompositionError
 
 VOLUME_TOLERANCE = 1e-6  # of the model's: 200 cuts at random lost 4e-16 of it at most, and a sliver left out is more
@@ -25,6 +25,7 @@ class Part:
     than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
     up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up.
+    modifiers: where other settings hold.
     """
 
     index: int
@@ -40,6 +41,7 @@ class Part:
     needing_upright: Mask | None = None
     no_seam: Marked = UNMARKED
     no_support: Marked = UNMARKED
+    modifiers: tuple[Modifier, ...] = ()
 
     @property
     def direction(self) -> Floats:

@@ -53,6 +53,16 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
     return mesh, (*notes, *floating_pieces(mesh), *too_fine(mesh))
 
 
+def read_in_place(path: Path) -> Mesh:
+    """The solid of a model file where the file has it, in mm. Raises MeshError as read_mesh, but for sizes."""
+    try:
+        solid, _ = repair(_read_surfaces(path))
+    except MeshError as error:
+        text = str(error)
+        raise MeshError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+    return Mesh(solid.vertices, solid.faces.astype(np.int32))
+
+
 def too_fine(mesh: Mesh) -> tuple[str, ...]:
     """What to reduce, for a mesh of far more faces than a print shows."""
     count = len(mesh.faces)

@@ -1,13 +1,16 @@
-"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam or no support.
+"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam or no support, and
+modifiers: volumes inside which other settings hold.
 
 Faces are named by a colour of the model's file or by a point and how far they reach around it. Which colour means what is the
 person's to say: a colour alone marks nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import cos, radians
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -154,18 +157,44 @@ def faces_of(mesh: Mesh, zone: Painted | Grown) -> Mask:
 
 
 @dataclass(frozen=True)
+class MeshVolume:
+    """A closed mesh that lies in the workpiece frame, and the file that it is read from."""
+
+    file: Path
+    mesh: Mesh = field(compare=False, repr=False)
+
+    def moved(self, shift_mm: Vector) -> "MeshVolume":
+        """The mesh somewhere else."""
+        return replace(self, mesh=self.mesh.transform(np.eye(3), shift_mm))
+
+
+@dataclass(frozen=True)
+class Modifier:
+    """A volume inside which other values of the process hold, by their keys."""
+
+    volume: Zone | MeshVolume
+    process: dict[str, Any]
+
+    def repeated(self, shifts_mm: Sequence[Vector]) -> tuple["Modifier", ...]:
+        """The same at several places, each shifted otherwise."""
+        return tuple(replace(self, volume=self.volume.moved(shift)) for shift in shifts_mm)
+
+
+@dataclass(frozen=True)
 class Zones:
-    """What a person keeps the program out of. keep: no plane passes through; no_seam: rims there weigh many times, and layers do
-    not begin there; no_support: what overhangs there is not held up, and weighs many times."""
+    """What a person says of places of a model. keep: no plane passes through; no_seam: rims there weigh many times, and layers do
+    not begin there; no_support: what overhangs there is not held up, and weighs many times. modifiers: where other settings hold,
+    those of a later one in place of an earlier one's."""
 
     keep: tuple[AnyZone, ...] = ()
     no_seam: tuple[AnyZone, ...] = ()
     no_support: tuple[AnyZone, ...] = ()
+    modifiers: tuple[Modifier, ...] = ()
 
     def on(self, mesh: Mesh) -> "ZonesOnModel":
         """The zones with the faces that they mean on a model."""
         keep = tuple(zone if isinstance(zone, Zone) else Patches.of(mesh, faces_of(mesh, zone)) for zone in self.keep)
-        return ZonesOnModel(keep, Marked.of(mesh, self.no_seam), Marked.of(mesh, self.no_support))
+        return ZonesOnModel(keep, Marked.of(mesh, self.no_seam), Marked.of(mesh, self.no_support), self.modifiers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +241,7 @@ class ZonesOnModel:
     keep: tuple[Zone | Patches, ...] = ()
     no_seam: Marked = Marked()
     no_support: Marked = Marked()
+    modifiers: tuple[Modifier, ...] = ()
 
     @property
     def by_face(self) -> bool:

@@ -1,4 +1,4 @@
-"""Part settings: what one part of a print is sliced with in place of the process's own values."""
+"""Part settings: what one part of a print, or a place of it, is sliced with in place of the process's own values."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -48,6 +48,38 @@ OF_PARTS_ON_PLASTIC = {
     "pin_spacing_mm",
     "most_pins",
 }
+
+# What may change within a layer: the rest decides where layers lie, how wide lines are, or runs through a layer as a whole.
+OF_A_PLACE = (
+    "walls",
+    "top_layers",
+    "top_thickness_mm",
+    "bottom_layers",
+    "bottom_thickness_mm",
+    "solid_below_mm2",
+    "infill_density",
+    "infill_pattern",
+    "infill_angle_deg",
+    "infill_anchor_mm",
+    "infill_joint_mm",
+    "ironing",
+)
+SPEEDS_OF_A_PLACE = (
+    "outer_wall_speed_mm_s",
+    "inner_wall_speed_mm_s",
+    "small_wall_speed_mm_s",
+    "overhang_75_speed_mm_s",
+    "overhang_50_speed_mm_s",
+    "overhang_25_speed_mm_s",
+    "overhang_0_speed_mm_s",
+    "gap_speed_mm_s",
+    "skin_speed_mm_s",
+    "top_skin_speed_mm_s",
+    "ironing_speed_mm_s",
+    "bridge_speed_mm_s",
+    "infill_bridge_speed_mm_s",
+    "infill_speed_mm_s",
+)
 
 
 class PartSettings(Frozen):
@@ -109,6 +141,23 @@ def _problems(process: Process, part: int, own: dict[str, Any], nozzle_mm: float
             yield f"process.{key} holds for the whole print: --set process.{key}=... sets it"
         elif part == 1 and key in OF_PARTS_ON_PLASTIC:
             yield f"process.{key} holds for parts that stand on plastic: part 1 stands on the platform"
+    yield from _value_problems(process, own, nozzle_mm)
+
+
+def problems_of_place(process: Process, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
+    """What is wrong with values that are to hold in some place of a layer, a sentence for each."""
+    for key in own:
+        if key in Process.model_fields and key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
+            yield (
+                f"process.{key} holds for a whole part: {', '.join(OF_A_PLACE)} and the speeds of walls, gaps, skins, ironing, "
+                "bridges and infill are allowed"
+            )
+    if own.get("walls") == 0:
+        yield "process.walls is 0: at least 1 is allowed"
+    yield from _value_problems(process, own, nozzle_mm)
+
+
+def _value_problems(process: Process, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
     table = process.model_dump()
     checked = table_problems(Process, "process.", table | own, table)
     yield from checked.problems

@@ -20,6 +20,7 @@ from profiles.process import Process
 from profiles.profile import Profile
 
 LEAST_SHARE = 0.25  # by which a layer may differ from its neighbours: thinner than this share of them it comes out unevenly
+SHELL_KEYS = ("top_layers", "top_thickness_mm", "bottom_layers", "bottom_thickness_mm")
 LEVEL = 1e-9  # of the cosine between two directions that are the same
 BIN_SHARE = 0.125  # of the least layer height: slopes are known in bins of this height, each by its worst face
 FLAT = 0.9998  # cosine of one degree: flatter faces count as level

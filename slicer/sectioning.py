@@ -20,6 +20,7 @@ from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Zone, touched
 from profiles.machine import Table
+from profiles.part_settings import SPEEDS_OF_A_PLACE
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import (
@@ -42,7 +43,7 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm
-from slicer.heights import Heights, part_heights, pedestal_layers, shell_layers
+from slicer.heights import Heights, part_heights, pedestal_layers
 from slicer.interface.interface import (
     Pins,
     cut_grooves,
@@ -57,6 +58,7 @@ from slicer.interface.interface import (
     plastic_below,
     sections_of,
 )
+from slicer.modifiers import Place, combined, modified_places, most_shell_layers
 from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
@@ -79,7 +81,8 @@ class Sections:
     have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is its
     outline, of use to part 1. `joints`, (k, 6) segments, are where the part meets others on the surface.
     Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
-    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, () for nowhere.
+    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, () for nowhere. In
+    `places` other settings hold, those of a later one over those of an earlier one.
     pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold something, but nothing that gets a
     line.
     """
@@ -104,6 +107,7 @@ class Sections:
     grooves: Polygons = field(default_factory=Polygons)
     no_seam: Sequence[Floats] = ()
     no_support: Sequence[Polygons] = ()
+    places: Sequence[Place] = ()
     pedestal_layers: int = 0
     too_thin: frozenset[int] = frozenset()
 
@@ -116,6 +120,16 @@ class Sections:
     def process(self) -> Process:
         """The settings of the part."""
         return self.profile.process
+
+    @cached_property
+    def speed_places(self) -> list[Place]:
+        """Where other speeds hold, as slicer.modifiers.combined."""
+        return combined(self.places, SPEEDS_OF_A_PLACE)
+
+    @property
+    def shell_layers(self) -> tuple[int, int]:
+        """Solid layers under and over a surface, where a place has most of them."""
+        return most_shell_layers(self.process, self.places)
 
     @cached_property
     def support_process(self) -> Process:
@@ -158,7 +172,8 @@ def section_part(
         base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
         lowest = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM))
         outlines = lay_on_plate(outlines, lowest, base, process.line_width_mm)
-    beside, above, beneath = _model_around(part, earlier, later, heights, process)
+    places = modified_places(part, mesh, process, cuts_mm)
+    beside, above, beneath = _model_around(part, earlier, later, heights, process, places)
     outlines = compensate(outlines, part, later, beside, cuts_mm, process)
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
@@ -191,6 +206,7 @@ def section_part(
         grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),
         no_seam=no_seam_segments(part, mesh, cuts_mm),
         no_support=no_support_areas(part, mesh, cuts_mm),
+        places=places,
         pedestal_layers=pedestal,
         too_thin=too_thin,
     )
@@ -231,11 +247,11 @@ def lay_on_plate(outlines: Sequence[Polygons], lowest: int, base: Polygons, widt
 
 
 def _model_around(
-    part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process
+    part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process, places: Sequence[Place]
 ) -> tuple[list[Polygons], list[Polygons], list[Polygons]]:
     """What later parts have of a part's layers and of those over them, and what the model has of those under its base plane, the
     nearest first: as many layers as its shells reach."""
-    (top, bottom), step = shell_layers(process), process.layer_height_mm
+    (top, bottom), step = most_shell_layers(process, places), process.layer_height_mm
     over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
     far_mm = max(step * max(top, bottom, process.interface_top_layers), reach_mm(process))
     before, after = (near_parts(part, others, far_mm) for others in (earlier, later))

@@ -26,9 +26,8 @@ from slicer.bead import (
     spacing_mm,
     varying,
     wall_rank,
-    with_line_width,
 )
-from slicer.fill.infill import infill_beads, infill_cell_mm, pattern_density, plan_lightning
+from slicer.fill.infill import Filling, filling_beads, has_lightning, open_area, plan_fillings, strips_beside, widest_cell_mm
 from slicer.fill.over_infill import ANCHORED, anchored, infill_bridges
 from slicer.fill.region import Cover, Region, ironed_areas, regions
 from slicer.fill.skin import SolidLines, skin_lines
@@ -46,8 +45,8 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm, simplify
-from slicer.heights import shell_layers
 from slicer.interface.interface import limb_planes, plane_in_frame_of
+from slicer.modifiers import WallCounts, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import Sections
@@ -56,14 +55,12 @@ from slicer.support.support import Supports
 from slicer.walls.variable import Wall
 from slicer.walls.walls import Walls, gaps, layer_walls, uncovered_area, walls
 
-DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
 
 # Loops and walls of varying width, inner walls that end on a cut, and the contours of what walls enclose, of its narrow places
 # and, where it differs, of what the walls of the uncut model enclose: Polygons cannot go from one process to another.
 Contours: TypeAlias = tuple[tuple[tuple[Floats, ...], ...], tuple[Wall, ...], tuple[Bead, ...], list[list[Floats]]]
 REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cut overlaps it by this
-TOUCHING_MM = 0.01  # places so near to each other are one
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
@@ -74,8 +71,8 @@ IRONED = 100  # after all else of an island
 class Shell:
     """One layer of the part itself.
 
-    process: the settings, with the extra walls of interfaces and overhangs and the widths of part 1's first layer; ending: inner
-    walls that end on the face of a cut, and what fills between them; ironed: tops that are smoothed.
+    process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of part 1's first layer;
+    ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; ironed: smoothed tops.
     """
 
     process: Process
@@ -88,13 +85,11 @@ class Shell:
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """A part's layers with the support planned for it; density: of the sparse infill's pattern; lightning: its lines (n, 2) in
-    every layer, where it is that pattern."""
+    """A part's layers with the support planned for it, and its sparse infills."""
 
     supports: Supports
     layers: Sequence[Shell]
-    density: float
-    lightning: Sequence[Sequence[Floats]]
+    fillings: Sequence[Filling]
 
     @property
     def sections(self) -> Sections:
@@ -113,16 +108,20 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
     model = model_sections(sections)
     heights_mm, count = sections.heights.height_mm.tolist(), len(processes)
+    counts = [
+        wall_counts(section, layer, process.walls, own.walls - process.walls, sections.places)
+        for layer, (section, own) in enumerate(zip(sections.own, processes, strict=True))
+    ]
     # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
-    whole = layers is None or process.infill_pattern == "lightning"  # what holds a layer is planned from the top
+    whole = layers is None or has_lightning(process, sections.places)  # what holds a layer is planned from the top
     runs = [range(count)] if whole else [range(max(k - 1, 0), k + 1) for k in layers or ()]
     needed = sorted({layer for run in runs for layer in run})
 
     def contours_of(place: int) -> Contours:
         layer = needed[place]
-        own, usual = processes[layer], process.walls
+        own, more = processes[layer], processes[layer].walls - process.walls
         walls, ending, inside = cut_walls(
-            sections.own[layer], model[layer], own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=usual
+            sections.own[layer], model[layer], own, counts[layer], height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, more=more
         )
         areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
         return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
@@ -131,21 +130,23 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     for layer, found in zip(needed, parallel_map(contours_of, len(needed), FEWEST_LAYERS), strict=True):
         walled[layer] = _walls_from(*found)
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
-    filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs)
-    ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process)
+    filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs, sections.places)
+    ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, sections.places)
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
-    infill = with_line_width(process, process.infill_line_width_mm)
-    density = pattern_density([region.sparse for region in filled], infill, process.layer_height_mm)
-    lightning = plan_lightning([region.sparse for region in filled], sections.own, infill, sections.heights.height_mm)
-    filled = filled if lightning else anchor_skins(filled, processes, density, sections)  # branches come to the skins' ends
+    sparse = [region.sparse for region in filled]
+    fillings = plan_fillings(sparse, sections.own, process, sections.places, sections.heights.height_mm)
+    filled = anchor_skins(filled, processes, fillings, sections)
+    ranked = [
+        own if of.all == [own.walls] else own.model_copy(update={"walls": max(of.all)})
+        for own, of in zip(processes, counts, strict=True)
+    ]
     return Shells(
         supports,
         [
             Shell(own, walls, ending, region, spans, smooth)
-            for own, (walls, ending, _), region, spans, smooth in zip(processes, walled, filled, bridges, ironed, strict=True)
+            for own, (walls, ending, _), region, spans, smooth in zip(ranked, walled, filled, bridges, ironed, strict=True)
         ],
-        density,
-        lightning,
+        fillings,
     )
 
 
@@ -154,19 +155,20 @@ def lines_angle_deg(process: Process, layer: int) -> float:
     return process.infill_angle_deg + 90.0 * (layer % 2)
 
 
-def anchor_skins(filled: Sequence[Region], processes: Sequence[Process], density: float, sections: Sections) -> list[Region]:
-    """The regions of all layers with skins that end on infill or on what is solid; density: of the infill's pattern."""
+def anchor_skins(
+    filled: Sequence[Region], processes: Sequence[Process], fillings: Sequence[Filling], sections: Sections
+) -> list[Region]:
+    """The regions of all layers with skins that end on infill or on what is solid."""
     done, z_mm, heights_mm = list(filled), sections.heights.tip_mm.tolist(), sections.heights.height_mm.tolist()
     for layer in range(1, len(filled)):
-        region, below, process = filled[layer], done[layer - 1].sparse, processes[layer - 1]
-        if below.is_empty() or process.infill_density >= DENSE or ((region.solid + region.top) ^ below).is_empty():
+        region, process, k = filled[layer], processes[layer - 1], layer - 1
+        below = open_area(done[k].sparse, fillings, process, k, lightning=False)
+        if below.is_empty() or ((region.solid + region.top) ^ below).is_empty():
             continue
-        infill = with_line_width(process, process.infill_line_width_mm)
-        beads = infill_beads(
-            below, infill, density=density, layer=layer - 1, z_mm=z_mm[layer - 1], height_mm=heights_mm[layer - 1]
-        )
+        beads = filling_beads(below, fillings, process, layer=k, z_mm=z_mm[k], height_mm=heights_mm[k])
         lines, angle_deg = [bead.points for bead in beads], lines_angle_deg(process, layer)
-        done[layer] = anchored(region, below, lines, angle_deg, processes[layer].line_width_mm, infill_cell_mm(process))
+        cell_mm = widest_cell_mm(fillings, process, k)
+        done[layer] = anchored(region, below, lines, angle_deg, processes[layer].line_width_mm, cell_mm)
     return done
 
 
@@ -216,37 +218,47 @@ def _boxes_meet(own: Polygons, beside: Polygons) -> bool:
 
 
 def cut_walls(
-    section: Polygons, model: Polygons | None, process: Process, *, height_mm: float, nozzle_mm: float, usual: int
+    section: Polygons,
+    model: Polygons | None,
+    process: Process,
+    counts: WallCounts,
+    *,
+    height_mm: float,
+    nozzle_mm: float,
+    more: int,
 ) -> tuple[Walls, tuple[Bead, ...], Polygons]:
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
-    Those that run round; inner walls along the surface that end on a cut face's, all of one width, and what fills between them;
-    what the walls would enclose if the model were not cut. usual: how many walls the model would have here.
+    Those that run round; inner walls along the surface that end on a cut face's, or where a modifier has fewer, all of one width,
+    and what fills between them; what the walls would enclose if the model were not cut and had so many fewer walls.
     """
-    if model is None:
-        round_ = layer_walls(section, process.walls, process, height_mm, nozzle_mm)
-        fewer = round_ if usual == process.walls else layer_walls(section, usual, process, height_mm, nozzle_mm)
+    whole, least, most = section if model is None else model, min(counts.all), max(counts.all)
+    if model is None and least == most:
+        round_ = layer_walls(section, most, process, height_mm, nozzle_mm)
+        fewer = layer_walls(section, most - more, process, height_mm, nozzle_mm) if more else round_
         return round_, (), fewer.inside
-    whole = walls(model, process.walls, process, height_mm)
-    fewer = whole if usual == process.walls else walls(model, usual, process, height_mm)
-    round_ = layer_walls(section, min(process.interface_walls, process.walls), process, height_mm, nozzle_mm)
-    if process.interface_walls >= process.walls or round_.inside.is_empty():
-        return round_, (), fewer.inside
-    width = process.line_width_mm
-    within = offset(round_.inside, REACH * width - 0.5 * spacing_mm(width, height_mm))
-    loops, ending = [*round_.loops, *((),) * (process.interface_walls - len(round_.loops))], []
-    for level in range(process.interface_walls, len(whole.loops)):
-        runs = [run for loop in whole.loops[level] for run in _within(loop, within) if length_mm(run) > width]
-        beads = [Bead(Kind.INNER_WALL, run, width, wall_rank(level, process)) for run in runs]
+    numbers = {number for count in counts.all for number in (count, count - more)}
+    enclosing = {count: walls(whole, count, process, height_mm) for count in numbers}
+    inside = counts.overlaid(lambda count: enclosing[count].inside)
+    model_inside = counts.overlaid(lambda count: enclosing[count - more].inside) if more else inside
+    around = least if model is None else min(process.interface_walls, least)
+    round_ = layer_walls(section, around, process, height_mm, nozzle_mm)
+    if around == most or round_.inside.is_empty():
+        return round_, (), round_.inside if model is None else model_inside
+    width, short_mm = process.line_width_mm, 0.5 * spacing_mm(process.line_width_mm, height_mm) - REACH * process.line_width_mm
+    within, ranked = offset(round_.inside, -short_mm), process.model_copy(update={"walls": most})
+    loops, ending = [*round_.loops, *((),) * (around - len(round_.loops))], []
+    for level in range(around, len(enclosing[most].loops)):
+        room = counts.where_more(level, within, short_mm)
+        runs = [run for loop in enclosing[most].loops[level] for run in _within(loop, room) if length_mm(run) > width]
+        beads = [Bead(Kind.INNER_WALL, run, width, wall_rank(level, ranked)) for run in runs]
         loops.append(tuple(bead.points[:-1] for bead in beads if bead.closed))
         ending += [bead for bead in beads if not bead.closed]
-    inside = round_.inside ^ whole.inside
-    lines = [
-        *(bead.points for bead in ending),
-        *(close_loop(loop) for level in loops[process.interface_walls :] for loop in level),
-    ]
+    inside = round_.inside ^ inside
+    lines = [*(bead.points for bead in ending), *(close_loop(loop) for level in loops[around:] for loop in level)]
     ending += gaps([uncovered_area(round_.inside - inside, lines, width)], width, height_mm)
-    return replace(round_, loops=tuple(loops), inside=inside), tuple(ending), fewer.inside
+    model_inside = inside if model is None and not more else model_inside
+    return replace(round_, loops=tuple(loops), inside=inside), tuple(ending), model_inside
 
 
 def _within(loop: Floats, area: Polygons) -> list[Floats]:
@@ -277,7 +289,7 @@ def cover(sections: Sections, model: Sequence[Polygons | None], insides: Sequenc
     model: as model_sections; insides: what walls would enclose of it. Earlier parts that are not known are taken to fill the
     first section; under the platform is nothing.
     """
-    top, bottom = shell_layers(sections.process)
+    top, bottom = sections.shell_layers
     own, above = sections.own, sections.above
     beside = [whole - mine if whole is not None else Polygons() for whole, mine in zip(model, own, strict=True)]
     later = [*beside, *above]
@@ -305,11 +317,13 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         wide = opening(bridge.hanging ^ shell.walls.inside, 0.5 * width)
         if not wide.is_empty():
             area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
-            area += _moat(area, region.sparse, infill_cell_mm(process))
+            # where infill beside it would be narrower than a cell it goes on to the walls
+            area += union(strips_beside(area, region.sparse, widest_cell_mm(shells.fillings, process, layer)))
             beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
             region = _without(region, area, width)
-    if layer and process.infill_density < DENSE:
-        area = infill_bridges(region, shells.layers[layer - 1].region.sparse, width)
+    if layer:
+        below = shells.layers[layer - 1]
+        area = infill_bridges(region, open_area(below.region.sparse, shells.fillings, below.process, layer - 1), width)
         if not area.is_empty():
             beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
             region = _without(region, area, width)
@@ -322,18 +336,8 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     for width_mm, around in places.items():
         beads += gaps(around, width_mm, height_mm)
     beads += ironing_beads(shell.ironed, lines, process)
-    sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
-    lightning = shells.lightning[layer] if shells.lightning else ()
-    return beads + infill_beads(
-        region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm, lightning=lightning
-    )
-
-
-def _moat(bridge: Polygons, sparse: Polygons, cell_mm: float) -> Polygons:
-    """What a bridge leaves of the sparse infill around it that is narrower than a cell: its lines go on to the walls there."""
-    left, touched = sparse - bridge, offset(bridge, TOUCHING_MM)
-    narrow = (left - opening(left, 0.5 * cell_mm)) ^ offset(bridge, cell_mm)
-    return union([piece for piece in islands(narrow) if not (piece ^ touched).is_empty()])
+    z_mm = float(heights.tip_mm[layer])
+    return beads + filling_beads(region.sparse, shells.fillings, process, layer=layer, z_mm=z_mm, height_mm=height_mm)
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:

@@ -36,8 +36,8 @@ from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, la
 from slicer.strokes.order import order_beads
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import plan_seams, rear_of, seam_limits
-from slicer.strokes.speed import fan_share, first_layer_speeds, own_fans, rising_fan, speeds_mm_s, travel_time_s
-from slicer.strokes.strokes import Strokes, in_pieces, split, split_overhangs
+from slicer.strokes.speed import fan_share, first_layer_speeds, kinds_apart, own_fans, rising_fan, speeds_mm_s, travel_time_s
+from slicer.strokes.strokes import Strokes, in_pieces, split, split_overhangs, split_places
 from slicer.strokes.travels import may_wipe_over
 from slicer.strokes.vase import vase_layers
 from slicer.support.handed_down import plan_supports
@@ -250,12 +250,15 @@ def order_layer(
     strokes = split_overhangs(strokes, outline, sections.below(index), own)
     if index == 0 and not on_platform and process.interlock == "grooves":
         strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
+    of_places = [place.over(process) for place in sections.speed_places]
+    areas = [place.areas[index] for place in sections.speed_places]
+    strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
     strokes = in_pieces(strokes, height_mm)
     flow = profile.material.flow
     if index == 0:
         flow *= process.first_layer_flow if on_platform else process.interface_flow
     fixed = None if index else first_layer_speeds(process, on_platform)
-    return strokes, speeds_mm_s(strokes, profile, height_mm, fixed, flow), flow
+    return strokes, speeds_mm_s(strokes, profile, height_mm, fixed, flow, of_places), flow
 
 
 def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:

@@ -27,6 +27,14 @@
     point_mm = [0.0, -12.5, 41.0]
     angle_deg = 30.0
 
+    [[modifier]]                        # other settings in a box, which may lean, a mesh, or a height range; later ones win
+    mesh = "insert.stl"                 # a file beside the plan, closed, lying in the workpiece frame as it is
+    process = {infill_density = 1.0}
+
+    [[modifier]]
+    z_mm = [10.0, 20.0]
+    process = {walls = 4}
+
     [[front]]                           # the best decomposition of every other number of parts, for --parts
     planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ..., then the points of its limbs, if any
 
@@ -50,9 +58,11 @@ from profiles.part_settings import PartSettings
 VERSION = 1  # of what a plan's keys mean
 GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
 ZONE_KINDS = ("keep", "no_seam", "no_support")  # as mdp.zone.Zones has them
-KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "front")
+KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "modifier", "front")
 PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
 ZONE_KEYS = ("min_mm", "max_mm", "axes", "colour", "point_mm", "angle_deg")
+MODIFIER_KEYS = ("min_mm", "max_mm", "axes", "z_mm", "mesh", "process")
+MOST_MM = 1e5  # fifty times what any printer makes (mdp.read.MOST_MM)
 ROW_FIGURES = ("support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2")
 ROW_KEYS = ("planes", *ROW_FIGURES)
 

@@ -1,5 +1,6 @@
 """Reading: a plan's file, each of its values checked; what is wrong is one sentence with file, key, value and what is allowed."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -12,6 +13,8 @@ from mdp.mesh import parse_colour
 from mdp.plane import unit_direction
 from mdp.plans.plan_file import (
     KEYS,
+    MODIFIER_KEYS,
+    MOST_MM,
     PART_KEYS,
     ROW_FIGURES,
     ROW_KEYS,
@@ -22,16 +25,18 @@ from mdp.plans.plan_file import (
     PlannedPart,
     PlannedRow,
 )
+from mdp.read import read_in_place
 from mdp.sweep.limbs import MOST_JOINED
-from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, Painted, Zone, Zones
-from profiles.errors import PlanError, reason
+from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, MeshVolume, Modifier, Painted, Zone, Zones
+from profiles.errors import MeshError, PlanError, reason
 from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
 from profiles.toml_text import read_toml
 
 MOST_BYTES = 10_000_000  # far more than the workbench writes; a file as large is refused unread
 MOST_ZONES = 1000  # of a kind: every face is asked for each
-MOST_MM = 1e5  # fifty times what any printer makes (mdp.read.MOST_MM)
+MODIFIER_VOLUMES = {"a box": {"min_mm", "max_mm", "axes"}, "a height range z_mm": {"z_mm"}, "a mesh": {"mesh"}}
+MOST_MODIFIERS = 100  # each of them makes another pass over the layers
 
 
 def read_plan(path: Path) -> PlanFile:
@@ -46,14 +51,15 @@ def read_plan(path: Path) -> PlanFile:
         raise PlanError(f"plan {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
     except ValueError as error:
         raise PlanError(f"plan {path} is no TOML: {error}") from None
-    return _Reader(path.name).plan(table)
+    return _Reader(path.name, path.parent).plan(table)
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Checks the values of one file."""
+    """Checks the values of one file, which lies in a folder."""
 
     name: str
+    folder: Path
 
     def plan(self, table: dict[str, Any]) -> PlanFile:
         self._only(table, KEYS, "")
@@ -61,10 +67,15 @@ class _Reader:
             raise self._error(f"version is {_show(table.get('version'))}: this program reads version {VERSION}")
         tables = list(enumerate(self._list(table, "part", MOST_PARTS), start=1))
         parts = [self._part(part, number) for number, part in tables]
-        settings = tuple(self._settings(part, number) for number, part in tables if part.get("process"))
+        settings = tuple(
+            PartSettings(part=number, process=self._process(part, f"part {number}: "))
+            for number, part in tables
+            if part.get("process")
+        )
         if parts and parts[0] != PlannedPart(None, None):
             raise self._error("part 1 stands on the platform and has no plane: put an empty [[part]] before the first plane")
-        zones = Zones(*(self._zones(table, kind) for kind in ZONE_KINDS))
+        kinds: dict[str, Any] = {kind: self._zones(table, kind) for kind in ZONE_KINDS}
+        zones = Zones(**kinds, modifiers=self._modifiers(table))
         rows = [self._row(row, number) for number, row in enumerate(self._list(table, "front", MOST_PARTS), start=1)]
         if len({len(row.parts) for row in rows}) < len(rows):
             raise self._error("two rows of [[front]] have the same number of planes: one is allowed for each")
@@ -87,11 +98,11 @@ class _Reader:
             raise self._error(f"{key} is {_show(value)}: a list of 1 to {MOST_JOINED} points is expected, as [[0, 12, 48]]")
         return tuple(self._vector(point, key) for point in value)
 
-    def _settings(self, table: dict[str, Any], number: int) -> PartSettings:
-        process = table["process"]
-        if not isinstance(process, dict):
-            raise self._error(f"part {number}: process is {_show(process)}: keys and values are expected, as {{walls = 4}}")
-        return PartSettings(part=number, process=process)
+    def _process(self, table: dict[str, Any], where: str) -> dict[str, Any]:
+        process = table.get("process")
+        if not isinstance(process, dict) or not process:
+            raise self._error(f"{where}process is {_show(process)}: keys and values are expected, as {{walls = 4}}")
+        return process
 
     def _row(self, table: dict[str, Any], number: int) -> PlannedRow:
         where = f"front {number}: "
@@ -123,11 +134,45 @@ class _Reader:
             if "point_mm" in values or "angle_deg" in values:
                 zones.append(self._grown(values, where))
                 continue
-            low, high = (self._vector(values.get(corner), where + corner) for corner in ZONE_KEYS[:2])
-            if not all(least < most for least, most in zip(low, high, strict=True)):
-                raise self._error(f"{where}min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
-            zones.append(Zone(low, high, self._rotation(values, f"{where}axes") if "axes" in values else None))
+            zones.append(self._box(values, where))
         return tuple(zones)
+
+    def _box(self, values: dict[str, Any], where: str) -> Zone:
+        low, high = (self._vector(values.get(corner), where + corner) for corner in ("min_mm", "max_mm"))
+        if not all(least < most for least, most in zip(low, high, strict=True)):
+            raise self._error(f"{where}min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
+        return Zone(low, high, self._rotation(values, f"{where}axes") if "axes" in values else None)
+
+    def _modifiers(self, table: dict[str, Any]) -> tuple[Modifier, ...]:
+        modifiers = []
+        for number, values in enumerate(self._list(table, "modifier", MOST_MODIFIERS), start=1):
+            where = f"modifier {number}: "
+            self._only(values, MODIFIER_KEYS, where)
+            kinds = [kind for kind, keys in MODIFIER_VOLUMES.items() if not keys.isdisjoint(values)]
+            if len(kinds) != 1:
+                given = " and ".join(kinds) or "no volume"
+                raise self._error(f"{where}has {given}: one of {', '.join(MODIFIER_VOLUMES)} is expected")
+            modifiers.append(Modifier(self._volume(values, where), self._process(values, where)))
+        return tuple(modifiers)
+
+    def _volume(self, values: dict[str, Any], where: str) -> Zone | MeshVolume:
+        if "mesh" in values:
+            return self._solid(values, where)
+        if "z_mm" not in values:
+            return self._box(values, where)
+        low, high = (self._number(z, f"{where}z_mm") for z in self._numbers(values["z_mm"], f"{where}z_mm", 2))
+        if low >= high:
+            raise self._error(f"{where}z_mm is {[low, high]}: the first number must be less")
+        return Zone((-MOST_MM, -MOST_MM, low), (MOST_MM, MOST_MM, high))
+
+    def _solid(self, values: dict[str, Any], where: str) -> MeshVolume:
+        if not self._text(values, "mesh"):
+            raise self._error(f"{where}mesh is {_show(values['mesh'])}: the name of a model's file is expected")
+        file = self.folder / values["mesh"]
+        try:
+            return MeshVolume(Path(os.path.abspath(file)), read_in_place(file))
+        except MeshError as error:
+            raise self._error(f"{where}mesh {error}") from None
 
     def _grown(self, values: dict[str, Any], where: str) -> Grown:
         if not set(values) <= {"point_mm", "angle_deg"}:

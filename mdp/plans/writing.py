@@ -1,18 +1,20 @@
 """Writing: a plan as the text of its file, with remarks for a reader."""
 
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import tomlkit
 
 from mdp.mesh import colour_text
 from mdp.plane import Plane
-from mdp.plans.plan_file import ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
-from mdp.zone import AnyZone, Grown, Painted
+from mdp.plans.plan_file import MOST_MM, ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.zone import AnyZone, Grown, MeshVolume, Modifier, Painted, Zone
 
 
-def plan_text(plan: PlanFile) -> str:
-    """The content of a plan's file."""
+def plan_text(plan: PlanFile, folder: Path | None = None) -> str:
+    """The content of a plan's file. folder: where it will lie; None: anywhere, the files that it names have whole paths."""
     document = tomlkit.document()
     count = len(plan.parts) + 1
     document.add(tomlkit.comment(f"How a model is cut into {count} part{'s' * (count > 1)}, in print order; use it with --plan."))
@@ -28,6 +30,8 @@ def plan_text(plan: PlanFile) -> str:
         zones: Sequence[AnyZone] = getattr(plan.zones, kind)
         if zones:
             document[kind] = _tables([_table(_zone_values(zone)) for zone in zones])
+    if plan.zones.modifiers:
+        document["modifier"] = _tables([_modifier_table(modifier, folder) for modifier in plan.zones.modifiers])
     if plan.front:
         document["front"] = _tables([_row_table(row) for row in plan.front])
     return tomlkit.dumps(document)
@@ -40,6 +44,33 @@ def _zone_values(zone: AnyZone) -> dict[str, Any]:
         return {"point_mm": list(zone.point_mm), "angle_deg": zone.angle_deg}
     leaning = {} if zone.axes is None else {"axes": [list(axis) for axis in zone.axes]}
     return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm), **leaning}
+
+
+def _modifier_table(modifier: Modifier, folder: Path | None) -> tomlkit.items.Table:
+    volume = modifier.volume
+    if isinstance(volume, MeshVolume):
+        values: dict[str, Any] = {"mesh": _path_from(folder, volume.file)}
+    elif _is_height_range(volume):
+        values = {"z_mm": [volume.min_mm[2], volume.max_mm[2]]}
+    else:
+        values = _zone_values(volume)
+    return _table({**values, "process": _inline(modifier.process)})
+
+
+def _is_height_range(box: Zone) -> bool:
+    return box.axes is None and (*box.min_mm[:2], *box.max_mm[:2]) == (-MOST_MM, -MOST_MM, MOST_MM, MOST_MM)
+
+
+def _path_from(folder: Path | None, file: Path) -> str:
+    if folder is None or folder.absolute().anchor != file.anchor:
+        return file.as_posix()
+    return Path(os.path.relpath(file, folder.absolute())).as_posix()
+
+
+def _inline(values: Mapping[str, Any]) -> tomlkit.items.InlineTable:
+    table = tomlkit.inline_table()
+    table.update(values)
+    return table
 
 
 def _table(values: dict[str, Any]) -> tomlkit.items.Table:
@@ -68,9 +99,7 @@ def _part_table(part: PlannedPart, process: Mapping[str, Any]) -> tomlkit.items.
     if part.limbs_mm:
         table["limbs_mm"] = [list(point) for point in part.limbs_mm]
     if process:
-        own = tomlkit.inline_table()
-        own.update(process)
-        table["process"] = own
+        table["process"] = _inline(process)
     return table
 
 

@@ -13,6 +13,7 @@ from mdp.kernels.sorting import rank
 from mdp.mesh import Floats, Indices, Ints
 from slicer.bead import spacing_mm
 from slicer.heights import shell_layers
+from slicer.modifiers import combined
 from slicer.sectioning import Sections
 
 TINY_MM2 = 1e-9
@@ -28,9 +29,20 @@ def rough_lengths_mm(sections: Sections) -> Floats:
     seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
     bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]
     spacing = spacing_mm(width, process.layer_height_mm)
-    inside = np.maximum(area - process.walls * spacing * around, 0.0)
+    walls, density = (_by_places(sections, key, float(getattr(process, key))) for key in ("walls", "infill_density"))
+    inside = np.maximum(area - walls * spacing * around, 0.0)
     skin = np.where(inside < process.solid_below_mm2, inside, inside * np.minimum(bare / np.maximum(area, TINY_MM2), 1.0))
-    return np.column_stack([(area - inside) / spacing, skin / spacing, (inside - skin) * process.infill_density / spacing])
+    return np.column_stack([(area - inside) / spacing, skin / spacing, (inside - skin) * density / spacing])
+
+
+def _by_places(sections: Sections, key: str, usual: float) -> Floats:
+    """(n,) the mean over every layer of a value of the process that some places may have otherwise."""
+    values = np.full(len(sections.own), usual)
+    for place in combined(sections.places, [key]):
+        for layer, (area, section) in enumerate(zip(place.areas, sections.own, strict=True)):
+            if not area.is_empty() and not section.is_empty():
+                values[layer] += (section ^ area).area() / section.area() * (place.settings[key] - values[layer])
+    return values
 
 
 @kernel

@@ -10,13 +10,15 @@ layer to layer, so that every side is double in one layer of three.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import cos, pi, sin, sqrt
 
 import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, spacing_mm
+from profiles.settings.infill import Infill
+from slicer.bead import Bead, spacing_mm, with_line_width
 from slicer.fill.lightning import clip_chains, lightning_lines
 from slicer.fill.lines import (
     Box,
@@ -29,10 +31,13 @@ from slicer.fill.lines import (
 )
 from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, close_loop, contours, offset
+from slicer.geometry.polygons import Polygons, close_loop, closing, contours, islands, offset, opening, union
 from slicer.geometry.polyline import length_mm
+from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
+DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
+TOUCHING_MM = 0.01  # places so near to each other are one
 RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}  # of straight families
@@ -42,6 +47,80 @@ MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pa
 GYROID_LENGTH = 2.454
 GYROID_STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
 TURN_DEG = 60.0  # a third of the half turn after which lines are themselves again
+
+
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """A sparse infill: the place that has it, None: all that no later one takes; density: that its pattern is drawn with;
+    lightning: its lines (n, 2) in every layer, where that is the pattern."""
+
+    place: Place | None
+    density: float
+    lightning: Sequence[Sequence[Floats]] = ()
+
+    def process(self, process: Process) -> Process:
+        """The settings of a layer for this infill, with the width of its lines."""
+        own = process if self.place is None else self.place.over(process)
+        return with_line_width(own, own.infill_line_width_mm)
+
+
+def has_lightning(process: Process, places: Sequence[Place]) -> bool:
+    """Whether any infill of a part has the lightning pattern, which is planned for all layers together."""
+    return any(own.infill_pattern == "lightning" for own in (process, *(place.over(process) for place in places)))
+
+
+def plan_fillings(
+    sparse: Sequence[Polygons], sections: Sequence[Polygons], process: Process, places: Sequence[Place], heights_mm: Floats
+) -> list[Filling]:
+    """The infills of a part, each with the density of its pattern.
+
+    sparse: what takes infill of each layer; sections: the part's own.
+    """
+    fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
+    areas: list[list[Polygons]] = [[] for _ in fillings]
+    for layer, area in enumerate(sparse):
+        for part, mine in zip(divided(area, fillings, layer, process, _apart_mm(process)), areas, strict=True):
+            mine.append(part)
+    planned = []
+    for filling, mine in zip(fillings, areas, strict=True):
+        own = filling.process(process)
+        if own.infill_pattern == "lightning" and own.infill_density > 0.0:
+            spacing = spacing_mm(own.line_width_mm, own.layer_height_mm)
+            solid = [section - area for section, area in zip(sections, sparse, strict=True)]
+            lines = lightning_lines([_inner(area, own, spacing) for area in mine], solid, infill_cell_mm(own), heights_mm)
+            planned.append(Filling(filling.place, own.infill_density, lines))
+        else:
+            planned.append(Filling(filling.place, pattern_density(mine, own, process.layer_height_mm)))
+    return planned
+
+
+def _apart_mm(process: Process) -> float:
+    """Between the areas of two infills, which both reach over their borders as into a wall."""
+    return 2.0 * process.infill_overlap * process.line_width_mm if process.walls else 0.0
+
+
+def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: Process, apart_mm: float = 0.0) -> list[Polygons]:
+    """What of a layer's sparse area each infill takes: a later one first, with the strips beside it that are too narrow for lines
+    of an earlier one."""
+    left, parts, width_mm = sparse, list[Polygons](), process.line_width_mm
+    for filling in reversed(fillings):
+        if filling.place is None or left.is_empty():
+            parts.append(left)
+            left = Polygons()
+            continue
+        own = filling.place.areas[layer]
+        own = own if own.is_empty() else opening(left ^ own, width_mm)
+        own = own if own.is_empty() else closing(union([own, *strips_beside(own, left, 2.0 * width_mm)]), SLIT_MM)
+        parts.append(own)
+        left = left if own.is_empty() else left - offset(own, apart_mm)
+    return parts[::-1]
+
+
+def strips_beside(area: Polygons, whole: Polygons, least_mm: float) -> list[Polygons]:
+    """The strips that an area leaves of what is around it, narrower than least_mm."""
+    left, touched = whole - area, offset(area, TOUCHING_MM)
+    narrow = (left - opening(left, 0.5 * least_mm)) ^ offset(area, least_mm)
+    return [piece for piece in islands(narrow) if not (piece ^ touched).is_empty()]
 
 
 def infill_cell_mm(process: Process) -> float:
@@ -58,7 +137,7 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     """
     asked = process.infill_density
     filled = [i for i, area in enumerate(areas) if not area.is_empty()]
-    if not filled or asked <= 0 or process.infill_pattern == "lightning":
+    if not filled or asked <= 0:
         return asked
     chosen = sorted({filled[(2 * k + 1) * len(filled) // (2 * SAMPLES)] for k in range(SAMPLES)})
     spacing = spacing_mm(process.line_width_mm, height_mm)
@@ -75,6 +154,33 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
             return asked
         drawn = min(max(drawn * asked / got, asked * (1.0 - MOST_SHIFT)), asked * (1.0 + MOST_SHIFT))
     return drawn
+
+
+def filling_beads(
+    sparse: Polygons, fillings: Sequence[Filling], process: Process, *, layer: int, z_mm: float, height_mm: float
+) -> list[Bead]:
+    """Beads of all infills in the sparse area of a layer, whose settings those of the process are."""
+    beads = list[Bead]()
+    for filling, area in zip(fillings, divided(sparse, fillings, layer, process, _apart_mm(process)), strict=True):
+        own = filling.process(process)
+        lines = filling.lightning[layer] if filling.lightning else ()
+        beads += infill_beads(area, own, density=filling.density, layer=layer, z_mm=z_mm, height_mm=height_mm, lightning=lines)
+    return beads
+
+
+def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int, lightning: bool = True) -> Polygons:
+    """What of a layer's sparse area has lines too far apart to carry skin without bridges; lightning: that of this pattern, too,
+    whose branches come to the ends of skins."""
+    areas = zip(fillings, divided(sparse, fillings, layer, process), strict=True)
+    able = [(filling, area) for filling, area in areas if lightning or not filling.lightning]
+    wide = [area for filling, area in able if filling.process(process).infill_density < DENSE]
+    return wide[0] if len(wide) == 1 else union(wide)
+
+
+def widest_cell_mm(fillings: Sequence[Filling], process: Process, layer: int) -> float:
+    """About how far apart the lines of any infill of a layer lie."""
+    there = [filling for filling in fillings if filling.place is None or not filling.place.areas[layer].is_empty()]
+    return max(infill_cell_mm(filling.process(process)) for filling in there)
 
 
 def infill_beads(
@@ -111,21 +217,6 @@ def _inner(area: Polygons, process: Process, spacing_mm: float) -> Polygons:
     """Where the middles of infill lines may be: as near to the walls as lines are apart, and by infill_overlap nearer."""
     overlap = process.infill_overlap if process.walls else 0.0
     return area if area.is_empty() else offset(area, -(0.5 * spacing_mm - overlap * process.line_width_mm))
-
-
-def plan_lightning(
-    sparse: Sequence[Polygons], sections: Sequence[Polygons], process: Process, heights_mm: Floats
-) -> list[list[Floats]]:
-    """The lines of the lightning pattern in every layer of a part; none where the process has another pattern.
-
-    sparse: the places of the infill; sections: the part's own.
-    """
-    if process.infill_pattern != "lightning" or process.infill_density <= 0.0:
-        return []
-    solid = [section - area for section, area in zip(sections, sparse, strict=True)]
-    spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
-    insides = [_inner(area, process, spacing) for area in sparse]
-    return lightning_lines(insides, solid, infill_cell_mm(process), heights_mm)
 
 
 def pattern_lines(process: Process, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:

@@ -5,13 +5,15 @@ from dataclasses import dataclass
 
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, larger, offset, opening, union
-from slicer.heights import shell_layers
+from slicer.heights import SHELL_KEYS, shell_layers
+from slicer.modifiers import Place, combined, most_shell_layers, overlaid
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
 BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
 ANCHOR = 2.0  # line widths that solid layers under walls reach into the infill around, as a bridge reaches over its anchors
 FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
 LEAST_IRONED_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
+SOLID_KEYS = (*SHELL_KEYS, "infill_density", "solid_below_mm2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,26 +53,66 @@ class Cover:
 
 
 def regions(
-    insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process: Process, runs: Sequence[range] | None = None
+    insides: Sequence[Polygons],
+    cover: Cover,
+    on_plastic: bool,
+    process: Process,
+    runs: Sequence[range] | None = None,
+    places: Sequence[Place] = (),
 ) -> list[Region]:
-    """Regions of every layer of a part from what its walls enclose; runs: of layers that are asked for, all where None.
+    """Regions of every layer of a part from what its walls enclose; runs: of layers that are asked for, all where None; places:
+    where other settings hold.
 
     A place is solid when one of the model's next top_layers sections above or bottom_layers below does not cover it: so every
     vertical line meets that many layers of wall or skin below a surface, on slopes too. It is also solid where a later part
     will lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
     """
-    top, bottom = shell_layers(process)
     found = [Region(*[Polygons()] * 5)] * len(insides)
+    ruled = combined(places, SOLID_KEYS)
+    if len({_solid_rule(own) for own in (process, *(place.over(process) for place in ruled))}) == 1:
+        ruled = []
+    tops = most_shell_layers(process, places)[0] > 0
     for run in [range(len(insides))] if runs is None else runs:
-        inner = cover.insides[run.start : run.stop]
-        stacked = [cover.section(layer) for layer in range(run.start - bottom, run.stop + top)]
-        above = _common(stacked, top)[bottom + 1 :] if top else inner
-        below = _common(stacked[::-1], bottom)[::-1][bottom - 1 :] if bottom else inner
-        sparse_areas = [sparse_area(*row, process) for row in zip(inner, above, below, strict=False)]
-        hollow = _without_footings(sparse_areas, cover.sections[run.start + 1 : run.stop], inner[1:], process)
+        hollow = _hollow(run, cover, process)
+        for place in ruled:
+            hollow = _hollow_with(hollow, run, cover, place, process)
         for layer, uncut in zip(run, hollow, strict=True):
-            found[layer] = _region_of(insides[layer], uncut, cover, layer, on_plastic, process)
+            found[layer] = _region_of(insides[layer], uncut, cover, layer, on_plastic, process, tops)
     return found
+
+
+def _hollow(run: range, cover: Cover, process: Process) -> list[Polygons]:
+    """What would be sparse of a run of layers if the model were in one piece."""
+    top, bottom = shell_layers(process)
+    inner = cover.insides[run.start : run.stop]
+    stacked = [cover.section(layer) for layer in range(run.start - bottom, run.stop + top)]
+    above = _common(stacked, top)[bottom + 1 :] if top else inner
+    below = _common(stacked[::-1], bottom)[::-1][bottom - 1 :] if bottom else inner
+    sparse_areas = [sparse_area(*row, process) for row in zip(inner, above, below, strict=False)]
+    return _without_footings(sparse_areas, cover.sections[run.start + 1 : run.stop], inner[1:], process)
+
+
+def _solid_rule(process: Process) -> tuple[object, ...]:
+    """What of the settings decides what becomes solid."""
+    density = process.infill_density
+    return shell_layers(process), density >= 1.0, density > 0.0, process.solid_below_mm2
+
+
+def _hollow_with(hollow: Sequence[Polygons], run: range, cover: Cover, place: Place, process: Process) -> list[Polygons]:
+    """What would be sparse of a run of layers, within the place by its settings; strips along its border that are too narrow for
+    infill become solid."""
+    own, width_mm, areas = place.over(process), process.line_width_mm, place.areas
+    there = [layer for layer in run if not areas[layer].is_empty()]
+    if not there:
+        return list(hollow)
+    stretch = range(there[0], min(there[-1] + 1 + max(shell_layers(own)[0], 1), run.stop))
+    inside, done = _hollow(stretch, cover, own), list(hollow)
+    for layer in there:
+        area, at = areas[layer], layer - run.start
+        both = overlaid(hollow[at], [(area, inside[layer - stretch.start])])
+        border = offset(area, 2.0 * width_mm) - offset(area, -2.0 * width_mm)
+        done[at] = larger(both - ((both - opening(both, width_mm)) ^ border), FEW_MM2 * width_mm**2)
+    return done
 
 
 def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
@@ -138,8 +180,11 @@ def _without_footings(
     return left
 
 
-def _region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process) -> Region:
-    """The region of one layer; uncut: what would be sparse there if the model were in one piece."""
+def _region_of(
+    inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process, tops: bool
+) -> Region:
+    """The region of one layer; uncut: what would be sparse there if the model were in one piece; tops: whether there is skin
+    under what nothing lies on."""
     empty, width_mm = Polygons(), process.line_width_mm
     if inside.is_empty():
         return Region(empty, empty, empty, empty, empty)
@@ -149,7 +194,7 @@ def _region_of(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_p
     if not sparse.is_empty() and abs(sparse.area() - inside.area()) < 1e-6:
         return Region(empty, empty, empty, sparse, uncut)
     solid = inside if sparse.is_empty() else inside - sparse
-    bare = solid - (cover.section(layer + 1) if shell_layers(process)[0] else inside)
+    bare = solid - (cover.section(layer + 1) if tops else inside)
     bare = bare if bare.is_empty() else opening(bare, width_mm)
     if bare.is_empty():
         return Region(bare, bare, solid, sparse, uncut)
@@ -172,16 +217,22 @@ def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, pr
     return larger(left, FEW_MM2 * width_mm**2)
 
 
-def ironed_areas(regions: Sequence[Region], beside: Sequence[Polygons], process: Process) -> list[Polygons]:
+def ironed_areas(
+    regions: Sequence[Region], beside: Sequence[Polygons], process: Process, places: Sequence[Place] = ()
+) -> list[Polygons]:
     """The skin of each layer that has nothing above it, a line's width away from where a later part will stand.
 
-    beside: what later parts have of each layer and of the one over the last.
+    beside: what later parts have of each layer and of the one over the last; places: where other settings hold.
     """
-    if not process.ironing:
+    ironed = combined(places, ["ironing"])
+    if not any(own.ironing for own in (process, *(place.over(process) for place in ironed))):
         return [Polygons()] * len(regions)
     width = process.line_width_mm
     tops = [
         region.bare if above.is_empty() else region.bare - offset(above, width)
         for region, above in zip(regions, beside[1:], strict=True)
     ]
+    for layer, top in enumerate(tops):
+        here = [(place.areas[layer], top if place.over(process).ironing else Polygons()) for place in ironed]
+        tops[layer] = overlaid(top if process.ironing else Polygons(), here)
     return [larger(opening(top, 0.5 * width), LEAST_IRONED_MM2) for top in tops]

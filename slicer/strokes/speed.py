@@ -4,7 +4,7 @@ A layer that would be done too soon is slowed down so that it has time to set; t
 for itself on bridges and overhangs.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,22 +17,30 @@ from slicer.paths import KINDS, Kind, bead_area_mm2
 from slicer.strokes.strokes import RINGS, Strokes
 
 KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
+BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
 
 
 def speeds_mm_s(
-    strokes: Strokes, profile: Profile, height_mm: float, fixed_mm_s: Mapping[Kind, float] | None, flow: float
+    strokes: Strokes,
+    profile: Profile,
+    height_mm: float,
+    fixed_mm_s: Mapping[Kind, float] | None,
+    flow: float,
+    of_places: Sequence[Process] = (),
 ) -> Floats:
     """(k,) speeds of a layer's strokes; fixed_mm_s replaces the process's speeds by kind, flow multiplies every stroke's flow.
+    of_places: the processes of the places in which other settings hold.
 
     Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
     below least_speed_mm_s.
     """
     process = profile.process
-    usual = _by_kind(stroke_speeds(process))[strokes.kind] if fixed_mm_s is None else _by_kind(fixed_mm_s)[strokes.kind]
-    asked = usual if fixed_mm_s is not None else _of_strokes(strokes, usual, process)
+    asked = _of_strokes(strokes, process) if fixed_mm_s is None else _by_kind(fixed_mm_s)[strokes.kind]
+    for number, own in enumerate(of_places if fixed_mm_s is None else (), start=1):
+        asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
     areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
     speeds = np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas)
     time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
@@ -43,13 +51,25 @@ def _by_kind(speeds: Mapping[Kind, float]) -> Floats:
     return np.array([speeds[kind] for kind in KINDS])
 
 
-def _of_strokes(strokes: Strokes, usual: Floats, process: Process) -> Floats:
-    """The kind's speed, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
-    by_share = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
-    hanging = np.array([np.inf, *(getattr(process, key) for key in by_share)])[strokes.overhang]
+def _of_strokes(strokes: Strokes, process: Process) -> Floats:
+    """The speed of its kind, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
+    usual = _by_kind(stroke_speeds(process))[strokes.kind]
+    hanging = np.array([np.inf, *(getattr(process, key) for key in BY_SHARE)])[strokes.overhang]
     small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
     lowered = np.minimum(usual, np.where(strokes.overhang > 0, hanging, small))
     return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
+
+
+def kinds_apart(processes: Sequence[Process]) -> list[Kind]:
+    """The kinds of beads that have not the same speed by all of some processes."""
+
+    def differ(*keys: str) -> bool:
+        return len({tuple(getattr(process, key) for key in keys) for process in processes}) > 1
+
+    speeds = [stroke_speeds(process) for process in processes]
+    kinds = [kind for kind in KINDS if len({own[kind] for own in speeds}) > 1]
+    kinds += [*RINGS, Kind.GAP, Kind.OVERHANG] if differ("small_wall_speed_mm_s", *BY_SHARE) else []
+    return [*kinds, Kind.BRIDGE] if differ("infill_bridge_speed_mm_s") else kinds
 
 
 def travel_time_s(strokes: Strokes, profile: Profile) -> float:

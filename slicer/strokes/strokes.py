@@ -23,7 +23,7 @@ from slicer.geometry.polyline import Segment, lengths_mm, nearest_share
 from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
-COLUMNS = ("kind", "width_mm", "flow", "overhang", "over_infill", "small", "varies", "retract")
+COLUMNS = ("kind", "width_mm", "flow", "overhang", "over_infill", "small", "varies", "retract", "place")
 Buffers = tuple[Floats, Indices, Indices, Mask]
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
@@ -41,7 +41,8 @@ class Strokes:
     approach: (m, 2) points that the travels to strokes pass; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS;
     width_mm: mean; flow, over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or
     nothing of it lies on plastic; small: a closed wall no longer than process.small_wall_mm, also the pieces of one whose width
-    varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back.
+    varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back; place: of those in which
+    other settings hold, counted from 1, 0: none.
     """
 
     points: Floats
@@ -54,6 +55,7 @@ class Strokes:
     small: Mask
     varies: Mask
     retract: Mask
+    place: NDArray[np.int8]
     approach: Floats
     approach_starts: Indices
 
@@ -119,6 +121,7 @@ def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Fl
         small=small,
         varies=np.array([bead.course is not None for bead in beads], dtype=np.bool_),
         retract=retract,
+        place=np.zeros(len(beads), np.int8),
         approach=np.concatenate([np.zeros((0, 2)), *passed]),
         approach_starts=np.cumsum([0, *(len(way) for way in passed)]),
     )
@@ -250,6 +253,15 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
         if share <= process.overhang_share:
             kind = np.where(within, NUMBER[Kind.OVERHANG], kind)
         strokes = replace(strokes, kind=kind.astype(np.int8), overhang=overhang.astype(np.int8))
+    return strokes
+
+
+def split_places(strokes: Strokes, areas: Sequence[Polygons], kinds: Sequence[Kind], shortest_mm: float) -> Strokes:
+    """The strokes of a layer, those of some kinds split where they enter and leave the places in which other settings hold."""
+    for number, area in enumerate(areas, start=1):
+        if kinds and not area.is_empty():
+            strokes, within = split(strokes, area, strokes.is_of(*kinds), shortest_mm)
+            strokes = replace(strokes, place=np.where(within, number, strokes.place).astype(np.int8))
     return strokes
 
 

@@ -40,7 +40,7 @@ def decompose(request: ModelRequest) -> int:
         save_parts(outputs.folder, decomposition, figures)
     for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
         if file is not None and not _is_same(file, request.cuts.plan):
-            write_bytes(file, plan_text(decomposed.plan).encode())
+            write_bytes(file, plan_text(decomposed.plan, file.parent).encode())
     _draw(outputs, decomposition, profile)
     if outputs.html is not None:
         write_bytes(outputs.html, parts_page(decomposition, profile, alternatives))

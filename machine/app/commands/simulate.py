@@ -45,7 +45,8 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     if mesh is not None:
         from machine.dryrun.conformity.agreement import agreement
 
-        agreed, run = agreement(program.run, mesh, profile)
+        modifiers = () if program.decomposition is None else program.decomposition.parts[0].modifiers
+        agreed, run = agreement(program.run, mesh, profile, modifiers)
         program = replace(program, run=run)
     if baud is not None:
         from machine.dryrun.starvation import find_starvation

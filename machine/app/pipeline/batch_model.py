@@ -116,7 +116,7 @@ def _decompose(request: ModelRequest, row: Row, out: Path) -> Row:
     decomposition, profile = decomposed.decomposition, decomposed.profile
     figures = json_values(decomposition, joints_of(decomposition.parts, profile), decomposed.read_s, decomposed.total_s)
     save_parts(out, decomposition, figures | {"rotate_deg": profile.process.rotate_deg})
-    write_bytes(out / PLAN, plan_text(decomposed.plan).encode())
+    write_bytes(out / PLAN, plan_text(decomposed.plan, out).encode())
     names = (*(part_file(part.index) for part in decomposition.parts), MODEL, SCENE, FIGURES, PLAN)
     row = replace(row, parts=len(decomposition.parts), files=BETWEEN.join(f"{out.name}/{name}" for name in names))
     try:

@@ -10,6 +10,7 @@ from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.search.search import check_part_count
 from profiles.errors import PlanError, ProfileError
+from profiles.part_settings import problems_of_place
 from profiles.profile import Profile, with_part_settings
 
 
@@ -60,8 +61,15 @@ def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
 
 
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
-    """The profile with the settings that a plan has for single parts, under those of --part. Raises PlanError."""
-    if given is None or not given.settings:
+    """The profile with the settings that a plan has for single parts, under those of --part. Raises PlanError, also for settings
+    that no modifier may have."""
+    if given is None:
+        return profile
+    for number, modifier in enumerate(given.zones.modifiers, start=1):
+        problems = list(problems_of_place(profile.process, modifier.process, profile.machine.head.nozzle_mm))
+        if problems:
+            raise PlanError(f"plan {given.name}: " + "; ".join(f"modifier {number}: {problem}" for problem in problems))
+    if not given.settings:
         return profile
     try:
         with_part_settings(profile.of_all_parts, given.settings)

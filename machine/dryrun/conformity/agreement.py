@@ -1,6 +1,6 @@
 """Agreement: the deposited plastic beside the model it was made from: what is filled, what lies outside, what hangs in air."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,8 @@ from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.placement import unsupported_mm
 from mdp.mesh import Mesh
+from mdp.zone import Modifier
+from profiles.part_settings import process_of_part
 from profiles.profile import Profile
 from slicer.sectioning import reach_mm
 
@@ -35,9 +37,9 @@ class Agreement:
     shift_mm: float
 
 
-def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, DryRun]:
+def agreement(run: DryRun, mesh: Mesh, profile: Profile, modifiers: Sequence[Modifier] = ()) -> tuple[Agreement, DryRun]:
     """How the plastic of a dry run, one that has looked for its findings itself, agrees with the closed model (workpiece frame);
-    the run with what that found added.
+    the run with what that found added. modifiers: where the print has other settings than the profile's.
 
     Findings: outside and shift (errors), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
     """
@@ -49,11 +51,14 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, Dry
     moved = registration.shifts(run, mesh, profile)
     farthest = max((shift.size_mm for shift in moved), default=0.0)
     result = Agreement(filled, 1.0 - share.share, share.farthest_mm, loose / whole, reported / whole, farthest)
-    problems = [*_findings(run, share, result, profile), *registration.findings(run, moved)]
+    processes = [profile.of_part(int(part)).process for part in set(run.program.part.tolist())]
+    processes += [process_of_part(profile.process, modifier.process) for modifier in modifiers]
+    solid = all(process.infill_density >= 1.0 for process in processes)
+    problems = [*_findings(run, share, result, solid), *registration.findings(run, moved)]
     return result, replace(run, findings=(*run.findings, *problems))
 
 
-def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) -> Iterator[Finding]:
+def _findings(run: DryRun, share: Share, result: Agreement, solid: bool) -> Iterator[Finding]:
     if result.outside > MOST_OUTSIDE:
         row = int(run.segment_row[np.flatnonzero(share.outside)[0]])
         message = (
@@ -61,7 +66,6 @@ def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) ->
             f"{result.farthest_mm:.2f} mm and more at the worst"
         )
         yield at_row(run.program, row, "error", "outside", message)
-    solid = all(profile.of_part(int(part)).process.infill_density >= 1.0 for part in set(run.program.part.tolist()))
     if solid and result.filled < LEAST_FILLED:
         message = (
             f"the beads fill {100 * result.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
+from mdp.save import stl
 from mdp.search.by_plan import cut_by_plan
-from mdp.zone import Grown, Painted, Zone, Zones
+from mdp.zone import Grown, MeshVolume, Modifier, Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
@@ -38,6 +39,11 @@ TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 AXES = st.none() | st.just(TURNED)
 ZONES = st.builds(lambda low, axes: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0), axes), CORNERS, AXES)
 GROWN = st.builds(Grown, CORNERS, st.floats(0.0, 180.0))
+MODIFIERS = st.builds(
+    Modifier,
+    ZONES | st.builds(lambda z: Zone((-1e5, -1e5, z), (1e5, 1e5, z + 2.0)), st.floats(-9e4, 9e4)),
+    st.sampled_from([{"infill_density": 0.6, "walls": 4}, {"infill_pattern": "gyroid"}]),
+)
 COLOURS = st.builds(Painted, st.integers(0, 0xFFFFFF))
 PLANS = st.builds(
     PlanFile,
@@ -46,7 +52,11 @@ PLANS = st.builds(
     sha256=st.text("0123456789abcdef", max_size=64),
     orientation=st.sampled_from([None, TURNED]),
     parts=st.lists(OPEN, max_size=5).map(tuple),
-    zones=st.builds(Zones, *[st.lists(ZONES | COLOURS | GROWN, max_size=2).map(tuple)] * 3),
+    zones=st.builds(
+        Zones,
+        *[st.lists(ZONES | COLOURS | GROWN, max_size=2).map(tuple)] * 3,
+        modifiers=st.lists(MODIFIERS, max_size=2).map(tuple),
+    ),
     settings=st.sampled_from([(), (PartSettings(part=1, process={"infill_pattern": "gyroid", "infill_density": 0.4}),)]),
     front=st.lists(ROWS, max_size=3, unique_by=lambda row: len(row.parts)).map(tuple),
 )
@@ -109,6 +119,17 @@ REFUSED = [
         "keep 1: has a point and a box: one of them is allowed",
     ),
     ("version = 1\n[keep]\nmin_mm = [0, 0, 0]", "[[keep]] tables are expected"),
+    ("version = 1\n[[modifier]]\nz_mm = [1, 2]", "modifier 1: process is missing: keys and values are expected, as {walls = 4}"),
+    ("version = 1\n[[modifier]]\nprocess = {walls = 4}", "has no volume: one of a box, a height range z_mm, a mesh is expected"),
+    ("version = 1\n[[modifier]]\nz_mm = [1, 2]\nmesh = 'a.stl'", "modifier 1: has a height range z_mm and a mesh: one of a box,"),
+    ("version = 1\n[[modifier]]\nz_mm = [2, 2]\nprocess = {walls = 4}", "z_mm is [2.0, 2.0]: the first number must be less"),
+    ("version = 1\n[[modifier]]\nz_mm = 2\nprocess = {walls = 4}", "modifier 1: z_mm is 2: 2 numbers in brackets are expected"),
+    ("version = 1\n[[modifier]]\nmesh = 'none.stl'\nprocess = {walls = 4}", "none.stl: there is no such file"),
+    ("version = 1\n[[modifier]]\nmesh = ''\nprocess = {walls = 4}", "mesh is '': the name of a model's file is expected"),
+    (
+        "version = 1\n[[modifier]]\ncolour = '#ff0000'",
+        "modifier 1: 'colour' is no key of a plan: min_mm, max_mm, axes, z_mm,",
+    ),
     ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
     ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),
     ("version = 1\n[[front]]\nplanes = []\ncost_mm2 = 'dear'", "front 1: cost_mm2 is 'dear': a number is expected"),
@@ -130,6 +151,29 @@ def test_what_is_no_plan_is_refused_in_one_sentence(tmp_path: Path, text: str, s
     assert "mine.toml" in message
     assert "\n" not in message
     assert len(message) < 400
+
+
+def test_the_mesh_of_a_modifier_lies_beside_the_plan_as_its_file_has_it(tmp_path: Path) -> None:
+    insert = shapes.box(3.0, 4.0, 5.0).transform(np.eye(3), (30.0, 0.0, 7.0))
+    (tmp_path / "insert.stl").write_bytes(stl(insert))
+    (tmp_path / "mine.toml").write_text("version = 1\n[[modifier]]\nmesh = 'insert.stl'\nprocess = {walls = 4}")
+    plan = read_plan(tmp_path / "mine.toml")
+    (volume,) = (modifier.volume for modifier in plan.zones.modifiers)
+    assert isinstance(volume, MeshVolume)
+    assert volume.mesh.bounds_mm.tolist() == [[28.5, -2.0, 7.0], [31.5, 2.0, 12.0]]
+    for folder, written in ((tmp_path, "insert.stl"), (tmp_path / "parts", "../insert.stl")):
+        folder.mkdir(exist_ok=True)
+        (folder / "plan.toml").write_text(plan_text(plan, folder))
+        assert f'mesh = "{written}"' in (folder / "plan.toml").read_text()
+        assert read_plan(folder / "plan.toml").zones == plan.zones
+    assert f'mesh = "{(tmp_path / "insert.stl").as_posix()}"' in plan_text(plan)
+
+
+def test_an_open_mesh_of_a_modifier_is_refused_by_its_name(tmp_path: Path) -> None:
+    (tmp_path / "flat.stl").write_bytes(b"solid flat\nendsolid flat\n")
+    (tmp_path / "mine.toml").write_text("version = 1\n[[modifier]]\nmesh = 'flat.stl'\nprocess = {walls = 4}")
+    with pytest.raises(PlanError, match=r"plan mine.toml: modifier 1: mesh .*flat.stl.*"):
+        read_plan(tmp_path / "mine.toml")
 
 
 def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path: Path) -> None:

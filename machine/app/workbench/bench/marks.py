@@ -1,6 +1,7 @@
 """Marks: boxes and faces on which a person wants no cut, no seam or no support: the zones of the plan."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -24,14 +25,19 @@ def mark(bench: Bench, asked: Asked) -> tuple[str, Zones]:
     index = whole(asked, "number", 1, len(zones)) - 1 if "number" in asked else len(zones)
     if index >= MOST_ZONES:
         raise PlanError(f"there are {index} zones of {kind}: {MOST_ZONES} are allowed")
-    return WORDS[kind], replace(bench.zones, **{kind: (*zones[:index], _zone(asked, bench), *zones[index + 1 :])})
+    return WORDS[kind], _with(bench.zones, kind, (*zones[:index], _zone(asked, bench), *zones[index + 1 :]))
 
 
 def unmark(bench: Bench, asked: Asked) -> tuple[str, Zones]:
     """The same without the zone `number` of `kind`. Raises PlanError."""
     kind, zones = _zones(bench, asked)
     index = whole(asked, "number", 1, len(zones)) - 1
-    return "take a mark away", replace(bench.zones, **{kind: (*zones[:index], *zones[index + 1 :])})
+    return "take a mark away", _with(bench.zones, kind, (*zones[:index], *zones[index + 1 :]))
+
+
+def _with(zones: Zones, kind: str, several: tuple[AnyZone, ...]) -> Zones:
+    changed: dict[str, Any] = {kind: several}
+    return replace(zones, **changed)
 
 
 def _zones(bench: Bench, asked: Asked) -> tuple[str, tuple[AnyZone, ...]]:

@@ -1,14 +1,14 @@
 """Placing: planes and zones that belong to a model go along when it is turned, scaled or lifted."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from machine.app.workbench.bench.values import vector_of
 from mdp.mesh import Floats, Mesh
-from mdp.plans.plan_file import ZONE_KINDS, PlannedPart
-from mdp.plans.reading import MOST_MM
-from mdp.zone import AnyZone, Grown, Zone, Zones
+from mdp.plans.plan_file import MOST_MM, ZONE_KINDS, PlannedPart
+from mdp.zone import AnyZone, Grown, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 
@@ -51,12 +51,13 @@ def _between(before: Floats, after: Floats) -> Floats:
 
 
 def moved_zones(zones: Zones, move: Placing) -> Zones:
-    """The zones on the same places of the model. Raises PlanError for a box that a plan could not have there."""
-    kinds = {
+    """The zones on the same places of the model. Raises PlanError for a box that a plan could not have there, and for a mesh."""
+    kinds: dict[str, Any] = {
         kind: tuple(_moved(zone, move, f"{kind} {number}") for number, zone in enumerate(getattr(zones, kind), start=1))
         for kind in ZONE_KINDS
     }
-    return Zones(**kinds)
+    modifiers = tuple(_moved_modifier(own, move, f"modifier {number}") for number, own in enumerate(zones.modifiers, start=1))
+    return Zones(**kinds, modifiers=modifiers)
 
 
 def moved_part(part: PlannedPart, move: Placing) -> PlannedPart:
@@ -76,6 +77,12 @@ def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:
         point_mm = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
         return replace(zone, point_mm=vector_of(np.round(point_mm, POINT_DIGITS)))
     return zone
+
+
+def _moved_modifier(modifier: Modifier, move: Placing, label: str) -> Modifier:
+    if isinstance(modifier.volume, Zone):
+        return replace(modifier, volume=_moved_box(modifier.volume, move, label))
+    raise PlanError(f"{label}: its mesh lies where {modifier.volume.file.name} has it and cannot be moved with the model")
 
 
 def _moved_box(box: Zone, move: Placing, label: str) -> Zone:

@@ -93,7 +93,7 @@ def write_work(folder: Path, bench: Bench) -> None:
         "copies": bench.copies,
     }
     if bench.planned:
-        write_whole(folder / PLAN, plan_text(plan_of_bench(bench, PLAN)).encode())
+        write_whole(folder / PLAN, plan_text(plan_of_bench(bench, PLAN), folder).encode())
     write_whole(folder / RECORD, json.dumps(record).encode())
     names |= {str(record["model"]), *copies.values()}
     for file in folder.iterdir():

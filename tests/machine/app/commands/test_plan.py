@@ -82,6 +82,47 @@ def test_settings_of_a_part_are_kept_in_the_plan_and_change_what_is_written(
     assert "part 3 is not there to have walls = 4: the parts are 1 to 2" in capsys.readouterr().err
 
 
+def test_modifiers_of_a_plan_are_printed_and_kept_in_the_plan(folder: Path) -> None:
+    Path("box.stl").write_bytes(stl(shapes.box()))
+    Path("insert.stl").write_bytes(stl(shapes.box(8.0, 8.0, 20.0)))
+    head = "version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 6\n"
+    volumes = "[[modifier]]\nmesh = 'insert.stl'\nprocess = {infill_density = 1}\n"
+    volumes += "[[modifier]]\nz_mm = [2, 4]\nprocess = {walls = 5}\n"
+    Path("plain.toml").write_text(head)
+    Path("box.toml").write_text(head + volumes)
+    sparse = "--set", "process.solid_below_mm2=0"
+    _run("export", "box.stl", "--plan", "plain.toml", "-o", "plain.gcode", "--json", "plain.json", *sparse)
+    _run("export", "box.stl", "--plan", "box.toml", "-o", "box.gcode", "--json", "box.json", *sparse)
+    assert _values("box.json")["extruded_mm3"] > _values("plain.json")["extruded_mm3"] + 100.0
+    _run("decompose", "box.stl", "--plan", "box.toml", "-o", "parts")
+    _run("export", "box.stl", "--plan", "parts/plan.toml", "-o", "again.gcode", *sparse)
+    assert 'mesh = "../insert.stl"' in Path("parts/plan.toml").read_text()
+    assert Path("again.gcode").read_bytes() == Path("box.gcode").read_bytes()
+
+
+MODIFIER = "version = 1\n[[part]]\n[[modifier]]\nz_mm = [1, 2]\nprocess = "
+
+
+@pytest.mark.parametrize(
+    ("process", "sentence"),
+    [
+        ("{layer_height_mm = 0.1}", "modifier 1: process.layer_height_mm holds for a whole part: walls, top_layers,"),
+        ("{first_layer_speed_mm_s = 10}", "modifier 1: process.first_layer_speed_mm_s holds for a whole part: walls,"),
+        ("{support = 'none'}", "modifier 1: process.support holds for a whole part: walls,"),
+        ("{walls = 0}", "modifier 1: process.walls is 0: at least 1 is allowed"),
+        ("{infill_density = 3}", "modifier 1: process.infill_density is 3"),
+        ("{wals = 3}", "modifier 1: process.wals"),
+    ],
+)
+def test_settings_that_no_modifier_may_have_are_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str], process: str, sentence: str
+) -> None:
+    Path("box.stl").write_bytes(stl(shapes.box()))
+    Path("mine.toml").write_text(MODIFIER + process)
+    assert main(["export", "box.stl", "--plan", "mine.toml", "-o", "box.gcode", *FAST]) == 1
+    assert f"tiltprint: plan mine.toml: {sentence}" in capsys.readouterr().err
+
+
 def test_more_parts_than_there_are_give_all_there_are_and_say_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     _run("decompose", "tee.stl", "--parts", "50", "--json", "many.json")

@@ -21,7 +21,7 @@ from mdp.plans.plan_file import PlannedPart
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.pose import about, unit
-from mdp.zone import Grown, Zone, Zones
+from mdp.zone import Grown, MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
@@ -68,6 +68,21 @@ def test_a_plan_of_boxes_without_end_on_a_model_turned_by_rounded_numbers_is_rea
     assert read_plan(file).zones.keep == (box,)
     assert isinstance(box, Zone)
     assert (box.touches(workpiece_mesh(bench)) == half.touches(tee())).all()
+
+
+def test_modifiers_go_along_with_a_model_but_for_meshes(tmp_path: Path) -> None:
+    heights = Zone((-1e5, -1e5, 10.0), (1e5, 1e5, 20.0))
+    both = replace(
+        BENCH, zones=Zones(modifiers=(Modifier(BOX, {"walls": 4}), Modifier(heights, {"infill_density": 0.5}))), cuts=()
+    )
+    larger = with_scaled_model(both, model(mesh=tee().transform(2.0 * np.eye(3))), 2.0)
+    box, slab = (modifier.volume for modifier in larger.zones.modifiers)
+    assert box == Zone((2.0, 4.0, 6.0), (18.0, 18.0, 18.0))
+    assert slab == Zone((-1e5, -1e5, 20.0), (1e5, 1e5, 40.0))
+    assert [modifier.process for modifier in larger.zones.modifiers] == [{"walls": 4}, {"infill_density": 0.5}]
+    mesh = replace(both, zones=Zones(modifiers=(Modifier(MeshVolume(tmp_path / "a.stl", tee()), {"walls": 4}),)))
+    with pytest.raises(PlanError, match=r"modifier 1: its mesh lies where a\.stl has it and cannot be moved with the model"):
+        with_rotation(mesh, ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)))
 
 
 def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> None:

@@ -1,0 +1,139 @@
+"""Modifiers: where in the layers of a part other settings hold, from the volumes that a person gives them.
+
+Walls, skins and infill are those of the part's own settings outside, of the modifier's inside, each cut along the volume: outer
+walls run on as they are, and no wall is made where only the settings change.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from mdp.cut import convex_hull
+from mdp.decomposition import Part
+from mdp.mesh import Floats, Mesh
+from mdp.topology.cross_section import cross_sections
+from mdp.zone import MeshVolume, Modifier
+from profiles.errors import SliceError
+from profiles.part_settings import process_of_part
+from profiles.process import Process
+from slicer.geometry.polygons import Polygons, clean, closing, offset, union
+from slicer.heights import SHELL_KEYS, shell_layers
+
+AROUND_MM = 5.0  # beside a part, which is more than its outlines may reach beyond its mesh
+LEAST_MM2 = 0.01  # of a layer: less of it is no place
+SLIT_MM = 0.001  # places that meet are joined over the rounding of their borders
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Values of the process, by their keys, and the areas of a part's layers in which they hold."""
+
+    settings: Mapping[str, Any]
+    areas: Sequence[Polygons]
+
+    def over(self, process: Process) -> Process:
+        """A process with these values in place of its own."""
+        return process.model_copy(update=self.settings)
+
+
+def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -> list[Place]:
+    """Where in the layers of a part other settings hold than those of its process, those of a later place over an earlier one's.
+
+    mesh: the part's, in its frame; cuts_mm: the middles of the layers. Raises SliceError for settings that do not go with the
+    process's own.
+    """
+    places = []
+    for own, modifiers in groupby(part.modifiers, key=lambda modifier: modifier.process):
+        settings = process_of_part(process, own).model_dump(include=set(own))
+        _check(process, settings)
+        places.append(Place(settings, _areas(part, [*modifiers], mesh, cuts_mm)))
+    return [place for place in places if any(not area.is_empty() for area in place.areas)]
+
+
+def combined(places: Sequence[Place], keys: Collection[str]) -> list[Place]:
+    """The places in which some keys have values of their own. Where some meet there is a further one with the values of all: the
+    last place at a point has all that hold there."""
+    found = list[Place]()
+    for place in places:
+        settings = {key: value for key, value in place.settings.items() if key in keys}
+        if settings:
+            new = Place(settings, place.areas)
+            found += [new, *(both for old in found if (both := _overlap(old, new)) is not None)]
+    return found
+
+
+def _check(process: Process, settings: Mapping[str, Any]) -> None:
+    if process.spiral_vase:
+        raise SliceError("process.spiral_vase is one wall all the way up: a [[modifier]] of the plan changes nothing in it")
+    if process.walls == 0 and "walls" in settings:
+        raise SliceError("process.walls is 0: a [[modifier]] of the plan can only change the walls of a part that has some")
+
+
+def _areas(part: Part, modifiers: Sequence[Modifier], mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
+    """What volumes have of each layer, near the part."""
+    (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
+    window = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
+    volumes = [modifier.volume for modifier in modifiers]
+    meshes = [volume.mesh if isinstance(volume, MeshVolume) else convex_hull(volume.corners) for volume in volumes]
+    sections = [cross_sections(own.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm)), cuts_mm) for own in meshes]
+    return [union([clean(loops, 0.0) for loops in layer]) ^ window for layer in zip(*sections, strict=True)]
+
+
+def _overlap(old: Place, new: Place) -> Place | None:
+    """Where two places meet; None where they do not, or the later one's values are all."""
+    settings = {**old.settings, **new.settings}
+    areas = [] if settings == new.settings else [a ^ b for a, b in zip(old.areas, new.areas, strict=True)]
+    return Place(settings, areas) if any(not area.is_empty() for area in areas) else None
+
+
+def most_shell_layers(process: Process, places: Sequence[Place]) -> tuple[int, int]:
+    """Solid layers under and over a surface, as many as the process or any place has."""
+    counts = [shell_layers(own) for own in (process, *(place.over(process) for place in combined(places, SHELL_KEYS)))]
+    return max(top for top, _ in counts), max(bottom for _, bottom in counts)
+
+
+def overlaid(base: Polygons, others: Sequence[tuple[Polygons, Polygons]]) -> Polygons:
+    """An area that in some places is another one; the last of them that has a place wins. others: places, and what is there."""
+    there = [(place, area) for place, area in others if not place.is_empty()]
+    for place, area in there:
+        base = (base - place) + (area ^ place)
+    return closing(base, SLIT_MM) if there else base
+
+
+@dataclass(frozen=True, eq=False)
+class WallCounts:
+    """How many walls a layer has, and the areas where it has another number, the last of which wins."""
+
+    usual: int
+    others: Sequence[tuple[Polygons, int]] = ()
+
+    @property
+    def all(self) -> list[int]:
+        """Every number of walls that there is."""
+        return [self.usual, *(count for _, count in self.others)]
+
+    def overlaid(self, of_count: Callable[[int], Polygons]) -> Polygons:
+        """One area made of those that belong to each number."""
+        return overlaid(of_count(self.usual), [(area, of_count(count)) for area, count in self.others])
+
+    def where_more(self, level: int, within: Polygons, short_mm: float) -> Polygons:
+        """What of an area has more walls than a level, so far from where it has fewer."""
+        if all(count > level for count in self.all):
+            return within
+        shrunk = [(offset(area, -short_mm if count > level else short_mm), count) for area, count in self.others]
+        return WallCounts(self.usual, shrunk).overlaid(lambda count: within if count > level else Polygons())
+
+
+def wall_counts(section: Polygons, layer: int, walls: int, more: int, places: Sequence[Place]) -> WallCounts:
+    """The walls of a section of a layer: the process's, or those of places; more: all have so many more."""
+    usual, others = walls + more, list[tuple[Polygons, int]]()
+    for place in combined(places, ["walls"]):
+        count, area_mm2 = place.settings["walls"] + more, (section ^ place.areas[layer]).area()
+        if section.area() - area_mm2 < LEAST_MM2:
+            usual, others = count, []
+        elif area_mm2 >= LEAST_MM2 and (others or count != usual):
+            others.append((place.areas[layer], count))
+    return WallCounts(usual, others)
