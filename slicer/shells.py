@@ -15,7 +15,6 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import (
     ROUND_SIDES,
-    WALLS,
     Bead,
     bulge_flow,
     first_layer_process,
@@ -44,7 +43,7 @@ from slicer.geometry.polygons import (
     opening,
     union,
 )
-from slicer.geometry.polyline import length_mm, simplify
+from slicer.geometry.polyline import length_mm
 from slicer.interface.interface import limb_planes, plane_in_frame_of
 from slicer.modifiers import WallCounts, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
@@ -300,11 +299,7 @@ def cover(sections: Sections, model: Sequence[Polygons | None], insides: Sequenc
 
 def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
     """What a layer prints of the part itself, and for it; walls that run round come as loops, without their seams."""
-    laid = _part_beads(shells, layer), auxiliary_beads(shells.supports, shells.layers[layer].process, layer)
-    own, auxiliary = (
-        [bead if bead.kind in WALLS else replace(bead, points=simplify(bead.points)) for bead in beads] for beads in laid
-    )
-    return own, auxiliary
+    return _part_beads(shells, layer), auxiliary_beads(shells.supports, shells.layers[layer].process, layer)
 
 
 def _part_beads(shells: Shells, layer: int) -> list[Bead]:

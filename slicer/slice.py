@@ -26,7 +26,7 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm, mark_corners
+from slicer.geometry.polyline import length_mm, mark_corners
 from slicer.heights import shell_layers
 from slicer.interface.interface import pin_width_mm, skin_beside
 from slicer.overhangs import Overhang, find_overhangs
@@ -213,7 +213,7 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)  # at least: accelerations are left out
     layer_fan = fan * fan_share(material, process, time_s)
     own_fan = own_fans(strokes, material, fan, layer_fan)
-    corners = mark_corners(strokes.points, strokes.starts, PATH_RESOLUTION_MM)
+    corners = mark_corners(strokes.points, strokes.starts, process.resolution_mm)
     strokes = replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts])
     return Layer(
         z_mm=float(sections.heights.tip_mm[index]),

@@ -17,7 +17,7 @@ SPACE, MINUS, POINT, ZERO, LINE_END, FEED = 32, 45, 46, 48, 10, 70
 COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point
 PUSHING, TRAVELLING, STANDING = range(3)  # what a path does: strokes and wipes, travels, retractions
 X, Y, Z, PUSHED, F = range(5)  # what the firmware knows
-SAME = 1.001  # less than the firmware and the dry run care for
+SAME = 1.02  # a stroke so much richer is not seen, and within what the dry run allows
 STEPS = 20  # a short stroke that must go slower does so by twentieths, or the speeds of its like would flicker
 
 

@@ -36,6 +36,7 @@ KEYS = {
     "bottom_shell_layers": "bottom_solid_layers",
     "top_shell_thickness": "top_solid_min_thickness",
     "bottom_shell_thickness": "bottom_solid_min_thickness",
+    "resolution": "gcode_resolution",
     "sparse_infill_density": "fill_density",
     "sparse_infill_pattern": "fill_pattern",
     "infill_direction": "fill_angle",

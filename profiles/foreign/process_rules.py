@@ -164,6 +164,7 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.seam", "seam_position", one_of(SEAMS)),
     ("process.spiral_vase", "spiral_vase", flag),
     ("process.slit_closing_mm", "slice_closing_radius", number),
+    ("process.resolution_mm", "gcode_resolution", number),
     ("process.elephant_foot_mm", "elefant_foot_compensation", number),
     ("process.outline_compensation_mm", "xy_size_compensation", number),
     ("process.hole_compensation_mm", "xy_size_compensation", _holes_of_all),

@@ -20,6 +20,7 @@ LAYERS = {
     "infill_line_width_mm": advanced("Infill line width", "sparse infill extrusion width"),
     "support_line_width_mm": advanced("Support line width", "support material extrusion width"),
     "slit_closing_mm": rare("Slits that are closed", "slice gap closing radius"),
+    "resolution_mm": rare("Resolution of paths", "gcode resolution slice simplify maximum deviation"),
 }
 SHELL = {
     "walls": simple("Walls", "perimeters shells wall loops wall count"),

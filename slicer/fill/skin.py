@@ -13,7 +13,7 @@ from math import ceil
 import numpy as np
 
 from mdp.mesh import Floats, Indices
-from slicer.bead import Bead, spacing_mm
+from slicer.bead import ROUND_SIDES, Bead, spacing_mm
 from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, horizontal_lines
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
@@ -22,12 +22,11 @@ from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 from slicer.walls.walls import gaps, uncovered_area
 
-JOIN = 4.0  # spacings along the border: line ends nearer than this are joined
+JOIN = 12.0  # spacings along the border: line ends nearer than this are joined
 EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
 RANK = 2  # behind gaps (slicer.walls.walls), before infill
-# Of 2,250 skins of bracket, tree, figure and the bunny (as they stand, default process, commit 5c72b83f) 90 of 100 ask for 0.82
-# to 1.06. What asks for less or more are specks whose lines hardly fit.
-LEAST_FLOW, MOST_FLOW = 0.85, 1.15
+TOUCHING = 0.01  # of the spacing: neighbouring lines overlap by this at least, however little flow a skin asks for
+MOST_FLOW = 1.15  # what asks for more are specks whose lines hardly fit
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
 
@@ -62,17 +61,18 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
     """The lines that fill an area, those of each connected piece spread evenly, and the places that they leave in each.
 
     The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
-    it.
+    it; but lines still touch each other in narrow places, which are all line ends.
     """
     spacing, width_mm = solid.spacing_mm, solid.width_mm
     beads, rests = list[Bead](), list[Polygons]()
+    least_flow = 1.0 + TOUCHING - solid.height_mm * ROUND_SIDES / spacing
     for island in islands(area):
         lines = _lines(offset(island, -(0.5 * spacing - solid.overlap * width_mm)), solid)
         rest = uncovered_area(island, lines, width_mm)
         rests.append(rest)
         total = sum(length_mm(line) for line in lines)
         if total > 0:
-            flow = min(max((island.area() - rest.area()) / (total * spacing), LEAST_FLOW), MOST_FLOW)
+            flow = min(max((island.area() - rest.area()) / (total * spacing), least_flow), MOST_FLOW)
             beads += [Bead(kind, line, width_mm, RANK, flow, follows=solid.in_order and k > 0) for k, line in enumerate(lines)]
     return beads, rests
 

@@ -15,8 +15,6 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 
-PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSlicer's resolution of G-code
-
 
 class Segment(NamedTuple):
     """A straight line from x0, y0 to x1, y1."""
@@ -125,14 +123,6 @@ def length_between(points: Floats, first: int, end: int) -> float:
     for i in range(first + 1, end):
         total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
     return total
-
-
-def simplify(points: Floats) -> Floats:
-    """A polyline (n, 2) without points that lie within PATH_RESOLUTION_MM of the line between those that stay; its ends stay."""
-    if len(points) < 3:
-        return points
-    corners = mark_corners(points, np.array([0, len(points)]), PATH_RESOLUTION_MM)
-    return points if corners.all() else points[corners]
 
 
 @kernel

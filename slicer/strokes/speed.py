@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.material import Material
 from profiles.process import Process
@@ -20,6 +21,7 @@ KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_m
 BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
+LEAST_GAIN_S = 0.1  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
 FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
 
 
@@ -42,9 +44,31 @@ def speeds_mm_s(
     for number, own in enumerate(of_places if fixed_mm_s is None else (), start=1):
         asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
     areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
-    speeds = np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas)
+    speeds = steady(np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas), strokes.lengths_mm)
     time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
     return _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
+
+
+@kernel
+def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
+    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or less.
+
+    A stretch of one speed that is faster than those before and after it takes the faster one of theirs; none gets faster.
+    """
+    steadied, changes = speeds.copy(), True
+    while changes:
+        changes, begin = False, 0
+        while begin < len(steadied):
+            end, length_mm = begin, 0.0
+            while end < len(steadied) and steadied[end] == steadied[begin]:
+                length_mm += lengths_mm[end]
+                end += 1
+            beside = max(steadied[begin - 1] if begin > 0 else 0.0, steadied[end] if end < len(steadied) else 0.0)
+            if 0.0 < beside < steadied[begin] and length_mm * (1.0 / beside - 1.0 / steadied[begin]) < LEAST_GAIN_S:
+                steadied[begin:end] = beside
+                changes = True
+            begin = end
+    return steadied
 
 
 def _by_kind(speeds: Mapping[Kind, float]) -> Floats:

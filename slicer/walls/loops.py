@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
-from slicer.geometry.polyline import PATH_RESOLUTION_MM, Segment, length_between, nearest_share
+from slicer.geometry.polygons import RESOLUTION_MM
+from slicer.geometry.polyline import Segment, length_between, nearest_share
 from slicer.geometry.triangulation import Triangulation
 from slicer.walls.skeleton import Counts, Rule, Skeleton, after, before, depth_of, loops_of, spacing_of
 
@@ -22,7 +23,6 @@ SMOOTH = 0.05  # radians: no mitre for less
 PER_CORNER = 3  # points that a corner of a triangle gives at most: that on its rib, and two of a mitre
 SHORTEST = 1.0  # nominal spacings: a shorter loop is none
 TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
-SEEN_RESOLUTION_MM = 0.004  # of outer walls, whose points are close where ribs are
 WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
 
 
@@ -71,7 +71,7 @@ def lay_loops(
             way[k, 2] = spacing[k % size] + rule.round if level else 2.0 * deep
             for axis in range(2):
                 way[k, axis] = ribs.feet[i, axis] + ribs.ways[i, axis] * deep
-        keep = corners(way, level)
+        keep = corners(way)
         for k in range(size + 1):
             if keep[k]:
                 for axis in range(3):
@@ -225,10 +225,9 @@ def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> F
 
 
 @kernel
-def corners(course: Floats, level: int) -> NDArray[np.bool_]:
-    """(n,) points of a course (n, 3) that the wall of a level keeps when it is simplified (Douglas and Peucker 1973), in place
+def corners(course: Floats) -> NDArray[np.bool_]:
+    """(n,) points of a course (n, 3) that a wall keeps when it is simplified (Douglas and Peucker 1973), in place
     and in width."""
-    tolerance_mm = PATH_RESOLUTION_MM if level else SEEN_RESOLUTION_MM
     keep = flags(len(course))
     keep[0], keep[len(course) - 1] = True, True
     stack = longs(2 * len(course), 0)
@@ -243,7 +242,7 @@ def corners(course: Floats, level: int) -> NDArray[np.bool_]:
             share = nearest_share(chord, x, y)
             dx, dy = x - chord.x0 - share * (chord.x1 - chord.x0), y - chord.y0 - share * (chord.y1 - chord.y0)
             wider = (course[a, 2] + share * (course[b, 2] - course[a, 2]) - course[k, 2]) / WIDTH_STEP_MM
-            far = max((dx * dx + dy * dy) / (tolerance_mm * tolerance_mm), wider * wider)
+            far = max((dx * dx + dy * dy) / (RESOLUTION_MM * RESOLUTION_MM), wider * wider)
             if far > worst:
                 worst, at = far, k
         if at >= 0:

@@ -95,7 +95,7 @@ def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
     middle = lines_along(chains, rule, piece_of) + _dots(skeleton, counts, rule, piece_of)
     borders = {piece: index_edges(pieces[piece]) for piece in {wall.piece for wall in middle if wall.level == 0}}
     middle = [wall if wall.level else _clipped(wall, borders[wall.piece], rule) for wall in middle]
-    walls += [replace(wall, course=wall.course[corners(wall.course, wall.level)]) for wall in middle if len(wall.course) > 1]
+    walls += [replace(wall, course=wall.course[corners(wall.course)]) for wall in middle if len(wall.course) > 1]
     laid = [wall for wall in walls if length_mm(wall.course) > 0.0]  # points may fall on each other when they are smoothed
     return sorted(laid, key=lambda wall: wall.piece)
 

@@ -21,8 +21,8 @@ from slicer.bead import (
     spacing_mm,
     varying,
 )
-from slicer.geometry.polygons import Polygons, contours, islands, larger, offset, offset_round, opening, strips
-from slicer.geometry.polyline import PATH_RESOLUTION_MM, length_mm, simplify
+from slicer.geometry.polygons import RESOLUTION_MM, Polygons, contours, islands, larger, offset, offset_round, opening, strips
+from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 from slicer.walls.skeleton import ROOM, SPLIT, Rule
 from slicer.walls.variable import Wall, variable_walls
@@ -107,7 +107,7 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
         line = offset(area, -half)
         core = offset(line, -behind)
         levels.append(tuple(contours(_backed(area, line, core, half_mm=half, behind_mm=behind, least_mm=least_mm))))
-        area = core.simplify(PATH_RESOLUTION_MM)
+        area = core.simplify(RESOLUTION_MM)
         if core.is_empty():
             break
     core = offset(area, -spacing)
@@ -130,7 +130,7 @@ def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, b
 
 def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polygons:
     """What the walls leave inside, where it has room for more than one bead."""
-    inside = offset_round(section, -_wall_mm(rule)).simplify(PATH_RESOLUTION_MM)
+    inside = offset_round(section, -_wall_mm(rule)).simplify(RESOLUTION_MM)
     middle = [wall.course for wall in varying if wall.level == rule.walls]
     if middle:
         reach_mm = [0.25 * (course[1:, 2] + course[:-1, 2]) for course in middle]
@@ -153,7 +153,7 @@ def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> 
         wider = min(filled[piece].area() / covered_mm2, MOST_WIDER) if courses else 1.0
         for course in courses:
             course[:, 2] = np.minimum(wider * course[:, 2] + line_width_mm - spacing, widest_mm)
-            points = simplify(np.ascontiguousarray(course[:, :2]))
+            points = np.ascontiguousarray(course[:, :2])
             beads.append(Bead(Kind.GAP, points, mean_width_mm(course), RANK, course=varying(course)))
     return beads
 

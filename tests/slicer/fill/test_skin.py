@@ -17,11 +17,13 @@ from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, 
 from tests.slicer.hand import as_shapely, distances_mm
 
 
-@pytest.mark.parametrize("area", [square, ring, strip])
+@pytest.mark.parametrize(("area", "more"), [(square, 0.003), (ring, 0.003), (strip, 0.01)])
 @pytest.mark.parametrize("angle", [45.0, 135.0, 20.0])
-def test_a_skin_extrudes_its_area(area: Callable[[], Polygons], angle: float) -> None:
+def test_a_skin_extrudes_its_area_a_strip_that_is_all_line_ends_little_more(
+    area: Callable[[], Polygons], more: float, angle: float
+) -> None:
     beads = skin_beads(area(), Kind.SKIN, SolidLines(angle, WIDTH, HEIGHT, OVERLAP))
-    assert plastic_mm2(beads) == pytest.approx(area().area(), rel=0.003)
+    assert 0.997 < plastic_mm2(beads) / area().area() < 1.0 + more
     assert all(0.9 < bead.flow < 1.1 for bead in beads if bead.kind is Kind.SKIN)
 
 

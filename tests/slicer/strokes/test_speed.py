@@ -3,12 +3,14 @@
 import manifold3d as m3
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from profiles.profile import load
 from slicer.bead import Bead
 from slicer.paths import Kind
 from slicer.slice import slice_part
-from slicer.strokes.speed import fan_share, stroke_accelerations, travel_time_s
+from slicer.strokes.speed import LEAST_GAIN_S, fan_share, steady, stroke_accelerations, travel_time_s
 from slicer.strokes.strokes import strokes_of
 from tests.shapes import box, from_manifold
 from tests.slicer.hand import cut, of_kind, profile, whole
@@ -93,3 +95,18 @@ def test_support_is_accelerated_as_infill_and_overhanging_walls_as_bridges() -> 
     assert found is not None
     kinds = (Kind.INFILL, Kind.SUPPORT, Kind.SUPPORT_INTERFACE, Kind.BRIDGE, Kind.OVERHANG, Kind.SKIN, Kind.OUTER_WALL)
     assert [found[kind] for kind in kinds] == [2000.0, 2000.0, 2000.0, 500.0, 500.0, 1000.0, 1000.0]
+
+
+def test_a_short_stretch_between_slower_ones_is_no_faster_than_the_faster_of_them() -> None:
+    assert steady(np.array([30.0, 60.0, 40.0]), np.array([9.0, 5.0, 9.0])).tolist() == [30.0, 40.0, 40.0]
+    assert steady(np.array([30.0, 60.0, 40.0]), np.array([9.0, 50.0, 9.0])).tolist() == [30.0, 60.0, 40.0]
+
+
+@given(st.lists(st.tuples(st.sampled_from([15.0, 25.0, 40.0, 60.0, 80.0]), st.floats(0.05, 60.0)), min_size=1, max_size=40))
+def test_no_stroke_gets_faster_and_every_change_that_is_left_out_costs_next_to_no_time(rows: list[tuple[float, float]]) -> None:
+    asked, lengths = np.array(rows).T
+    steadied = steady(asked, lengths)
+    assert (steadied <= asked).all()
+    left_out = np.count_nonzero(np.diff(asked)) - np.count_nonzero(np.diff(steadied))
+    assert (lengths / steadied).sum() - (lengths / asked).sum() <= LEAST_GAIN_S * left_out + 1e-9
+    assert steady(steadied, lengths).tolist() == steadied.tolist()

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from mdp.topology.cross_section import cross_sections
 from slicer.bead import spacing_mm
-from slicer.geometry.polygons import Polygons
-from slicer.geometry.polyline import PATH_RESOLUTION_MM
+from slicer.geometry.polygons import RESOLUTION_MM, Polygons
 from slicer.paths import Kind, bead_area_mm2
 from slicer.shells import wall_beads
 from slicer.walls.walls import walls
@@ -62,7 +61,7 @@ def test_walls_stay_inside_any_polygon(points: Points) -> None:
     polygon = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(2.0, 24)
     for level, loops in enumerate(walls(polygon, 3, PROCESS, HEIGHT).loops):
         for loop in loops:
-            coarse = 0.01 + level * PATH_RESOLUTION_MM
+            coarse = 0.01 + level * RESOLUTION_MM
             assert distances_mm(polygon, loop).min() > WIDTH / 2 + level * SPACING - coarse
 
 
