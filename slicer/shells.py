@@ -306,7 +306,9 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     if layer and process.infill_density < DENSE:
         area = infill_bridges(region, shells.layers[layer - 1].region.sparse, width)
         if not area.is_empty():
-            beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
+            onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width  # so that lines end over the walls, not beside them
+            held = area + (offset(area, onto_mm) - shell.walls.inside)
+            beads += bridge_beads(held, lines, process.infill_bridge_flow, over_infill=True)
             region = _without(region, area, width)
     top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
     places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
