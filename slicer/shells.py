@@ -46,7 +46,7 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm, simplify
-from slicer.heights import shell_layers
+from slicer.heights import Heights, shell_layers
 from slicer.interface.interface import limb_planes, plane_in_frame_of
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
 from slicer.paths import Kind, bead_area_mm2
@@ -75,7 +75,8 @@ class Shell:
     """One layer of the part itself.
 
     process: the settings, with the extra walls of interfaces and overhangs and the widths of part 1's first layer; ending: inner
-    walls that end on the face of a cut, and what fills between them; ironed: tops that are smoothed.
+    walls that end on the face of a cut, and what fills between them; ironed: tops that are smoothed; infill: of the region's
+    sparse places, None where it is not drawn yet.
     """
 
     process: Process
@@ -84,6 +85,7 @@ class Shell:
     region: Region
     bridges: tuple[Bridge, ...]
     ironed: Polygons
+    infill: list[Bead] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +135,14 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     infill = with_line_width(process, process.infill_line_width_mm)
     density = pattern_density([region.sparse for region in filled], infill, process.layer_height_mm)
-    filled = anchor_skins(filled, processes, density, sections)
+    filled, drawn = anchor_skins(filled, processes, density, sections)
     return Shells(
         supports,
         [
-            Shell(own, walls, ending, region, spans, smooth)
-            for own, (walls, ending, _), region, spans, smooth in zip(processes, walled, filled, bridges, ironed, strict=True)
+            Shell(own, walls, ending, region, spans, smooth, drawn.get(layer))
+            for layer, (own, (walls, ending, _), region, spans, smooth) in enumerate(
+                zip(processes, walled, filled, bridges, ironed, strict=True)
+            )
         ],
         density,
     )
@@ -149,20 +153,29 @@ def lines_angle_deg(process: Process, layer: int) -> float:
     return process.infill_angle_deg + 90.0 * (layer % 2)
 
 
-def anchor_skins(filled: Sequence[Region], processes: Sequence[Process], density: float, sections: Sections) -> list[Region]:
-    """The regions of all layers with skins that end on infill or on what is solid; density: of the infill's pattern."""
-    done, z_mm, heights_mm = list(filled), sections.heights.tip_mm.tolist(), sections.heights.height_mm.tolist()
-    for layer in range(1, len(filled)):
-        region, below, process = filled[layer], done[layer - 1].sparse, processes[layer - 1]
-        if below.is_empty() or process.infill_density >= DENSE or ((region.solid + region.top) ^ below).is_empty():
+def anchor_skins(
+    filled: Sequence[Region], processes: Sequence[Process], density: float, sections: Sections
+) -> tuple[list[Region], dict[int, list[Bead]]]:
+    """The regions of all layers with skins that end on infill or on what is solid, and the infill of those that lie below some.
+
+    density: of the infill's pattern.
+    """
+    done, drawn = list(filled), dict[int, list[Bead]]()
+    for layer, (region, process) in enumerate(zip(filled[1:], processes, strict=False), 1):
+        below, width = done[layer - 1].sparse, processes[layer].line_width_mm
+        if process.infill_density >= DENSE or below.is_empty() or ((region.solid + region.top) ^ below).area() < width**2:
             continue
-        infill = with_line_width(process, process.infill_line_width_mm)
-        beads = infill_beads(
-            below, infill, density=density, layer=layer - 1, z_mm=z_mm[layer - 1], height_mm=heights_mm[layer - 1]
-        )
-        lines, angle_deg = [bead.points for bead in beads], lines_angle_deg(process, layer)
-        done[layer] = anchored(region, below, lines, angle_deg, processes[layer].line_width_mm, infill_cell_mm(process))
-    return done
+        drawn[layer - 1] = sparse_beads(below, process, density, sections.heights, layer - 1)
+        lines, angle_deg = [bead.points for bead in drawn[layer - 1]], lines_angle_deg(process, layer)
+        done[layer] = anchored(region, below, lines, angle_deg, width, infill_cell_mm(process))
+    return done, drawn
+
+
+def sparse_beads(area: Polygons, process: Process, density: float, heights: Heights, layer: int) -> list[Bead]:
+    """The infill of a layer in an area; density: of its pattern."""
+    sparse = with_line_width(process, process.infill_line_width_mm)
+    z_mm, height_mm = float(heights.tip_mm[layer]), float(heights.height_mm[layer])
+    return infill_beads(area, sparse, density=density, layer=layer, z_mm=z_mm, height_mm=height_mm)
 
 
 def layer_processes(process: Process, on_platform: bool, layers: int) -> list[Process]:
@@ -309,7 +322,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width  # so that lines end over the walls, not beside them
             held = area + (offset(area, onto_mm) - shell.walls.inside)
             beads += bridge_beads(held, lines, process.infill_bridge_flow, over_infill=True)
-            region = _without(region, area, width)
+            region = replace(_without(region, area, width), sparse=region.sparse)
     top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
     places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
     for area, kind, solid in ((region.solid, Kind.SKIN, lines), (region.top, Kind.TOP_SKIN, top)):
@@ -319,8 +332,9 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     for width_mm, around in places.items():
         beads += gaps(around, width_mm, height_mm)
     beads += ironing_beads(shell.ironed, lines, process)
-    sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
-    return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
+    if shell.infill is not None and region.sparse is shell.region.sparse:
+        return beads + shell.infill
+    return beads + sparse_beads(region.sparse, process, shells.density, heights, layer)
 
 
 def _moat(bridge: Polygons, sparse: Polygons, cell_mm: float) -> Polygons:

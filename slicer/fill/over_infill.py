@@ -37,20 +37,14 @@ def anchored(
     sparse_below: what is sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart.
     """
     skin, sparse = region.solid + region.top, region.sparse
-    if (skin ^ sparse_below).area() < width_mm**2:
-        return region
     for _ in range(MOST_ROUNDS):
         added = _extension(skin, sparse_below, infill_below, angle_deg, width_mm) ^ sparse
         if added.area() < width_mm**2:
             break
-        beside = offset(added, 2.0 * width_mm)
-        left = union(
-            [
-                piece
-                for piece in islands(opening(sparse - added, width_mm))
-                if piece.area() >= KEPT * cell_mm**2 or (piece ^ beside).is_empty()
-            ]
-        )
+        pieces = islands(opening(sparse - added, width_mm))
+        large = [piece.area() >= KEPT * cell_mm**2 for piece in pieces]
+        beside = Polygons() if all(large) else offset(added, 2.0 * width_mm)
+        left = union([piece for piece, kept in zip(pieces, large, strict=True) if kept or (piece ^ beside).is_empty()])
         skin, sparse = skin + (sparse - left), left
     if sparse is region.sparse:
         return region
