@@ -5,7 +5,7 @@ A layer of height h leaves steps of depth h |n_z| on a surface with normal n, me
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
 
@@ -21,6 +21,7 @@ from profiles.profile import Profile
 
 LEAST_SHARE = 0.25  # by which a layer may differ from its neighbours: thinner than this share of them it comes out unevenly
 SHELL_KEYS = ("top_layers", "top_thickness_mm", "bottom_layers", "bottom_thickness_mm")
+SAME_MM = 1e-5  # heights nearer than this are one: what STL files round to, 200 mm up
 LEVEL = 1e-9  # of the cosine between two directions that are the same
 BIN_SHARE = 0.125  # of the least layer height: slopes are known in bins of this height, each by its worst face
 FLAT = 0.9998  # cosine of one degree: flatter faces count as level
@@ -78,7 +79,16 @@ def layer_heights(
         if min(plane_mm - from_mm, top_mm - plane_mm) >= process.least_layer_height_mm:
             heights += _heights_from(mesh, plane_mm, process, nozzle_mm, from_mm, first_mm)
             from_mm, first_mm = plane_mm, process.layer_height_mm
-    return heights + _heights_from(mesh, top_mm, process, nozzle_mm, from_mm, first_mm)
+    heights += _heights_from(mesh, top_mm, process, nozzle_mm, from_mm, first_mm)
+    return replace(heights, cut_mm=_below_corners(heights.cut_mm, mesh))
+
+
+def _below_corners(cuts_mm: Floats, mesh: Mesh) -> Floats:
+    """The planes of sections, those at the height of a corner just below it, or rounding would tell whether a ceiling there
+    belongs to the layer or to the next."""
+    corners_mm = np.sort(mesh.vertices[:, 2])
+    below, up_to = (np.searchsorted(corners_mm, cuts_mm + by_mm) for by_mm in (-SAME_MM, SAME_MM))
+    return np.where(below < up_to, cuts_mm - 2.0 * SAME_MM, cuts_mm)
 
 
 def part_heights(part: Part, later: Sequence[Part], profile: Profile) -> Heights:

@@ -25,6 +25,7 @@ from slicer.geometry.polygons import (
     strips,
     union,
 )
+from slicer.heights import SAME_MM
 from slicer.sectioning import RIM_MM, Sections, faces_by_layer
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
@@ -213,7 +214,7 @@ def bridges_of_layers(
         if free.is_empty() or below is None:
             continue
         drop_mm = float(heights.bottom_mm[i]) - process.support_gap_mm - 2.0 * process.layer_height_mm
-        lowest = int(np.searchsorted(heights.tip_mm, drop_mm))
+        lowest = int(np.searchsorted(heights.tip_mm, drop_mm - SAME_MM))
         held = union([area for area in supported[lowest:i] if not area.is_empty()])
         held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
         bare = opening(free - held, 0.25 * process.line_width_mm)

@@ -44,6 +44,7 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm
+from slicer.heights import Heights
 from slicer.interface.interface import limb_planes, plane_in_frame_of
 from slicer.modifiers import WallCounts, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
@@ -71,7 +72,8 @@ class Shell:
     """One layer of the part itself.
 
     process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of part 1's first layer;
-    ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; ironed: smoothed tops.
+    ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; ironed: smoothed tops;
+    infill: of the region's sparse places, None where it is not drawn yet.
     """
 
     process: Process
@@ -80,6 +82,7 @@ class Shell:
     region: Region
     bridges: tuple[Bridge, ...]
     ironed: Polygons
+    infill: list[Bead] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +137,7 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     sparse = [region.sparse for region in filled]
     fillings = plan_fillings(sparse, sections.own, process, sections.places, sections.heights.height_mm)
-    filled = anchor_skins(filled, processes, fillings, sections)
+    filled, drawn = anchor_skins(filled, processes, fillings, sections.heights)
     ranked = [
         own if of.all == [own.walls] else own.model_copy(update={"walls": max(of.all)})
         for own, of in zip(processes, counts, strict=True)
@@ -142,8 +145,10 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     return Shells(
         supports,
         [
-            Shell(own, walls, ending, region, spans, smooth)
-            for own, (walls, ending, _), region, spans, smooth in zip(ranked, walled, filled, bridges, ironed, strict=True)
+            Shell(own, walls, ending, region, spans, smooth, drawn.get(layer))
+            for layer, (own, (walls, ending, _), region, spans, smooth) in enumerate(
+                zip(ranked, walled, filled, bridges, ironed, strict=True)
+            )
         ],
         fillings,
     )
@@ -155,20 +160,19 @@ def lines_angle_deg(process: Process, layer: int) -> float:
 
 
 def anchor_skins(
-    filled: Sequence[Region], processes: Sequence[Process], fillings: Sequence[Filling], sections: Sections
-) -> list[Region]:
-    """The regions of all layers with skins that end on infill or on what is solid."""
-    done, z_mm, heights_mm = list(filled), sections.heights.tip_mm.tolist(), sections.heights.height_mm.tolist()
-    for layer in range(1, len(filled)):
-        region, process, k = filled[layer], processes[layer - 1], layer - 1
+    filled: Sequence[Region], processes: Sequence[Process], fillings: Sequence[Filling], heights: Heights
+) -> tuple[list[Region], dict[int, list[Bead]]]:
+    """The regions of all layers with skins that end on infill or on what is solid, and the infill of those below such skins."""
+    done, drawn = list(filled), dict[int, list[Bead]]()
+    for layer, (region, process) in enumerate(zip(filled[1:], processes, strict=False), 1):
+        k, width = layer - 1, processes[layer].line_width_mm
         below = open_area(done[k].sparse, fillings, process, k, lightning=False)
-        if below.is_empty() or ((region.solid + region.top) ^ below).is_empty():
+        if below.is_empty() or ((region.solid + region.top) ^ below).area() < width**2:
             continue
-        beads = filling_beads(below, fillings, process, layer=k, z_mm=z_mm[k], height_mm=heights_mm[k])
-        lines, angle_deg = [bead.points for bead in beads], lines_angle_deg(process, layer)
-        cell_mm = widest_cell_mm(fillings, process, k)
-        done[layer] = anchored(region, below, lines, angle_deg, processes[layer].line_width_mm, cell_mm)
-    return done
+        drawn[k] = filling_beads(done[k].sparse, fillings, process, heights, k)
+        lines, angle_deg = [bead.points for bead in drawn[k]], lines_angle_deg(process, layer)
+        done[layer] = anchored(region, below, lines, angle_deg, width, widest_cell_mm(fillings, process, k))
+    return done, drawn
 
 
 def layer_processes(process: Process, on_platform: bool, layers: int) -> list[Process]:
@@ -320,8 +324,10 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         below = shells.layers[layer - 1]
         area = infill_bridges(region, open_area(below.region.sparse, shells.fillings, below.process, layer - 1), width)
         if not area.is_empty():
-            beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
-            region = _without(region, area, width)
+            onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width  # so that lines end over the walls, not beside them
+            held = area + (offset(area, onto_mm) - shell.walls.inside)
+            beads += bridge_beads(held, lines, process.infill_bridge_flow, over_infill=True)
+            region = replace(_without(region, area, width), sparse=region.sparse)
     top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
     places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
     for area, kind, solid in ((region.solid, Kind.SKIN, lines), (region.top, Kind.TOP_SKIN, top)):
@@ -331,8 +337,9 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     for width_mm, around in places.items():
         beads += gaps(around, width_mm, height_mm)
     beads += ironing_beads(shell.ironed, lines, process)
-    z_mm = float(heights.tip_mm[layer])
-    return beads + filling_beads(region.sparse, shells.fillings, process, layer=layer, z_mm=z_mm, height_mm=height_mm)
+    if shell.infill is not None and region.sparse is shell.region.sparse:
+        return beads + shell.infill
+    return beads + filling_beads(region.sparse, shells.fillings, process, heights, layer)
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:

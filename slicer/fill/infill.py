@@ -33,6 +33,7 @@ from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, close_loop, closing, contours, islands, offset, opening, union
 from slicer.geometry.polyline import length_mm
+from slicer.heights import Heights
 from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
@@ -156,15 +157,14 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     return drawn
 
 
-def filling_beads(
-    sparse: Polygons, fillings: Sequence[Filling], process: Process, *, layer: int, z_mm: float, height_mm: float
-) -> list[Bead]:
+def filling_beads(sparse: Polygons, fillings: Sequence[Filling], process: Process, heights: Heights, layer: int) -> list[Bead]:
     """Beads of all infills in the sparse area of a layer, whose settings those of the process are."""
+    at = {"z_mm": float(heights.tip_mm[layer]), "height_mm": float(heights.height_mm[layer])}
     beads = list[Bead]()
     for filling, area in zip(fillings, divided(sparse, fillings, layer, process, _apart_mm(process)), strict=True):
-        own = filling.process(process)
         lines = filling.lightning[layer] if filling.lightning else ()
-        beads += infill_beads(area, own, density=filling.density, layer=layer, z_mm=z_mm, height_mm=height_mm, lightning=lines)
+        own = filling.process(process)
+        beads += infill_beads(area, own, density=filling.density, layer=layer, lightning=lines, **at)
     return beads
 
 

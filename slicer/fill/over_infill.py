@@ -19,7 +19,7 @@ from slicer.geometry.polygons import Polygons, closing, edges, islands, of_conto
 
 NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
-HOLDS = 0.75  # line widths that a row may reach beyond what holds it
+HOLDS = 0.5  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
 KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid
@@ -37,20 +37,14 @@ def anchored(
     sparse_below: what is sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart.
     """
     skin, sparse = region.solid + region.top, region.sparse
-    if (skin ^ sparse_below).area() < width_mm**2:
-        return region
     for _ in range(MOST_ROUNDS):
         added = _extension(skin, sparse_below, infill_below, angle_deg, width_mm) ^ sparse
         if added.area() < width_mm**2:
             break
-        beside = offset(added, 2.0 * width_mm)
-        left = union(
-            [
-                piece
-                for piece in islands(opening(sparse - added, width_mm))
-                if piece.area() >= KEPT * cell_mm**2 or (piece ^ beside).is_empty()
-            ]
-        )
+        pieces = islands(opening(sparse - added, width_mm))
+        large = [piece.area() >= KEPT * cell_mm**2 for piece in pieces]
+        beside = Polygons() if all(large) else offset(added, 2.0 * width_mm)
+        left = union([piece for piece, kept in zip(pieces, large, strict=True) if kept or (piece ^ beside).is_empty()])
         skin, sparse = skin + (sparse - left), left
     if sparse is region.sparse:
         return region

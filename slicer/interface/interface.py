@@ -364,7 +364,7 @@ def _deepest(island: Polygons) -> tuple[float, float]:
 
 def _taken_mm3(hole: Mesh, heights: Heights) -> float:
     """What a hole, in the frame of the part below, takes of its layers."""
-    first, last = np.searchsorted(heights.cut_mm, hole.bounds_mm[:, 2])
+    first, last = np.searchsorted(heights.cut_mm, hole.bounds_mm[:, 2], side="right")  # a section is what lies below its plane
     sections = cross_sections(hole, heights.cut_mm[first:last])
     areas = [sum(area_mm2(loop) for loop in loops) for loops in sections]
     return float(np.dot(areas, heights.height_mm[first:last]))

@@ -14,6 +14,7 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.profile import Profile
 from slicer.bead import outer_wall_width_mm
+from slicer.geometry.clip import cut_line
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
@@ -22,6 +23,7 @@ from slicer.sectioning import Sections
 from slicer.strokes.speed import fan_share, rising_fan
 
 SHRINKS = 0.999  # of the area of the layer below
+MOST_IN_AIR, MOST_IN_AIR_MM = 0.5, 30.0  # of a turn, and of the longest turns: the dry run refuses more
 PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
 
@@ -30,7 +32,8 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
     """The layers above the bottom, as far up as the model is wide enough for a wall; supported: where each layer's support is;
     first: the lowest; tip: (2,) where the bottom ends.
 
-    Raises SliceError where the model needs support or one of its layers is not one area without holes.
+    Raises SliceError where the model needs support, one of its layers is not one area without holes, or a turn would not lie on
+    the one below.
     """
     profile, heights, outlines = sections.profile, sections.heights, sections.outlines
     hanging = next((k for k, area in enumerate(supported) if not area.is_empty()), None)
@@ -43,6 +46,8 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
     while end > first + 1 and _is_tip(outlines[end - 1], outlines[end - 2], half_mm):
         end -= 1
     loops = [_loop(outlines[k], float(heights.tip_mm[k]), half_mm) for k in range(first, end)]
+    for k, loop in enumerate(loops, start=first):
+        _check_step(loop, outlines[k - 1], half_mm, lowest=k == first, z_mm=float(heights.tip_mm[k]))
     layers: list[Layer] = []
     for k, loop in enumerate(loops, start=first):
         turn = _begun_near(loop, tip, joined=k > first)
@@ -68,6 +73,21 @@ def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
             f"process.spiral_vase needs one outline without holes in every layer: at {z_mm:.2f} mm there is {instead}"
         )
     return close_loop(loops[0])
+
+
+def _check_step(loop: Floats, below: Polygons, half_mm: float, *, lowest: bool, z_mm: float) -> None:
+    """Raises SliceError where too much of a turn's centreline is farther than a wall's width from that of the wall below.
+
+    below: the outline of the layer below; lowest: that layer is solid.
+    """
+    reached = offset(below, half_mm)
+    points, within = cut_line(loop, reached if lowest else reached - offset(below, -3.0 * half_mm))
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    if lengths[~within].sum() > min(MOST_IN_AIR * lengths.sum(), MOST_IN_AIR_MM):
+        raise SliceError(
+            f"process.spiral_vase lays every turn on the one below, and at {z_mm:.2f} mm the model steps in or out by more than "
+            f"a wall's width, {2.0 * half_mm:g} mm: {lengths[~within].sum():.0f} mm of wall would be laid on air"
+        )
 
 
 def _begun_near(loop: Floats, tip: Floats, joined: bool) -> Floats:

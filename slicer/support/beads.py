@@ -25,6 +25,7 @@ from slicer.geometry.polygons import (
     Polygons,
     area_mm2,
     close_loop,
+    closing,
     contours,
     offset,
     offset_round,
@@ -73,7 +74,7 @@ def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: 
     ]
     edge = process.support_walls * spacing
     inner = offset(area, SEAM * width - edge) if edge else area
-    roof = opening(inner ^ dense, 0.5 * width) if not dense.is_empty() else dense
+    roof = opening(_joined(dense, 0.5 * support_cell_mm(process), width) ^ inner, 0.5 * width)
     rest = inner if roof.is_empty() else opening(inner - roof, 0.25 * width)
     across_deg = process.infill_angle_deg + 90.0
     angles_deg = [process.infill_angle_deg] if process.support_pattern == "lines" else [process.infill_angle_deg, across_deg]
@@ -81,6 +82,15 @@ def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: 
     beads += [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in _lines(rest, angles_deg, density, process, spacing)]
     lines = _lines(roof, [across_deg], process.support_interface_density, process, spacing)
     return beads + [Bead(Kind.SUPPORT_INTERFACE, line, width, OUTSIDE) for line in lines]
+
+
+def _joined(dense: Polygons, radius_mm: float, width_mm: float) -> Polygons:
+    """Dense places with what lies between them and is narrower than sparse lines are apart, twice the radius: lines that fill
+    one place lie beside each other, those of many small ones hang between the sparse lines."""
+    if dense.num_contour() < 2:
+        return dense
+    joined = closing(dense, radius_mm)
+    return joined if joined.area() > dense.area() + width_mm**2 else dense
 
 
 def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process: Process, spacing: float) -> list[Floats]:

@@ -195,8 +195,8 @@ def beside_standing(sections: Sections, layers: slice, far_mm: float) -> list[Po
     heights, stands = sections.heights[layers], sections.standing[layers]
     outside = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True) - room_of(part)
     reaches = out_of_reach(part, sections.earlier, heights.tip_mm.tolist(), machine)
-    low = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm)
-    high = np.searchsorted(heights.bottom_mm, heights.tip_mm + gap_mm)
+    low = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + EVEN_MM)
+    high = np.searchsorted(heights.bottom_mm, heights.tip_mm + gap_mm - EVEN_MM)
     near = [union(stands[a:b]) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
     beside = [offset(area, process.support_distance_mm) if not area.is_empty() else area for area in near]
     return [union([outside, *areas]) for areas in zip(beside, reaches, strict=True)]

@@ -89,6 +89,10 @@ def test_the_printed_vase_climbs_in_every_line_and_the_dry_run_has_nothing_again
     assert (heights[0], heights[-1]) == pytest.approx((2.8, 3.0), abs=0.01)
 
 
+def test_a_step_that_is_less_than_a_walls_width_is_climbed() -> None:
+    assert slice_part(whole(stepped(10, 9.7)), profile(*VASE)).layers[-1].z_mm == pytest.approx(8.0)
+
+
 def two_towers() -> Mesh:
     towers = m3.Manifold.cube((5, 5, 8), True).translate((-6, 0, 4)) + m3.Manifold.cube((5, 5, 8), True).translate((6, 0, 4))
     return standing(towers + m3.Manifold.cube((20, 8, 2), True))
@@ -98,6 +102,11 @@ def tube() -> Mesh:
     return standing(m3.Manifold.cylinder(6, 10, 10, 48) - m3.Manifold.cylinder(6, 6, 6, 48).translate((0, 0, 2)))
 
 
+def stepped(low_mm: float, high_mm: float) -> Mesh:
+    """A round tower 4 mm high with another one on it, by their radii."""
+    return standing(m3.Manifold.cylinder(4, low_mm, low_mm, 48) + m3.Manifold.cylinder(8, high_mm, high_mm, 48))
+
+
 @pytest.mark.parametrize(
     ("parts", "settings", "reason"),
     [
@@ -105,6 +114,7 @@ def tube() -> Mesh:
         ([whole(tee())], ("process.support=auto",), "prints no support, and at"),
         ([whole(two_towers())], (), "one outline without holes in every layer: at 2.20 mm there is 2 outlines"),
         ([whole(tube())], (), "at 2.20 mm there is 2 outlines"),
+        ([whole(stepped(10, 6))], (), "at 4.20 mm the model steps in or out by more than a wall's width, 0.45 mm: 36 mm of wall"),
     ],
 )
 def test_what_is_no_vase_is_refused_with_the_reason(parts: list[Part], settings: tuple[str, ...], reason: str) -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mdp.decomposition import Part
 from mdp.plane import Plane
 from slicer.bead import spacing_mm
-from slicer.geometry.polygons import Polygons
+from slicer.geometry.polygons import Polygons, union
 from slicer.heights import Heights
 from slicer.paths import Kind
 from slicer.sectioning import section_part
@@ -86,6 +86,13 @@ def test_every_bead_of_support_lies_in_its_place_and_the_dense_ones_in_theirs() 
         assert lines
         assert as_shapely(room).buffer(0.01).covers(shapely.union_all(lines))
     assert support_beads(Polygons(), dense, process, 0.2, False) == []
+
+
+def test_dense_places_nearer_than_sparse_lines_are_filled_as_one() -> None:
+    process = profile("process.support_walls=0", "process.support_density=0.2").process
+    bars = union([Polygons.square((0.8, 20.0)).translate((1.7 * k, 0.0)) for k in range(12)])
+    beads = support_beads(Polygons.square((19.5, 20.0)), bars, process, 0.2, False)
+    assert {bead.kind for bead in beads} == {Kind.SUPPORT_INTERFACE}
 
 
 @pytest.mark.parametrize(("pattern", "cell"), [("lines", 1.0), ("grid", 2.0)])

@@ -88,6 +88,14 @@ def test_pins_are_filled_without_a_finding_and_the_part_too_slender_for_one_is_n
     assert "no pins under part 2: one wants a place 4.6 mm wide" in capsys.readouterr().err
 
 
+def test_a_vase_that_ends_below_a_tip_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    cone = cut(from_manifold(m3.Manifold.cylinder(6, 6, 0, 48)))
+    profile = load(settings=["process.spiral_vase=true", "process.support=none"])
+    program = build(Decomposition("cone", cone[0].mesh, tuple(cone), 1, "classic", 0.0, 0.0, 0, 1, 0.0), profile)
+    assert "the vase stops at 5.80 mm: above that the model is too narrow for a spiral wall" in capsys.readouterr().err
+    assert program.sliced[0].layers[-1].z_mm == pytest.approx(5.8)
+
+
 def test_grooves_are_filled_without_a_finding() -> None:
     program = _arms("process.interlock=grooves", "process.interlock_mm=0.2")
     assert {finding.code for finding in program.run.findings} <= {"uncalibrated"}
