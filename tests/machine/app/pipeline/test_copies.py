@@ -56,14 +56,14 @@ def test_copies_on_a_round_plate_keep_to_its_edge_and_apart() -> None:
 
 
 def test_every_copy_has_the_settings_of_its_modifiers() -> None:
-    half = Modifier(Zone((0.0, -99.0, -1.0), (5.0, 99.0, 99.0)), {"infill_density": 1.0})
+    half = Modifier(Zone((-99.0, 0.0, -1.0), (99.0, 5.0, 99.0)), {"infill_density": 1.0})
     insert = Modifier(MeshVolume(Path("insert.stl"), box(4.0, 4.0, 4.0)), {"walls": 5})
     (many,) = in_copies(decomposed(replace(whole(box(10, 10, 9)), modifiers=(half, insert))), 2, plate())[0].parts
     volumes = [(modifier.volume, modifier.process) for modifier in many.modifiers]
     assert [own for _, own in volumes] == [half.process] * 2 + [insert.process] * 2
-    boxes = [volume.min_mm[0] for volume, _ in volumes if isinstance(volume, Zone)]
-    meshes = [float(volume.mesh.bounds_mm[0, 0]) for volume, _ in volumes if isinstance(volume, MeshVolume)]
-    assert sorted(boxes) == [-7.5, 7.5]  # 10 mm wide, 5 mm apart
+    boxes = [volume.min_mm[1] for volume, _ in volumes if isinstance(volume, Zone)]
+    meshes = [float(volume.mesh.bounds_mm[0, 1]) for volume, _ in volumes if isinstance(volume, MeshVolume)]
+    assert sorted(boxes) == [-7.5, 7.5]  # 10 mm deep, 5 mm apart
     assert sorted(meshes) == [-9.5, 5.5]
 
 
