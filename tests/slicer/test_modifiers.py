@@ -17,7 +17,7 @@ from mdp.zone import MeshVolume, Modifier, Zone
 from profiles.errors import SliceError
 from slicer.estimate.estimate import estimate
 from slicer.paths import Kind, Layer, SlicedPart, bead_area_mm2
-from slicer.slice import slice_part
+from slicer.slice import slice_part, slice_parts
 from tests.shapes import box, from_manifold, standing
 from tests.slicer.hand import BARE, SOLID, content, cut, profile, whole
 
@@ -118,6 +118,14 @@ def test_a_solid_part_extrudes_its_volume_whatever_holds_in_a_box(own: dict[str,
     mesh = standing(m3.Manifold.cube((30.0, 30.0, 2.0)) - m3.Manifold.cylinder(9.0, 4.0, 4.0, 48).translate((12.0, 14.0, -1.0)))
     plain, other = (slice_part(part, profile(*SOLID)) for part in (whole(mesh), modified(whole(mesh), (leaning, own))))
     assert other.volume_mm3 == pytest.approx(plain.volume_mm3, rel=0.002)
+
+
+@pytest.mark.parametrize("own", [{"walls": 6}, {"walls": 1}])
+def test_parts_of_a_cut_extrude_their_volumes_whatever_holds_in_a_box(own: dict[str, Any]) -> None:
+    parts = cut(standing(m3.Manifold.cube((24.0, 20.0, 20.0))), ((0.6, 0.0, 0.8), 13.0))
+    within = Zone((-6.0, -5.0, -1.0), (7.0, 99.0, 99.0))
+    plain, other = (slice_parts(each, profile(*SOLID)) for each in (parts, [modified(part, (within, own)) for part in parts]))
+    assert [one.volume_mm3 for one in other] == pytest.approx([one.volume_mm3 for one in plain], rel=0.003)
 
 
 def test_a_dense_box_in_sparse_infill_is_filled() -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import manifold3d as m3
 import numpy as np
@@ -13,7 +14,7 @@ from machine.app.pipeline.pipeline import build
 from machine.planning.fit import places_on_plate
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
-from mdp.zone import Grown, Marked, Zone
+from mdp.zone import Grown, Marked, MeshVolume, Modifier, Zone
 from profiles.errors import PlanError
 from profiles.profile import Profile, load
 from tests.shapes import box, standing, tee
@@ -52,6 +53,18 @@ def test_copies_on_a_round_plate_keep_to_its_edge_and_apart() -> None:
     assert len(boxes) > 20
     assert all(disc.covers(box.buffer(2.0, join_style="mitre")) for box in boxes)
     assert min(a.distance(b) for a, b in combinations(boxes, 2)) == pytest.approx(5.0)
+
+
+def test_every_copy_has_the_settings_of_its_modifiers() -> None:
+    half = Modifier(Zone((-99.0, 0.0, -1.0), (99.0, 5.0, 99.0)), {"infill_density": 1.0})
+    insert = Modifier(MeshVolume(Path("insert.stl"), box(4.0, 4.0, 4.0)), {"walls": 5})
+    (many,) = in_copies(decomposed(replace(whole(box(10, 10, 9)), modifiers=(half, insert))), 2, plate())[0].parts
+    volumes = [(modifier.volume, modifier.process) for modifier in many.modifiers]
+    assert [own for _, own in volumes] == [half.process] * 2 + [insert.process] * 2
+    boxes = [volume.min_mm[1] for volume, _ in volumes if isinstance(volume, Zone)]
+    meshes = [float(volume.mesh.bounds_mm[0, 1]) for volume, _ in volumes if isinstance(volume, MeshVolume)]
+    assert sorted(boxes) == [-7.5, 7.5]  # 10 mm deep, 5 mm apart
+    assert sorted(meshes) == [-9.5, 5.5]
 
 
 def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> None:
