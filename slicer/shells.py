@@ -54,7 +54,7 @@ from slicer.sectioning import Sections
 from slicer.support.beads import auxiliary_beads
 from slicer.support.support import Supports
 from slicer.walls.variable import Wall
-from slicer.walls.walls import Walls, gaps, layer_walls, uncovered_area, walls
+from slicer.walls.walls import Walls, gaps, layer_walls, uncovered_area, walls, walls_under_tops
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
@@ -111,15 +111,23 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
     model = model_sections(sections)
     heights_mm, count = sections.heights.height_mm.tolist(), len(processes)
+    over = [mine if whole is None else whole for mine, whole in zip(sections.own, model, strict=True)][1:]
+    over += sections.above[:1] or [Polygons()]
     # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
     runs = [range(count)] if layers is None else [range(max(k - 1, 0), k + 1) for k in layers]
     needed = sorted({layer for run in runs for layer in run})
 
     def contours_of(place: int) -> Contours:
         layer = needed[place]
-        own, usual = processes[layer], process.walls
+        own = processes[layer]
         walls, ending, inside = cut_walls(
-            sections.own[layer], model[layer], own, height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, usual=usual
+            sections.own[layer],
+            model[layer],
+            own,
+            height_mm=heights_mm[layer],
+            nozzle_mm=nozzle_mm,
+            usual=min(process.walls, own.walls),
+            above=over[layer] if own.only_one_wall_top else None,
         )
         areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
         return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
@@ -211,16 +219,30 @@ def _boxes_meet(own: Polygons, beside: Polygons) -> bool:
 
 
 def cut_walls(
-    section: Polygons, model: Polygons | None, process: Process, *, height_mm: float, nozzle_mm: float, usual: int
+    section: Polygons,
+    model: Polygons | None,
+    process: Process,
+    *,
+    height_mm: float,
+    nozzle_mm: float,
+    usual: int,
+    above: Polygons | None = None,
 ) -> tuple[Walls, tuple[Bead, ...], Polygons]:
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
     Those that run round; inner walls along the surface that end on a cut face's, all of one width, and what fills between them;
-    what the walls would enclose if the model were not cut. usual: how many walls the model would have here.
+    what the walls would enclose if the model were not cut. usual: how many walls the model would have here; above: the
+    model in the next layer, where what it leaves bare has one wall.
     """
     if model is None:
-        round_ = layer_walls(section, process.walls, process, height_mm, nozzle_mm)
-        fewer = round_ if usual == process.walls else layer_walls(section, usual, process, height_mm, nozzle_mm)
+
+        def walled(count: int) -> Walls:
+            if above is None:
+                return layer_walls(section, count, process, height_mm, nozzle_mm)
+            return walls_under_tops(section, above, count, process, height_mm, nozzle_mm)
+
+        round_ = walled(process.walls)
+        fewer = round_ if usual == process.walls else walled(usual)
         return round_, (), fewer.inside
     whole = walls(model, process.walls, process, height_mm)
     fewer = whole if usual == process.walls else walls(model, usual, process, height_mm)

@@ -93,6 +93,11 @@ def _wall_order(config: Config, key: str) -> Converted:
     return Value("outer-first" if config.flag(key) else "inner-first", "" if config.flag(key) is not None else "off")
 
 
+def _one_wall_top(config: Config, key: str) -> Converted:
+    wanted = config.text(key)
+    return Value(wanted != "none", "on all tops" if wanted == "topmost" else "")
+
+
 def _brim(config: Config, key: str) -> Converted:
     if config.text("brim_type") == "no_brim":
         return Value(0.0, "brim_type is no_brim")
@@ -160,6 +165,9 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.bottom_layers", "bottom_solid_layers", whole),
     ("process.top_thickness_mm", "top_solid_min_thickness", number),
     ("process.bottom_thickness_mm", "bottom_solid_min_thickness", number),
+    ("process.only_one_wall_top", "top_one_perimeter_type", _one_wall_top),
+    ("process.only_one_wall_top", "only_one_wall_top", flag),
+    ("process.only_one_wall_first_layer", "only_one_perimeter_first_layer", flag),
     ("process.wall_order", "external_perimeters_first", _wall_order),
     ("process.seam", "seam_position", one_of(SEAMS)),
     ("process.spiral_vase", "spiral_vase", flag),

@@ -24,6 +24,8 @@ LAYERS = {
 SHELL = {
     "walls": simple("Walls", "perimeters shells wall loops wall count"),
     "overhang_extra_walls": advanced("Extra walls over overhangs", "extra perimeters if needed"),
+    "only_one_wall_top": advanced("One wall on top surfaces", "single perimeter on top surfaces"),
+    "only_one_wall_first_layer": advanced("One wall in the first layer", "single perimeter on initial layer"),
     "wall_order": advanced("Order of walls", "perimeters external perimeters first inner outer"),
     "outer_bulge": rare("Bulge of outer walls", "external perimeters"),
     "top_layers": simple("Top layers", "top solid layers shell roof"),

@@ -14,6 +14,12 @@ class Shell(Frozen):
     overhang_extra_walls: int = Field(
         0, ge=0, le=20, description="more walls in layers with overhanging walls: the outer ones hang on the inner ones"
     )
+    only_one_wall_top: bool = Field(
+        False,
+        description="one wall round surfaces that face the printing direction, whose skin takes the place of the others; not in "
+        "layers that another part touches",
+    )
+    only_one_wall_first_layer: bool = Field(False, description="one wall in part 1's first layer")
     wall_order: Literal["inner-first", "outer-first"] = Field(
         "inner-first",
         description="inner-first: the outer wall leans on finished plastic, best over overhangs; outer-first: nothing pushes it "

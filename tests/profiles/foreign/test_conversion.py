@@ -37,6 +37,8 @@ def taken(kind: str = "process", **values: str) -> dict[str, str]:
         ),
         ({"overhang_speed_0": "40%", "external_perimeter_speed": "50"}, "overhang_25_speed_mm_s", "20.0"),
         ({"perimeters": "2"}, "walls", "2"),
+        ({"top_one_perimeter_type": "topmost"}, "only_one_wall_top", "true"),
+        ({"only_one_perimeter_first_layer": "1"}, "only_one_wall_first_layer", "true"),
         ({"cooling": "0", "slowdown_below_layer_time": "15"}, "least_layer_time_s", "0.0"),
     ],
 )
