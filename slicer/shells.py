@@ -330,15 +330,22 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         if not area.is_empty():
             beads += bridge_beads(area, lines, process.infill_bridge_flow, over_infill=True)
             region = _without(region, area, width)
-    top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
+    skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))
+    top = replace(skins, width_mm=process.top_skin_line_width_mm or width, pattern=process.top_skin_pattern)
+    bottom = replace(skins, pattern=process.bottom_skin_pattern)
+    solid, under = region.solid, Polygons()
+    if bottom != skins:
+        below = shells.sections.below(layer)
+        under = solid if below is None else opening(solid - below, 0.5 * width)
+        solid = solid - under
     places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
-    for area, kind, solid in ((region.solid, Kind.SKIN, lines), (region.top, Kind.TOP_SKIN, top)):
-        skin, rests = skin_lines(area, kind, solid)
+    for area, kind, laid in ((solid, Kind.SKIN, skins), (under, Kind.SKIN, bottom), (region.top, Kind.TOP_SKIN, top)):
+        skin, rests = skin_lines(area, kind, laid)
         beads += skin
-        places.setdefault(solid.width_mm, []).extend(rests)
+        places.setdefault(laid.width_mm, []).extend(rests)
     for width_mm, around in places.items():
         beads += gaps(around, width_mm, height_mm)
-    beads += ironing_beads(shell.ironed, lines, process)
+    beads += ironing_beads(shell.ironed, skins, process)
     sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
     return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
 
@@ -392,7 +399,7 @@ def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Be
         return []
     spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
     flow = process.ironing_flow * spacing * height_mm / bead_area_mm2(width, height_mm)
-    dense = SolidLines(skin.angle_deg + 90.0, spacing + height_mm * ROUND_SIDES, height_mm, in_order=True)
+    dense = SolidLines(skin.angle_deg + 90.0, spacing + height_mm * ROUND_SIDES, height_mm, pattern="monotonic")
     beads, _ = skin_lines(area, Kind.IRONING, dense)
     return [replace(bead, width_mm=width, flow=flow, rank=IRONED) for bead in beads]
 

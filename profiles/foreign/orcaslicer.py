@@ -39,6 +39,8 @@ KEYS = {
     "bottom_shell_thickness": "bottom_solid_min_thickness",
     "sparse_infill_density": "fill_density",
     "sparse_infill_pattern": "fill_pattern",
+    "top_surface_pattern": "top_fill_pattern",
+    "bottom_surface_pattern": "bottom_fill_pattern",
     "infill_direction": "fill_angle",
     "minimum_sparse_infill_area": "solid_infill_below_area",
     "spiral_mode": "spiral_vase",
@@ -94,6 +96,8 @@ KEYS = {
 }
 WORDS = {  # values that are called otherwise
     "fill_pattern": {"zig-zag": "rectilinear", "tri-hexagon": "stars"},
+    "top_fill_pattern": {"zig-zag": "rectilinear"},
+    "bottom_fill_pattern": {"zig-zag": "rectilinear"},
     "seam_position": {"back": "rear", "aligned_back": "rear"},
     "support_material_pattern": {"default": "rectilinear"},
 }

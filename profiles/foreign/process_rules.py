@@ -31,6 +31,11 @@ PATTERNS = {
     **dict.fromkeys(("honeycomb", "3dhoneycomb"), "honeycomb"),
     **{name: name for name in ("grid", "gyroid", "concentric")},
 }
+SKINS = {
+    **dict.fromkeys(("monotonic", "monotoniclines", "monotonicline"), "monotonic"),
+    **dict.fromkeys(("rectilinear", "alignedrectilinear"), "rectilinear"),
+    "concentric": "concentric",
+}
 SEAMS = {"aligned": "aligned", "rear": "rear", "nearest": "nearest", "random": "random"}
 STYLES = {
     "grid": "grid",
@@ -180,6 +185,9 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.infill_density", "fill_density", share),
     ("process.infill_pattern", "fill_pattern", one_of(PATTERNS)),
     ("process.infill_angle_deg", "fill_angle", number),
+    ("process.top_skin_pattern", "top_fill_pattern", one_of(SKINS)),
+    ("process.bottom_skin_pattern", "bottom_fill_pattern", one_of(SKINS)),
+    ("process.skin_angle_deg", "solid_infill_direction", number),
     ("process.solid_below_mm2", "solid_infill_below_area", number),
     ("process.infill_anchor_mm", "infill_anchor", part_of("infill_extrusion_width")),
     ("process.infill_joint_mm", "infill_anchor_max", part_of("infill_extrusion_width")),

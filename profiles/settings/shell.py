@@ -6,6 +6,8 @@ from pydantic import Field
 
 from profiles.frozen import Frozen
 
+SkinPattern = Literal["monotonic", "rectilinear", "concentric"]
+
 
 class Shell(Frozen):
     """Walls, seams and skins."""
@@ -40,8 +42,21 @@ class Shell(Frozen):
         le=100,
         description="least thickness of the layers under a surface, however thin they are: more layers then, mm",
     )
-    top_skin_monotonic: bool = Field(
-        True, description="the lines of the uppermost skins all lie on the same side of their neighbour: an even sheen"
+    top_skin_pattern: SkinPattern = Field(
+        "monotonic",
+        description="lines of the uppermost skins; monotonic: all lie on the same side of their neighbour, an even sheen; "
+        "rectilinear: in any order, which is faster; concentric: along the outline",
+    )
+    bottom_skin_pattern: SkinPattern = Field(
+        "rectilinear",
+        description="lines of the skins with nothing below, that of the first layer among them: as top_skin_pattern",
+    )
+    skin_angle_deg: float | None = Field(
+        None,
+        ge=0,
+        le=360,
+        description="direction of straight skin lines in the part's frame, across it in every second layer; absent: "
+        "infill_angle_deg; the first ones over sparse infill cross its lines, deg",
     )
     bottom_thickness_mm: float = Field(
         0.5, ge=0, le=100, description="least thickness of the layers over a surface that faces away, mm"

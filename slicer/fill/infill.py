@@ -23,12 +23,13 @@ from slicer.fill.lines import (
     Lines,
     anchor_lines,
     clip_pattern,
+    concentric_lines,
     grid_numbers,
     parallel_lines,
 )
 from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, close_loop, contours, offset
+from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 
@@ -84,7 +85,8 @@ def infill_beads(area: Polygons, process: Process, *, density: float, layer: int
     if density <= 0 or inner.is_empty():
         return []
     if process.infill_pattern == "concentric":
-        lines = _concentric(inner, spacing, density)
+        apart_mm = spacing / density
+        lines = concentric_lines(offset(inner, -0.5 * (apart_mm - spacing)), apart_mm)
     else:
         border = index_edges(inner)
         families = pattern_lines(process, layer, z_mm, spacing, density)
@@ -167,12 +169,3 @@ def _solutions(a: Floats, b: Floats, c: Floats) -> list[Floats]:
     """The two solutions u of a sin u + b cos u = -c in one period."""
     phase, away = np.unwrap(np.arctan2(a, b)), np.arccos(np.clip(-c / np.hypot(b, a), -1.0, 1.0))
     return [phase + away, phase - away]
-
-
-def _concentric(inner: Polygons, spacing_mm: float, density: float) -> list[Floats]:
-    """Outlines shrunk step by step."""
-    lines, area = [], offset(inner, -0.5 * (spacing_mm / density - spacing_mm))
-    while not area.is_empty():
-        lines += [close_loop(loop) for loop in contours(area)]
-        area = offset(area, -spacing_mm / density)
-    return lines
