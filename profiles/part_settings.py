@@ -19,6 +19,8 @@ MOST_PARTS = 1000
 SUPPORT_OF_A_PART = {
     "overhang_share",
     "bridge_flow",
+    "bridge_angle_deg",
+    "thick_bridges",
     "infill_bridge_flow",
     "support_pattern",
     "support_density",

@@ -6,6 +6,7 @@ A part that is cut from a model has all walls and skins along the model's surfac
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import pi, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -67,6 +68,7 @@ TOUCHING_MM = 0.01  # places so near to each other are one
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
+THREADS_APART_MM = 0.05  # between the threads of a thick bridge, as in PrusaSlicer (BRIDGE_EXTRA_SPACING)
 IRONED = 100  # after all else of an island
 
 
@@ -323,7 +325,11 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         if not wide.is_empty():
             area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
             area += _moat(area, region.sparse, infill_cell_mm(process))
-            beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
+            across = replace(lines, angle_deg=bridge.angle_deg)
+            if process.thick_bridges:
+                beads += thread_beads(area, across, sqrt(process.bridge_flow) * shells.sections.profile.machine.head.nozzle_mm)
+            else:
+                beads += bridge_beads(area, across, process.bridge_flow)
             region = _without(region, area, width)
     if layer and process.infill_density < DENSE:
         area = infill_bridges(region, shells.layers[layer - 1].region.sparse, width)
@@ -391,6 +397,14 @@ def bridge_beads(area: Polygons, lines: SolidLines, flow: float, over_infill: bo
     beads, rests = skin_lines(area, Kind.BRIDGE, lines)
     beads += [] if over_infill else gaps(rests, lines.width_mm, lines.height_mm)
     return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in beads]
+
+
+def thread_beads(area: Polygons, lines: SolidLines, diameter_mm: float) -> list[Bead]:
+    """The lines of a bridge as round threads, which hang below the layer, so far apart that they do not touch."""
+    height_mm = lines.height_mm
+    apart = replace(lines, width_mm=diameter_mm + THREADS_APART_MM + height_mm * ROUND_SIDES)
+    flow = 0.25 * pi * diameter_mm**2 / bead_area_mm2(diameter_mm, height_mm)
+    return [replace(bead, width_mm=diameter_mm, flow=flow) for bead in skin_lines(area, Kind.BRIDGE, apart)[0]]
 
 
 def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:

@@ -120,12 +120,6 @@ def _holes_of_all(config: Config, key: str) -> Converted:
     return Left("is no number") if grown is None else Value(-grown or 0.0, "what grows outside closes holes")
 
 
-def _bridge_flow(config: Config, key: str) -> Converted:
-    if config.flag("thick_bridges"):
-        return Left("thick_bridges: round threads, which ours are not")
-    return number(config, key)
-
-
 def _only_on(why: str) -> Convert:
     return lambda config, key: Value(True) if config.flag(key) else Left(why)
 
@@ -197,7 +191,9 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.ironing_flow", "ironing_flowrate", share),
     ("process.ironing_spacing_mm", "ironing_spacing", number),
     ("process.ironing_speed_mm_s", "ironing_speed", number),
-    ("process.bridge_flow", "bridge_flow_ratio", _bridge_flow),
+    ("process.bridge_flow", "bridge_flow_ratio", number),
+    ("process.bridge_angle_deg", "bridge_angle", number),
+    ("process.thick_bridges", "thick_bridges", flag),
     ("process.skirt_loops", "skirts", whole),
     ("process.skirt_distance_mm", "skirt_distance", number),
     ("process.brim_mm", "brim_width", _brim),

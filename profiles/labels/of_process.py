@@ -61,6 +61,8 @@ SUPPORT = {
     "bridge_longest_mm": advanced("Longest bridge without support", "bridging max bridge length don't support bridges"),
     "arch_longest_mm": advanced("Widest arch without support", "arches holes"),
     "bridge_flow": advanced("Bridge flow", "bridge flow ratio bridging"),
+    "bridge_angle_deg": advanced("Bridge angle", "bridging angle override direction"),
+    "thick_bridges": advanced("Thick bridges", "bridging round threads external bridge"),
     "infill_bridge_flow": rare("Flow of the first solid layer over infill", "internal bridge flow ratio"),
     "support": simple("Support", "supports enable generate support material"),
     "support_style": simple("Support style", "supports tree organic grid snug type"),

@@ -37,6 +37,8 @@ def taken(kind: str = "process", **values: str) -> dict[str, str]:
         ),
         ({"overhang_speed_0": "40%", "external_perimeter_speed": "50"}, "overhang_25_speed_mm_s", "20.0"),
         ({"perimeters": "2"}, "walls", "2"),
+        ({"bridge_angle": "45"}, "bridge_angle_deg", "45.0"),
+        ({"thick_bridges": "1"}, "thick_bridges", "true"),
         ({"top_fill_pattern": "monotoniclines"}, "top_skin_pattern", '"monotonic"'),
         ({"bottom_fill_pattern": "concentric"}, "bottom_skin_pattern", '"concentric"'),
         ({"solid_infill_direction": "30"}, "skin_angle_deg", "30.0"),
