@@ -353,6 +353,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         beads += gaps(around, width_mm, height_mm)
     beads += ironing_beads(shell.ironed, skins, process)
     sparse, z_mm = with_line_width(process, process.infill_line_width_mm), float(heights.tip_mm[layer])
+    beads = [bead for bead in beads if bead.kind is not Kind.GAP or bead.length_mm >= process.gap_least_mm]
     return beads + infill_beads(region.sparse, sparse, density=shells.density, layer=layer, z_mm=z_mm, height_mm=height_mm)
 
 

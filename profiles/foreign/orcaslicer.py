@@ -33,6 +33,7 @@ KEYS = {
     "initial_layer_print_height": "first_layer_height",
     "wall_loops": "perimeters",
     "only_one_wall_first_layer": "only_one_perimeter_first_layer",
+    "fuzzy_skin_point_distance": "fuzzy_skin_point_dist",
     "top_shell_layers": "top_solid_layers",
     "bottom_shell_layers": "bottom_solid_layers",
     "top_shell_thickness": "top_solid_min_thickness",

@@ -103,6 +103,10 @@ def _one_wall_top(config: Config, key: str) -> Converted:
     return Value(wanted != "none", "on all tops" if wanted == "topmost" else "")
 
 
+def _gap_fill(config: Config, key: str) -> Converted:
+    return Left("on: as here") if config.flag(key) else Value(1000.0, "off: no gap is so long")
+
+
 def _brim(config: Config, key: str) -> Converted:
     if config.text("brim_type") == "no_brim":
         return Value(0.0, "brim_type is no_brim")
@@ -167,6 +171,11 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.only_one_wall_top", "top_one_perimeter_type", _one_wall_top),
     ("process.only_one_wall_top", "only_one_wall_top", flag),
     ("process.only_one_wall_first_layer", "only_one_perimeter_first_layer", flag),
+    ("process.gap_least_mm", "gap_fill_enabled", _gap_fill),
+    ("process.gap_least_mm", "filter_out_gap_fill", number),
+    ("process.fuzzy_skin", "fuzzy_skin", one_of({name: name for name in ("none", "external", "all", "allwalls")})),
+    ("process.fuzzy_skin_thickness_mm", "fuzzy_skin_thickness", number),
+    ("process.fuzzy_skin_point_distance_mm", "fuzzy_skin_point_dist", number),
     ("process.wall_order", "external_perimeters_first", _wall_order),
     ("process.seam", "seam_position", one_of(SEAMS)),
     ("process.spiral_vase", "spiral_vase", flag),

@@ -36,6 +36,10 @@ SHELL = {
     "skin_angle_deg": advanced("Skin angle", "solid infill direction top surface"),
     "bottom_thickness_mm": advanced("Least bottom thickness", "minimum bottom shell thickness"),
     "solid_below_mm2": advanced("Solid infill in places below", "solid infill threshold area minimum sparse"),
+    "gap_least_mm": advanced("Shortest gap fill", "filter out tiny gaps gap fill enabled"),
+    "fuzzy_skin": simple("Fuzzy skin", "rough walls texture"),
+    "fuzzy_skin_thickness_mm": advanced("Fuzzy skin thickness"),
+    "fuzzy_skin_point_distance_mm": advanced("Fuzzy skin point distance", "density"),
     "seam": simple("Seam position", "z seam scar start of perimeters"),
     "seam_gap": rare("Gap at the seam", "seam scarf blob"),
 }

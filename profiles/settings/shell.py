@@ -68,6 +68,20 @@ class Shell(Frozen):
         description="places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more "
         "than the plastic saved, mm2",
     )
+    gap_least_mm: float = Field(
+        0.0, ge=0, le=1000, description="gap fill shorter than this is left out, which saves travels; 1000: all of it, mm"
+    )
+    fuzzy_skin: Literal["none", "external", "all", "allwalls"] = Field(
+        "none",
+        description="walls are rough; external: outer ones on the outside; all: those of holes as well; allwalls: inner ones, "
+        "too. First layers, faces at cuts, single lines and what climbs in spiral_vase stay even",
+    )
+    fuzzy_skin_thickness_mm: float = Field(
+        0.3, gt=0, le=2, description="points of rough walls are moved by as much at most, inward or outward, mm"
+    )
+    fuzzy_skin_point_distance_mm: float = Field(
+        0.8, ge=0.1, le=5, description="mean distance of the points of rough walls, by a quarter more or less, mm"
+    )
     seam: Literal["aligned", "corner", "rear", "nearest", "random"] = Field(
         "aligned",
         description="where walls begin: in one line over the layers where it is seen least, in corners rather than on faces; in "
