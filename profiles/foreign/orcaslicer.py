@@ -34,6 +34,8 @@ KEYS = {
     "wall_loops": "perimeters",
     "only_one_wall_first_layer": "only_one_perimeter_first_layer",
     "fuzzy_skin_point_distance": "fuzzy_skin_point_dist",
+    "before_layer_change_gcode": "before_layer_gcode",
+    "layer_change_gcode": "layer_gcode",
     "top_shell_layers": "top_solid_layers",
     "bottom_shell_layers": "bottom_solid_layers",
     "top_shell_thickness": "top_solid_min_thickness",

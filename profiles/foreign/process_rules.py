@@ -153,6 +153,8 @@ def _layer_time(config: Config, key: str) -> Converted:
 
 RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.layer_height_mm", "layer_height", number),
+    ("", "before_layer_gcode", left("is the machine's here: machine.gcode.before_layer")),
+    ("", "layer_gcode", left("is the machine's here: machine.gcode.before_layer")),
     ("process.first_layer_height_mm", "first_layer_height", part_of("layer_height")),
     ("process.least_layer_height_mm", "min_layer_height", above_zero("by the nozzle")),
     ("process.most_layer_height_mm", "max_layer_height", above_zero("by the nozzle")),
