@@ -118,6 +118,11 @@ class Blocks(Frozen):
     end: Block = Field(description="after the last part: heaters off, parking")
     before_part: Block = Field("", description="before each reorientation")
     after_part: Block = Field("", description="after each part")
+    before_layer: Block = Field(
+        "",
+        description="before each layer, over the print: only commands that are known to move nothing and to change no mode; "
+        "macros are refused",
+    )
     resume: Block = Field(
         "",
         description="after a power cut, a print on the table: makes the axes know where they stand, and leaves the tip at "

@@ -19,6 +19,8 @@ MOST_PARTS = 1000
 SUPPORT_OF_A_PART = {
     "overhang_share",
     "bridge_flow",
+    "bridge_angle_deg",
+    "thick_bridges",
     "infill_bridge_flow",
     "support_pattern",
     "support_density",
@@ -29,7 +31,7 @@ OF_THE_PRINT = (
     | (frozenset(Support.model_fields) - SUPPORT_OF_A_PART)
     | frozenset(key for key in Process.model_fields if key.startswith(("first_layer_", "travel_", "lift_")))
     | frozenset(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
-    | {"name", "scale", "rotate_deg", "self_supporting_angle_deg", "spiral_vase"}
+    | {"name", "scale", "rotate_deg", "self_supporting_angle_deg", "spiral_vase", "only_one_wall_first_layer"}
 )
 OF_PARTS_ON_PLASTIC = {
     "interface_overlap",

@@ -22,7 +22,8 @@ __all__ = ["DEFAULTS", "KINDS", "OF_KIND", "SECTIONS", "Profile", "kind_of", "kn
 
 DEFAULTS = {"machine": "generic_ac", "material": "pla", "process": "standard"}
 SECTIONS: dict[str, type[Frozen]] = {"machine": Machine, "material": Material, "process": Process, "search": Search}
-GONE = {"process": {"wall_generator"}}  # keys of earlier versions: what a G-code file or a journal tells of them is passed over
+# Keys of earlier versions: what a G-code file or a journal tells of them is passed over.
+GONE = {"process": {"wall_generator", "top_skin_monotonic"}}
 LIMITS = {"machine", "machine.nozzle_limit_c", "machine.bed_limit_c", "machine.head", "machine.head.nozzle_mm"}
 
 

@@ -120,7 +120,10 @@ def with_line_width(process: Process, width_mm: float | None) -> Process:
 
 
 def first_layer_process(process: Process) -> Process:
-    """The process of part 1's first layer, whose beads all have one width where first_layer_line_width_mm gives one."""
+    """The process of part 1's first layer: one wall where that is wanted, and one width of all beads where
+    first_layer_line_width_mm gives one."""
+    if process.only_one_wall_first_layer:
+        process = process.model_copy(update={"walls": min(process.walls, 1)})
     if process.first_layer_line_width_mm is None:
         return process
     return with_line_width(process.model_copy(update=dict.fromkeys(WIDTHS)), process.first_layer_line_width_mm)

@@ -14,6 +14,7 @@ from mdp.mesh import Floats
 from mdp.overhang import UP, facing_down
 from mdp.support_need.need import needs_support
 from mdp.support_need.spans import ROUNDING_MM, TOLERATED, line_across
+from profiles.process import Process
 from slicer.geometry.clip import rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges, within
 from slicer.geometry.polygons import (
@@ -92,7 +93,7 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
             all_need = len(needing.get(i, ())) == len(triangles)
             need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
             anchors = below + (outlines[i] - hanging)  # also slopes beside it that carry themselves
-            overhang = _sort_islands(hanging, need, anchors, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
+            overhang = _sort_islands(hanging, need, anchors, process, (level_mm, min(level_mm, arch_mm)))
             if sections.no_support:
                 wanted = overhang.hanging - sections.no_support[i]
                 overhang = replace(overhang, hanging=wanted, unwanted=overhang.hanging - wanted)
@@ -110,19 +111,19 @@ def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons
 
 
 def _sort_islands(
-    hanging: Polygons, need: Polygons, anchors: Polygons, width_mm: float, longest_mm: tuple[float, float]
+    hanging: Polygons, need: Polygons, anchors: Polygons, process: Process, longest_mm: tuple[float, float]
 ) -> Overhang:
     """Sorts the connected pieces of a hanging place.
 
     need: what of it needs support by the search's definition; longest_mm: of bridges that do not, and of those that do.
     """
-    places = islands(hanging)
+    width_mm, places = process.line_width_mm, islands(hanging)
     if all(island.area() < LEAST * width_mm**2 for island in places):
         return Overhang(need)
     held_by = index_edges(offset(anchors, 0.25 * width_mm))
     rest, bridges = [], []
     for island in places:
-        bridge = find_bridge(island, held_by, width_mm)
+        bridge = find_bridge(island, held_by, width_mm, process.bridge_angle_deg)
         most_mm = longest_mm[(island ^ need).area() >= LEAST * width_mm**2]
         if bridge is not None and (most_mm == inf or bridge.carries(most_mm)):
             bridges.append(bridge)
@@ -132,22 +133,24 @@ def _sort_islands(
     return Overhang(left ^ need, tuple(bridges), left - need)
 
 
-def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
+def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> Bridge | None:
     """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
 
     anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The mean fourth
     power of the spans is least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach
-    over, that is the direction of the shortest spans.
+    over, that is the direction of the shortest spans. angle_deg: the direction where one is asked for, 0: none is.
     """
     if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):
         return None
     sides = edges(hanging)
-    angle, longest_mm, loose, _ = _least_sag(sides, anchors, _angles(sides), width_mm)
+    angle, longest_mm, loose, _ = _least_sag(sides, anchors, _angles(sides, angle_deg), width_mm)
     return None if np.isnan(angle) else Bridge(hanging, float(np.degrees(angle)), longest_mm, loose)
 
 
-def _angles(sides: Floats) -> Floats:
-    """Directions worth trying, radians in 0 .. pi, those of the place's sides first."""
+def _angles(sides: Floats, angle_deg: float) -> Floats:
+    """Directions worth trying, radians in 0 .. pi, those of the place's sides first; only the one that is asked for, if any."""
+    if angle_deg:
+        return np.array([np.radians(angle_deg % 180.0)])
     steps = sides[:, 2:] - sides[:, :2]
     longest = np.argsort(-np.hypot(*steps.T), kind="stable")[:SIDES]
     along = np.arctan2(steps[longest, 1], steps[longest, 0])
@@ -207,6 +210,7 @@ def bridges_of_layers(
     supported: where each layer's support is.
     """
     process, heights, outlines = sections.process, sections.heights, sections.outlines
+    width_mm = process.line_width_mm
     bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
     for i in layers[: bisect_left(layers, len(overhangs))]:
         overhang = overhangs[i]
@@ -216,27 +220,30 @@ def bridges_of_layers(
         drop_mm = float(heights.bottom_mm[i]) - process.support_gap_mm - 2.0 * process.layer_height_mm
         lowest = int(np.searchsorted(heights.tip_mm, drop_mm - SAME_MM))
         held = union([area for area in supported[lowest:i] if not area.is_empty()])
-        held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
-        bare = opening(free - held, 0.25 * process.line_width_mm)
+        held = held if held.is_empty() else offset(held, 0.5 * width_mm)
+        bare = opening(free - held, 0.25 * width_mm)
         if not bare.is_empty():
             slopes = outlines[i] - union([free, *(bridge.hanging for bridge in overhang.bridges)])
             carrying = union([below if i else offset(below, RIM_MM), held, slopes])
-            anchors = index_edges(offset(carrying, 0.25 * process.line_width_mm))
-            bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
+            anchors = index_edges(offset(carrying, 0.25 * width_mm))
+            bridges[i] += tuple(
+                span for island in islands(bare) for span in find_bridges(island, anchors, width_mm, process.bridge_angle_deg)
+            )
     return bridges
 
 
-def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> list[Bridge]:
+def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> list[Bridge]:
     """Lines over one connected hanging place, each piece of it in the direction in which most of them are held at both ends.
 
-    Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn.
+    Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn. angle_deg: as
+    find_bridge.
     """
     bridges: list[Bridge] = []
     left = [hanging]
     while left:
         piece = left.pop()
-        bridge = find_bridge(piece, anchors, width_mm)
-        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(piece, anchors, width_mm)
+        bridge = find_bridge(piece, anchors, width_mm, angle_deg)
+        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(piece, anchors, width_mm, angle_deg)
         if held is None:
             bridges += [bridge] if bridge is not None else []
         else:
@@ -245,10 +252,10 @@ def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> list
     return bridges
 
 
-def _held_piece(hanging: Polygons, anchors: EdgeIndex, width_mm: float) -> Bridge | None:
+def _held_piece(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float) -> Bridge | None:
     """The part of a place whose lines are held at both ends, in the direction with most such lines; None where it is tiny."""
     sides = edges(hanging)
-    *_, angle = _least_sag(sides, anchors, _angles(sides), width_mm)
+    *_, angle = _least_sag(sides, anchors, _angles(sides, angle_deg), width_mm)
     lines = _lines_across(sides, anchors, angle, width_mm)
     lines = lines[lines[:, 3] == 2.0]
     if not len(lines):

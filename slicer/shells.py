@@ -6,6 +6,7 @@ A part that is cut from a model has all walls and skins along the model's surfac
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import pi, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -53,7 +54,7 @@ from slicer.sectioning import Sections
 from slicer.support.beads import auxiliary_beads
 from slicer.support.support import Supports
 from slicer.walls.variable import Wall
-from slicer.walls.walls import Walls, gaps, layer_walls, uncovered_area, walls
+from slicer.walls.walls import Walls, gaps, layer_walls, uncovered_area, walls, walls_under_tops
 
 FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
 
@@ -64,6 +65,7 @@ REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cu
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
+THREADS_APART_MM = 0.05  # between the threads of a thick bridge, as in PrusaSlicer (BRIDGE_EXTRA_SPACING)
 IRONED = 100  # after all else of an island
 
 
@@ -111,9 +113,13 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     model = model_sections(sections)
     heights_mm, count = sections.heights.height_mm.tolist(), len(processes)
     counts = [
-        wall_counts(section, layer, process.walls, own.walls - process.walls, sections.places)
+        wall_counts(
+            section, layer, process.walls, own.walls - process.walls, sections.places if own.walls >= process.walls else ()
+        )
         for layer, (section, own) in enumerate(zip(sections.own, processes, strict=True))
     ]
+    over = [mine if whole is None else whole for mine, whole in zip(sections.own, model, strict=True)][1:]
+    over += sections.above[:1] or [Polygons()]
     # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
     whole = layers is None or has_lightning(process, sections.places)  # what holds a layer is planned from the top
     runs = [range(count)] if whole else [range(max(k - 1, 0), k + 1) for k in layers or ()]
@@ -121,9 +127,16 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
 
     def contours_of(place: int) -> Contours:
         layer = needed[place]
-        own, more = processes[layer], processes[layer].walls - process.walls
+        own = processes[layer]
         walls, ending, inside = cut_walls(
-            sections.own[layer], model[layer], own, counts[layer], height_mm=heights_mm[layer], nozzle_mm=nozzle_mm, more=more
+            sections.own[layer],
+            model[layer],
+            own,
+            counts[layer],
+            height_mm=heights_mm[layer],
+            nozzle_mm=nozzle_mm,
+            more=max(own.walls - process.walls, 0),
+            above=over[layer] if own.only_one_wall_top else None,
         )
         areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
         return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
@@ -229,16 +242,24 @@ def cut_walls(
     height_mm: float,
     nozzle_mm: float,
     more: int,
+    above: Polygons | None = None,
 ) -> tuple[Walls, tuple[Bead, ...], Polygons]:
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
     Those that run round; inner walls along the surface that end on a cut face's, or where a modifier has fewer, all of one width,
-    and what fills between them; what the walls would enclose if the model were not cut and had so many fewer walls.
+    and what fills between them; what the walls would enclose if the model were not cut and had so many fewer walls. above: the
+    model in the next layer, where what it leaves bare has one wall.
     """
     whole, least, most = section if model is None else model, min(counts.all), max(counts.all)
     if model is None and least == most:
-        round_ = layer_walls(section, most, process, height_mm, nozzle_mm)
-        fewer = layer_walls(section, most - more, process, height_mm, nozzle_mm) if more else round_
+
+        def walled(count: int) -> Walls:
+            if above is None:
+                return layer_walls(section, count, process, height_mm, nozzle_mm)
+            return walls_under_tops(section, above, count, process, height_mm, nozzle_mm)
+
+        round_ = walled(most)
+        fewer = walled(most - more) if more else round_
         return round_, (), fewer.inside
     numbers = {number for count in counts.all for number in (count, count - more)}
     enclosing = {count: walls(whole, count, process, height_mm) for count in numbers}
@@ -318,7 +339,11 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
             # where infill beside it would be narrower than a cell it goes on to the walls
             area += union(strips_beside(area, region.sparse, widest_cell_mm(shells.fillings, process, layer)))
-            beads += bridge_beads(area, replace(lines, angle_deg=bridge.angle_deg), process.bridge_flow)
+            across = replace(lines, angle_deg=bridge.angle_deg)
+            if process.thick_bridges:
+                beads += thread_beads(area, across, sqrt(process.bridge_flow) * shells.sections.profile.machine.head.nozzle_mm)
+            else:
+                beads += bridge_beads(area, across, process.bridge_flow)
             region = _without(region, area, width)
     if layer:
         below = shells.layers[layer - 1]
@@ -328,15 +353,23 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             held = area + (offset(area, onto_mm) - shell.walls.inside)
             beads += bridge_beads(held, lines, process.infill_bridge_flow, over_infill=True)
             region = replace(_without(region, area, width), sparse=region.sparse)
-    top = replace(lines, width_mm=process.top_skin_line_width_mm or width, in_order=process.top_skin_monotonic)
+    skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))
+    top = replace(skins, width_mm=process.top_skin_line_width_mm or width, pattern=process.top_skin_pattern)
+    bottom = replace(skins, pattern=process.bottom_skin_pattern)
+    solid, under = region.solid, Polygons()
+    if bottom != skins:
+        bare = shells.sections.below(layer)
+        under = solid if bare is None else opening(solid - bare, 0.5 * width)
+        solid = solid - under
     places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
-    for area, kind, solid in ((region.solid, Kind.SKIN, lines), (region.top, Kind.TOP_SKIN, top)):
-        skin, rests = skin_lines(area, kind, solid)
+    for area, kind, laid in ((solid, Kind.SKIN, skins), (under, Kind.SKIN, bottom), (region.top, Kind.TOP_SKIN, top)):
+        skin, rests = skin_lines(area, kind, laid)
         beads += skin
-        places.setdefault(solid.width_mm, []).extend(rests)
+        places.setdefault(laid.width_mm, []).extend(rests)
     for width_mm, around in places.items():
         beads += gaps(around, width_mm, height_mm)
-    beads += ironing_beads(shell.ironed, lines, process)
+    beads += ironing_beads(shell.ironed, skins, process)
+    beads = [bead for bead in beads if bead.kind is not Kind.GAP or bead.length_mm >= process.gap_least_mm]
     if shell.infill is not None and region.sparse is shell.region.sparse:
         return beads + shell.infill
     return beads + filling_beads(region.sparse, shells.fillings, process, heights, layer)
@@ -378,13 +411,21 @@ def bridge_beads(area: Polygons, lines: SolidLines, flow: float, over_infill: bo
     return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in beads]
 
 
+def thread_beads(area: Polygons, lines: SolidLines, diameter_mm: float) -> list[Bead]:
+    """The lines of a bridge as round threads, which hang below the layer, so far apart that they do not touch."""
+    height_mm = lines.height_mm
+    apart = replace(lines, width_mm=diameter_mm + THREADS_APART_MM + height_mm * ROUND_SIDES)
+    flow = 0.25 * pi * diameter_mm**2 / bead_area_mm2(diameter_mm, height_mm)
+    return [replace(bead, width_mm=diameter_mm, flow=flow) for bead in skin_lines(area, Kind.BRIDGE, apart)[0]]
+
+
 def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:
     """Lines across those of the skin; their flow is counted on a bead of the line's width."""
     if area.is_empty():
         return []
     spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
     flow = process.ironing_flow * spacing * height_mm / bead_area_mm2(width, height_mm)
-    dense = SolidLines(skin.angle_deg + 90.0, spacing + height_mm * ROUND_SIDES, height_mm, in_order=True)
+    dense = SolidLines(skin.angle_deg + 90.0, spacing + height_mm * ROUND_SIDES, height_mm, pattern="monotonic")
     beads, _ = skin_lines(area, Kind.IRONING, dense)
     return [replace(bead, width_mm=width, flow=flow, rank=IRONED) for bead in beads]
 

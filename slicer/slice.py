@@ -25,7 +25,7 @@ from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
-from slicer.geometry.polygons import Polygons
+from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm, mark_corners
 from slicer.heights import shell_layers
 from slicer.interface.interface import pin_width_mm, skin_beside
@@ -42,6 +42,7 @@ from slicer.strokes.travels import may_wipe_over
 from slicer.strokes.vase import vase_layers
 from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, explain, own_supports
+from slicer.walls.fuzzy import fuzzy_walls
 
 FEWEST_IN_ALL = 250  # fewer are sliced sooner than processes are forked and their paths brought back
 LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it
@@ -173,6 +174,8 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
             bare.append(i)
         around = Surroundings(rear, seams, tip, limits[i], i, planned[i])
         beads, seams = place_seams([*own, *auxiliary], process, around)
+        if i and process.fuzzy_skin != "none":
+            beads = fuzzy_walls(beads, process, _joints_near(sections, i), (sections.part.index, i))
         skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
         layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers else None, skin)
         if len(layer):
@@ -197,6 +200,12 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         float((sections.heights.tip_mm if usual == count else sections.heights.bottom_mm)[too_thin[0]]) if too_thin else 0.0,
         len(sections.pins),
     )
+
+
+def _joints_near(sections: Sections, layer: int) -> list[Polygons]:
+    """What other parts take of a layer and of those next to it."""
+    near = [*sections.beside, *sections.above[:1]][max(layer - 1, 0) : layer + 2]
+    return [area for area in (*near, *sections.standing[layer : layer + 1]) if not area.is_empty()]
 
 
 def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
@@ -247,7 +256,10 @@ def order_layer(
     if index == 0 and not on_platform:
         beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
     strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin)
-    strokes = split_overhangs(strokes, outline, sections.below(index), own)
+    below = sections.below(index)
+    if below is not None and own.fuzzy_skin != "none":
+        below = offset(below, own.fuzzy_skin_thickness_mm)  # rough walls lie on rough walls
+    strokes = split_overhangs(strokes, outline, below, own)
     if index == 0 and not on_platform and process.interlock == "grooves":
         strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
     of_places = [place.over(process) for place in sections.speed_places]

@@ -8,7 +8,7 @@ from machine.firmware import dialect_of
 from machine.firmware.dialect import Dialect
 from machine.firmware.klipper import stepper_name
 from machine.firmware.line import FRAME_CHARACTERS
-from machine.gcode.commands import COMMANDS, Heat, command_named, heat_in, homes
+from machine.gcode.commands import COMMANDS, Heat, command_named, heat_in, homes, stands_still
 from machine.gcode.line_text import plain_line, read_line
 from machine.gcode.words import FLAG, MACRO
 from machine.planning.moves import BeginPart
@@ -20,7 +20,7 @@ from profiles.machine import Blocks, Machine
 from profiles.places import shipped_of_dialect
 from profiles.profile import Profile
 
-RESUME, START = "resume", "start"
+RESUME, START, BEFORE_LAYER = "resume", "start", "before_layer"
 MOST_QUOTED = 3
 OTHER_WORD = {"S": "P", "P": "S"}  # what a temperature stands behind in the other kind of firmware
 WITH_E = {"G76", "M66", "M67", "M68"}  # the commands of CNC programs that use an E
@@ -36,11 +36,12 @@ def placeholder_names(profile: Profile, block: str) -> list[str]:
 def block_problems(profile: Profile, *blocks: str) -> list[str]:
     """What cannot be filled in of blocks, of all where none is named, each by itself; and what the firmware refuses of them."""
     machine, dialect = profile.machine, dialect_of(profile.machine)
-    problems, refused = [], {}
+    problems, refused = list[str](), dict[str, list[str]]()
     for block in blocks or tuple(Blocks.model_fields):
         try:
             lines = fill_block(getattr(machine.gcode, block), f"machine.gcode.{block}", _values(profile, block), dialect)
             refused[block] = list(refused_lines(lines, dialect))
+            problems += _moving(lines, dialect) if block == BEFORE_LAYER else ()
         except ProfileError as error:
             problems.append(str(error))
     return [*problems, *_foreign(machine, {block: lines for block, lines in refused.items() if lines})]
@@ -51,6 +52,16 @@ def check_blocks(profile: Profile) -> None:
     problems = block_problems(profile)
     if problems:
         raise ProfileError("; ".join(problems))
+
+
+def _moving(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
+    """What of the block before layers cannot be run over a print."""
+    for line in lines:
+        if not stands_still(line, dialect):
+            yield (
+                f"machine.gcode.{BEFORE_LAYER}: {line!r} may move an axis or change a mode: over the print only commands are "
+                "allowed that are known to do neither, macros are not"
+            )
 
 
 def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator[str]:
@@ -71,7 +82,8 @@ def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator
 def _values(profile: Profile, block: str) -> dict[str, object]:
     if block == RESUME:
         return resume_placeholders(profile.machine, (0.0, 0.0, 0.0), level(profile.machine), 0.0)
-    return placeholders("check", profile, [], 0.0, 0.0)
+    values = placeholders("check", profile, [], 0.0, 0.0)
+    return values | {"layer_num": 0, "layer_z": 0.0, "max_layer_z": 0.0} if block == BEFORE_LAYER else values
 
 
 def filled_start(profile: Profile) -> list[str]:

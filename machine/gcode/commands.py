@@ -205,6 +205,15 @@ def homes(line: str, dialect: Dialect) -> bool:
     return any(command_named(name, commands_of(dialect)).homes for name, _ in _commands(line))
 
 
+def stands_still(line: str, dialect: Dialect) -> bool:
+    """Whether a line is known to move nothing and to leave the rest of a program its meaning; a macro is not."""
+    rows = [command_named(name, commands_of(dialect)) for name, _ in _commands(line)]
+    stirs = [
+        row.moves or row.homes or row.probes or row.motors or row.changes or row.refused or row.heats == "any" for row in rows
+    ]
+    return NOTHING_KNOWN not in rows and not any(stirs)
+
+
 def _commands(line: str) -> list[tuple[str, str]]:
     """Name and rest of every command in a line; a text that is shown is none.
 

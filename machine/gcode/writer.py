@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
-from machine.gcode.blocks import check_blocks, fill_block, placeholders
+from machine.gcode.blocks import BEFORE_LAYER, check_blocks, fill_block, placeholders
 from machine.gcode.lines import Lines
 from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, Texts, Z, as_bytes
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, turn
@@ -71,6 +71,7 @@ def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_m
     coming = iter(parts)
     next_part = next(coming, None)
     last_strokes = _last_strokes(program)
+    top_mm = {mark.part: mark.z_mm for mark in program.marks if isinstance(mark, BeginLayer)}
     yield from _ended(settings.head(program.name, profile))
     yield from _ended(_start(profile, parts, pen))
     done = 0
@@ -90,6 +91,7 @@ def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_m
             yield from _ended((*_begin_part(mark, len(parts), pen), *_contents(program, row)))
         else:
             yield from _ended((*_begin_layer(mark, profile, pen), *_progress(float(elapsed[row]), total, pen)))
+            yield from _before_layer(mark, top_mm[mark.part], pen)
     yield from _moves(program, done, len(program), last_strokes, profile, pen)
     yield from _ended((*_end(pen), *_progress(total, total, pen), *_dialect_line(pen.dialect.last, pen)))
     yield from _ended(settings.foot(profile, filament_mm, total))
@@ -205,6 +207,11 @@ def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:
     """How hot the first layer among marks is printed; 0 where there is none."""
     coming = next((mark for mark in marks if isinstance(mark, BeginLayer)), None)
     return 0.0 if coming is None else _nozzle_c(coming, profile)
+
+
+def _before_layer(move: BeginLayer, top_mm: float, pen: Pen) -> Iterator[str]:
+    """The block before a layer; top_mm: height of the last layer of its part."""
+    return _ended(_block(BEFORE_LAYER, pen, layer_num=pen.layers - 1, layer_z=float(move.z_mm), max_layer_z=float(top_mm)))
 
 
 def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:

@@ -32,6 +32,10 @@ KEYS = {
     **WIDTHS,
     "initial_layer_print_height": "first_layer_height",
     "wall_loops": "perimeters",
+    "only_one_wall_first_layer": "only_one_perimeter_first_layer",
+    "fuzzy_skin_point_distance": "fuzzy_skin_point_dist",
+    "before_layer_change_gcode": "before_layer_gcode",
+    "layer_change_gcode": "layer_gcode",
     "top_shell_layers": "top_solid_layers",
     "bottom_shell_layers": "bottom_solid_layers",
     "top_shell_thickness": "top_solid_min_thickness",
@@ -39,6 +43,8 @@ KEYS = {
     "resolution": "gcode_resolution",
     "sparse_infill_density": "fill_density",
     "sparse_infill_pattern": "fill_pattern",
+    "top_surface_pattern": "top_fill_pattern",
+    "bottom_surface_pattern": "bottom_fill_pattern",
     "infill_direction": "fill_angle",
     "minimum_sparse_infill_area": "solid_infill_below_area",
     "spiral_mode": "spiral_vase",
@@ -94,6 +100,8 @@ KEYS = {
 }
 WORDS = {  # values that are called otherwise
     "fill_pattern": {"zig-zag": "rectilinear", "tri-hexagon": "stars"},
+    "top_fill_pattern": {"zig-zag": "rectilinear"},
+    "bottom_fill_pattern": {"zig-zag": "rectilinear"},
     "seam_position": {"back": "rear", "aligned_back": "rear"},
     "support_material_pattern": {"default": "rectilinear"},
 }

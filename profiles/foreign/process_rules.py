@@ -31,6 +31,11 @@ PATTERNS = {
     **dict.fromkeys(("honeycomb", "3dhoneycomb"), "honeycomb"),
     **{name: name for name in ("grid", "gyroid", "concentric", "lightning")},
 }
+SKINS = {
+    **dict.fromkeys(("monotonic", "monotoniclines", "monotonicline"), "monotonic"),
+    **dict.fromkeys(("rectilinear", "alignedrectilinear"), "rectilinear"),
+    "concentric": "concentric",
+}
 SEAMS = {"aligned": "aligned", "rear": "rear", "nearest": "nearest", "random": "random"}
 STYLES = {
     "grid": "grid",
@@ -93,6 +98,15 @@ def _wall_order(config: Config, key: str) -> Converted:
     return Value("outer-first" if config.flag(key) else "inner-first", "" if config.flag(key) is not None else "off")
 
 
+def _one_wall_top(config: Config, key: str) -> Converted:
+    wanted = config.text(key)
+    return Value(wanted != "none", "on all tops" if wanted == "topmost" else "")
+
+
+def _gap_fill(config: Config, key: str) -> Converted:
+    return Left("on: as here") if config.flag(key) else Value(1000.0, "off: no gap is so long")
+
+
 def _brim(config: Config, key: str) -> Converted:
     if config.text("brim_type") == "no_brim":
         return Value(0.0, "brim_type is no_brim")
@@ -108,12 +122,6 @@ def _ironing(config: Config, key: str) -> Converted:
 def _holes_of_all(config: Config, key: str) -> Converted:
     grown = config.number(key)
     return Left("is no number") if grown is None else Value(-grown or 0.0, "what grows outside closes holes")
-
-
-def _bridge_flow(config: Config, key: str) -> Converted:
-    if config.flag("thick_bridges"):
-        return Left("thick_bridges: round threads, which ours are not")
-    return number(config, key)
 
 
 def _only_on(why: str) -> Convert:
@@ -145,6 +153,8 @@ def _layer_time(config: Config, key: str) -> Converted:
 
 RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.layer_height_mm", "layer_height", number),
+    ("", "before_layer_gcode", left("is the machine's here: machine.gcode.before_layer")),
+    ("", "layer_gcode", left("is the machine's here: machine.gcode.before_layer")),
     ("process.first_layer_height_mm", "first_layer_height", part_of("layer_height")),
     ("process.least_layer_height_mm", "min_layer_height", above_zero("by the nozzle")),
     ("process.most_layer_height_mm", "max_layer_height", above_zero("by the nozzle")),
@@ -160,6 +170,14 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.bottom_layers", "bottom_solid_layers", whole),
     ("process.top_thickness_mm", "top_solid_min_thickness", number),
     ("process.bottom_thickness_mm", "bottom_solid_min_thickness", number),
+    ("process.only_one_wall_top", "top_one_perimeter_type", _one_wall_top),
+    ("process.only_one_wall_top", "only_one_wall_top", flag),
+    ("process.only_one_wall_first_layer", "only_one_perimeter_first_layer", flag),
+    ("process.gap_least_mm", "gap_fill_enabled", _gap_fill),
+    ("process.gap_least_mm", "filter_out_gap_fill", number),
+    ("process.fuzzy_skin", "fuzzy_skin", one_of({name: name for name in ("none", "external", "all", "allwalls")})),
+    ("process.fuzzy_skin_thickness_mm", "fuzzy_skin_thickness", number),
+    ("process.fuzzy_skin_point_distance_mm", "fuzzy_skin_point_dist", number),
     ("process.wall_order", "external_perimeters_first", _wall_order),
     ("process.seam", "seam_position", one_of(SEAMS)),
     ("process.spiral_vase", "spiral_vase", flag),
@@ -173,6 +191,9 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.infill_density", "fill_density", share),
     ("process.infill_pattern", "fill_pattern", one_of(PATTERNS)),
     ("process.infill_angle_deg", "fill_angle", number),
+    ("process.top_skin_pattern", "top_fill_pattern", one_of(SKINS)),
+    ("process.bottom_skin_pattern", "bottom_fill_pattern", one_of(SKINS)),
+    ("process.skin_angle_deg", "solid_infill_direction", number),
     ("process.solid_below_mm2", "solid_infill_below_area", number),
     ("process.infill_anchor_mm", "infill_anchor", part_of("infill_extrusion_width")),
     ("process.infill_joint_mm", "infill_anchor_max", part_of("infill_extrusion_width")),
@@ -182,7 +203,9 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.ironing_flow", "ironing_flowrate", share),
     ("process.ironing_spacing_mm", "ironing_spacing", number),
     ("process.ironing_speed_mm_s", "ironing_speed", number),
-    ("process.bridge_flow", "bridge_flow_ratio", _bridge_flow),
+    ("process.bridge_flow", "bridge_flow_ratio", number),
+    ("process.bridge_angle_deg", "bridge_angle", number),
+    ("process.thick_bridges", "thick_bridges", flag),
     ("process.skirt_loops", "skirts", whole),
     ("process.skirt_distance_mm", "skirt_distance", number),
     ("process.brim_mm", "brim_width", _brim),

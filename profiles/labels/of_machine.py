@@ -56,6 +56,7 @@ TABLES = {
     "gcode.end": advanced("End G-code", "custom script finish"),
     "gcode.before_part": advanced("G-code before a part", "custom script"),
     "gcode.after_part": advanced("G-code after a part", "custom script"),
+    "gcode.before_layer": advanced("G-code before a layer", "custom script layer change before_layer_gcode layer_gcode"),
     "gcode.resume": rare("G-code after a power cut", "custom script recovery"),
 }
 MACHINE: dict[str, Label] = {

@@ -6,6 +6,8 @@ from pydantic import Field
 
 from profiles.frozen import Frozen
 
+SkinPattern = Literal["monotonic", "rectilinear", "concentric"]
+
 
 class Shell(Frozen):
     """Walls, seams and skins."""
@@ -14,6 +16,12 @@ class Shell(Frozen):
     overhang_extra_walls: int = Field(
         0, ge=0, le=20, description="more walls in layers with overhanging walls: the outer ones hang on the inner ones"
     )
+    only_one_wall_top: bool = Field(
+        False,
+        description="one wall round surfaces that face the printing direction, whose skin takes the place of the others; not in "
+        "layers that another part touches",
+    )
+    only_one_wall_first_layer: bool = Field(False, description="one wall in part 1's first layer")
     wall_order: Literal["inner-first", "outer-first"] = Field(
         "inner-first",
         description="inner-first: the outer wall leans on finished plastic, best over overhangs; outer-first: nothing pushes it "
@@ -34,8 +42,21 @@ class Shell(Frozen):
         le=100,
         description="least thickness of the layers under a surface, however thin they are: more layers then, mm",
     )
-    top_skin_monotonic: bool = Field(
-        True, description="the lines of the uppermost skins all lie on the same side of their neighbour: an even sheen"
+    top_skin_pattern: SkinPattern = Field(
+        "monotonic",
+        description="lines of the uppermost skins; monotonic: all lie on the same side of their neighbour, an even sheen; "
+        "rectilinear: in any order, which is faster; concentric: along the outline",
+    )
+    bottom_skin_pattern: SkinPattern = Field(
+        "rectilinear",
+        description="lines of the skins with nothing below, that of the first layer among them: as top_skin_pattern",
+    )
+    skin_angle_deg: float | None = Field(
+        None,
+        ge=0,
+        le=360,
+        description="direction of straight skin lines in the part's frame, across it in every second layer; absent: "
+        "infill_angle_deg; the first ones over sparse infill cross its lines, deg",
     )
     bottom_thickness_mm: float = Field(
         0.5, ge=0, le=100, description="least thickness of the layers over a surface that faces away, mm"
@@ -46,6 +67,20 @@ class Shell(Frozen):
         le=1e6,
         description="places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more "
         "than the plastic saved, mm2",
+    )
+    gap_least_mm: float = Field(
+        0.0, ge=0, le=1000, description="gap fill shorter than this is left out, which saves travels; 1000: all of it, mm"
+    )
+    fuzzy_skin: Literal["none", "external", "all", "allwalls"] = Field(
+        "none",
+        description="walls are rough; external: outer ones on the outside; all: those of holes as well; allwalls: inner ones, "
+        "too. First layers, faces at cuts, single lines and what climbs in spiral_vase stay even",
+    )
+    fuzzy_skin_thickness_mm: float = Field(
+        0.3, gt=0, le=2, description="points of rough walls are moved by as much at most, inward or outward, mm"
+    )
+    fuzzy_skin_point_distance_mm: float = Field(
+        0.8, ge=0.1, le=5, description="mean distance of the points of rough walls, by a quarter more or less, mm"
     )
     seam: Literal["aligned", "corner", "rear", "nearest", "random"] = Field(
         "aligned",

@@ -32,6 +32,17 @@ class Support(Frozen):
     bridge_flow: float = Field(
         1.0, ge=0.3, le=2, description="factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
     )
+    bridge_angle_deg: float = Field(
+        0.0,
+        ge=0,
+        le=360,
+        description="direction of the lines of bridges in the part's frame; 0: that in which they sag least, 180: along x, deg",
+    )
+    thick_bridges: bool = Field(
+        False,
+        description="bridges are round threads of the nozzle's diameter, which pull tight over long spans but look coarser; "
+        "not those over infill",
+    )
     infill_bridge_flow: float = Field(
         1.0, ge=0.3, le=2, description="factor on extruded volume of the first solid layer over sparse infill, which spans it"
     )

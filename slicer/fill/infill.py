@@ -26,12 +26,13 @@ from slicer.fill.lines import (
     Lines,
     anchor_lines,
     clip_pattern,
+    concentric_lines,
     grid_numbers,
     parallel_lines,
 )
 from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, close_loop, closing, contours, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, closing, islands, offset, opening, union
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.modifiers import SLIT_MM, Place, combined
@@ -202,7 +203,8 @@ def infill_beads(
     if density <= 0 or inner.is_empty():
         return []
     if process.infill_pattern == "concentric":
-        lines = _concentric(inner, spacing, density)
+        apart_mm = spacing / density
+        lines = concentric_lines(offset(inner, -0.5 * (apart_mm - spacing)), apart_mm)
     elif process.infill_pattern == "lightning":
         lines = clip_chains(lightning, inner, width)
     else:
@@ -293,12 +295,3 @@ def _solutions(a: Floats, b: Floats, c: Floats) -> list[Floats]:
     """The two solutions u of a sin u + b cos u = -c in one period."""
     phase, away = np.unwrap(np.arctan2(a, b)), np.arccos(np.clip(-c / np.hypot(b, a), -1.0, 1.0))
     return [phase + away, phase - away]
-
-
-def _concentric(inner: Polygons, spacing_mm: float, density: float) -> list[Floats]:
-    """Outlines shrunk step by step."""
-    lines, area = [], offset(inner, -0.5 * (spacing_mm / density - spacing_mm))
-    while not area.is_empty():
-        lines += [close_loop(loop) for loop in contours(area)]
-        area = offset(area, -spacing_mm / density)
-    return lines

@@ -15,6 +15,7 @@ from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Indices
 from slicer.geometry.clip import NO_PIECES, Pieces, clip_lines, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex
+from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 
 Box = tuple[float, float, float, float]
 Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
@@ -47,6 +48,15 @@ def parallel_lines(angle_deg: float, apart_mm: float, shift_mm: float = 0.0) -> 
 def grid_numbers(low: float, high: float, apart_mm: float) -> Floats:
     """Whole numbers k for which (k + 1/2) apart lies between low and high: a grid that is the same in every layer."""
     return np.arange(ceil(low / apart_mm - 0.5), ceil(high / apart_mm - 0.5), dtype=np.float64)
+
+
+def concentric_lines(area: Polygons, apart_mm: float) -> list[Floats]:
+    """The outlines of an area, and those of what is left when they have shrunk by a distance, and so on; all closed."""
+    lines = list[Floats]()
+    while not area.is_empty():
+        lines += [close_loop(loop) for loop in contours(area)]
+        area = offset(area, -apart_mm)
+    return lines
 
 
 def horizontal_lines(heights: Floats, box: Box) -> Lines:

@@ -1,4 +1,4 @@
-"""Skin: solid fill by lines at alternating +-45 degrees, by short beads where no such line fits, and the ironing of tops.
+"""Skin: solid fill by lines at alternating +-45 degrees or along the outline, by short beads where none fits, and ironing.
 
 Monotonic skins are printed in such an order that every line lies on the same side of its neighbour: where lines meet from both
 sides of a hole the sheen of a skin changes and a ridge may stand. So lines are taken together in cells, in which each has one
@@ -13,8 +13,9 @@ from math import ceil
 import numpy as np
 
 from mdp.mesh import Floats, Indices
+from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
-from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, horizontal_lines
+from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons, islands, offset
@@ -35,15 +36,15 @@ SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which m
 class SolidLines:
     """How an area is filled completely: direction, width and height of the lines, and how they meet what is around.
 
-    overlap: their reach into the walls around, share of a line width. in_order: every line is printed on the same side of its
-    neighbour.
+    overlap: their reach into the walls around, share of a line width. pattern: monotonic, every line on the same side of its
+    neighbour; rectilinear, in any order; or concentric, without a direction.
     """
 
     angle_deg: float
     width_mm: float
     height_mm: float
     overlap: float = 0.0
-    in_order: bool = False
+    pattern: SkinPattern = "rectilinear"
 
     @property
     def spacing_mm(self) -> float:
@@ -63,7 +64,7 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
     The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
     it; but lines still touch each other in narrow places, which are all line ends.
     """
-    spacing, width_mm = solid.spacing_mm, solid.width_mm
+    spacing, width_mm, in_order = solid.spacing_mm, solid.width_mm, solid.pattern == "monotonic"
     beads, rests = list[Bead](), list[Polygons]()
     least_flow = 1.0 + TOUCHING - solid.height_mm * ROUND_SIDES / spacing
     for island in islands(area):
@@ -73,7 +74,7 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
         total = sum(length_mm(line) for line in lines)
         if total > 0:
             flow = min(max((island.area() - rest.area()) / (total * spacing), least_flow), MOST_FLOW)
-            beads += [Bead(kind, line, width_mm, RANK, flow, follows=solid.in_order and k > 0) for k, line in enumerate(lines)]
+            beads += [Bead(kind, line, width_mm, RANK, flow, follows=in_order and k > 0) for k, line in enumerate(lines)]
     return beads, rests
 
 
@@ -81,10 +82,12 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     """The centrelines that fill a piece; inner: as far as they reach."""
     if inner.is_empty():
         return []
+    if solid.pattern == "concentric":
+        return concentric_lines(inner, solid.spacing_mm)
     border = index_edges(inner)
     pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
     joint_mm = JOIN * solid.spacing_mm
-    if solid.in_order:
+    if solid.pattern == "monotonic":
         lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm)
     else:
         lines = anchor_lines(pieces, border, joint_mm)

@@ -6,7 +6,7 @@ turns round.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -36,6 +36,7 @@ SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original 
 RANK = 1  # behind walls, which have 0 and less
 LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
 MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie beside each other
+LEAST_TOP = 3.0  # line widths: narrower tops keep their walls, as in OrcaSlicer
 ROUNDS = 50  # beads round a place at most: as many as walls
 SHORTEST = 0.25  # of the line width: what is shorter is no bead
 MOST_WIDER = 1.3  # times as wide as its place is a bead, at most, to make up for the tips of the place that it does not reach
@@ -71,6 +72,27 @@ def layer_walls(section: Polygons, count: int, process: Process, height_mm: floa
     varying = tuple(variable_walls(narrow, rule))
     inside = _enclosed(Polygons.compose(narrow), varying, rule)
     return Walls(even.loops, even.inside + inside, even.narrow, varying)
+
+
+def walls_under_tops(
+    section: Polygons, above: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float
+) -> Walls:
+    """Up to `count` walls of a section, but one round its tops, which are what `above` leaves bare for LEAST_TOP lines."""
+    width = process.line_width_mm
+    outer = layer_walls(section, min(count, 1), process, height_mm, nozzle_mm)
+    top = opening(outer.inside - above, 0.5 * LEAST_TOP * width)
+    if count < 2 or top.is_empty():
+        return layer_walls(section, count, process, height_mm, nozzle_mm)
+    covered = opening(outer.inside - top, 0.5 * width)
+    beside_walls = offset(covered, 0.5 * (width - spacing_mm(width, height_mm)))  # the round sides of beads overlap
+    even = process.model_copy(update={"outer_wall_line_width_mm": None})
+    inner = layer_walls(beside_walls, count - 1, even, height_mm, nozzle_mm)
+    return Walls(
+        (*outer.loops, *inner.loops),
+        inner.inside + (outer.inside - covered),
+        outer.narrow + inner.narrow,
+        (*outer.varying, *(replace(wall, level=wall.level + 1, free=0) for wall in inner.varying)),
+    )
 
 
 def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) -> Rule:

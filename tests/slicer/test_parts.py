@@ -28,7 +28,7 @@ def test_parts_side_by_side_are_the_same_bytes_as_one_after_the_other(cores: int
     assert [content(piece) for piece in together] == [content(piece) for piece in slice_parts(parts, profile())]
 
 
-@pytest.mark.parametrize("keys", [(), ("process.top_skin_monotonic=true", "process.infill_pattern=gyroid", "process.walls=3")])
+@pytest.mark.parametrize("keys", [(), ("process.top_skin_pattern=concentric", "process.infill_pattern=gyroid")])
 def test_layers_side_by_side_are_the_same_bytes_as_one_after_the_other(
     keys: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -189,6 +189,21 @@ def test_the_blocks_stand_around_every_turn_with_their_placeholders_filled() -> 
     assert re.fullmatch(r"M117 part 2 of 2 at A90 C-?90 from Z[0-9.]+", lines[turn - 1])
 
 
+def test_the_block_before_a_layer_stands_before_every_layer_with_its_number_and_height() -> None:
+    sliced = [layer for part in printed()[2] for layer in part.layers]
+    lines = list(write_gcode(printed()[3], _with_block("before_layer", "M117 {layer_num} at {layer_z} of {max_layer_z}")))
+    shown = [line for line in lines if line.startswith("M117 ")]
+    tops = [part.layers[-1].z_mm for part in printed()[2] for _ in part.layers]
+    heights = zip([layer.z_mm for layer in sliced], tops, strict=True)
+    assert shown == [f"M117 {k} at {round(z, 4):g} of {round(top, 4):g}" for k, (z, top) in enumerate(heights)]
+
+
+@pytest.mark.parametrize("line", ["G1 Z10", "G28 X", "G91", "M82", "TIMELAPSE_TAKE_FRAME", "M84"])
+def test_what_may_move_over_the_print_or_change_a_mode_is_refused_before_a_layer(line: str) -> None:
+    with pytest.raises(ProfileError, match=f"machine.gcode.before_layer: '{line}' may move an axis or change a mode"):
+        write_gcode(printed()[3], _with_block("before_layer", f"M104 S210\n{line}"))
+
+
 def test_an_unknown_placeholder_is_named_with_the_allowed_ones() -> None:
     with pytest.raises(ProfileError, match=r"machine.gcode.end: placeholder \{speed\} is not known: allowed are bed_c, .*z_mm"):
         write_gcode(printed()[3], _with_block("end", "M104 S0\nG1 F{speed}"))

@@ -118,6 +118,29 @@ def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
     assert beads[0].flow == pytest.approx(0.9 * plain[0].flow)
 
 
+@pytest.mark.parametrize("angle_deg", [60.0, 180.0])
+def test_bridges_run_in_the_direction_that_is_asked_for(angle_deg: float) -> None:
+    """Along the banks of a gap, at 180 degrees, none is held; portals are bridged along x where nothing is asked for."""
+    hanging, banks = gap(20, 5, 0)
+    span = find_bridge(hanging, index_edges(offset(banks, 0.25 * WIDTH)), WIDTH, angle_deg)
+    assert (span is None) == (angle_deg == 180.0)
+    beads = of_kind(slice_part(whole(portal(5)), profile(*SOLID, f"process.bridge_angle_deg={angle_deg}")), Kind.BRIDGE)
+    steps = np.diff(max(beads, key=lambda p: p.length_mm).points, axis=0)
+    longest = steps[np.argmax(np.hypot(*steps.T))]
+    assert apart_deg(float(np.degrees(np.arctan2(longest[1], longest[0]))), angle_deg) < 0.1
+
+
+def test_thick_bridges_are_round_threads_of_the_nozzle_s_diameter_as_far_apart() -> None:
+    """A thread of 0.4 mm has pi / 4 * 0.4^2 = 0.1257 mm2. Between three walls 7.5 mm are left, 17 times 0.45 mm."""
+    sliced = slice_part(whole(portal(5)), profile(*SOLID, "process.thick_bridges=true"))
+    layer = next(layer for layer in sliced.layers if layer.is_of(Kind.BRIDGE).any())
+    rows = layer.is_of(Kind.BRIDGE)
+    volume, length = layer.volumes_mm3[rows].sum(), sum(path.length_mm for path in of_kind(sliced, Kind.BRIDGE))
+    assert volume / length == pytest.approx(0.12566, rel=1e-3)
+    steps = np.concatenate([np.diff(path.points, axis=0) for path in of_kind(sliced, Kind.BRIDGE)])
+    assert int((np.hypot(*steps.T) > 4.0).sum()) == 17
+
+
 def test_a_deck_between_posts_that_widen_into_it_is_a_bridge() -> None:
     gate = [(0, 0), (6, 0), (6, 9.75), (6.29, 10.05), (12.11, 10.05), (12.4, 9.75), (12.4, 0), (18.4, 0), (18.4, 12), (0, 12)]
     solid = m3.Manifold.extrude(m3.CrossSection([gate]), 10).rotate((90, 0, 0))

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats
+from profiles.settings.shell import SkinPattern
 from slicer.bead import Bead
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, clean
@@ -58,12 +59,15 @@ HOLES = st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(0.6, 4.
 def test_no_line_is_printed_after_its_upper_neighbour(holes: list[tuple[float, float, float]], angle_deg: float) -> None:
     beads = [
         b
-        for b in skin_beads(plate(holes), Kind.TOP_SKIN, SolidLines(angle_deg, WIDTH, HEIGHT, in_order=True))
+        for b in skin_beads(plate(holes), Kind.TOP_SKIN, SolidLines(angle_deg, WIDTH, HEIGHT, pattern="monotonic"))
         if b.kind is Kind.TOP_SKIN
     ]
     for island in range(sum(not bead.follows for bead in beads)):
         firsts = [k for k, bead in enumerate(beads) if not bead.follows] + [len(beads)]
         assert out_of_order(lines_of(beads[firsts[island] : firsts[island + 1]], angle_deg)) == 0
+
+
+PATTERNS: tuple[SkinPattern, SkinPattern] = ("monotonic", "rectilinear")
 
 
 @given(HOLES)
@@ -72,12 +76,12 @@ def test_order_loses_no_line(holes: list[tuple[float, float, float]]) -> None:
         lines_of(
             [
                 b
-                for b in skin_beads(plate(holes), Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, in_order=mode))
+                for b in skin_beads(plate(holes), Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, pattern=mode))
                 if b.kind is Kind.TOP_SKIN
             ],
             45.0,
         )
-        for mode in (True, False)
+        for mode in PATTERNS
     ]
     assert float((rows[0][:, 2] - rows[0][:, 1]).sum()) == pytest.approx(float((rows[1][:, 2] - rows[1][:, 1]).sum()), rel=0.01)
 
@@ -89,7 +93,7 @@ def test_without_it_lines_meet_from_both_sides_of_a_hole() -> None:
 
 def test_the_order_of_a_layer_keeps_it() -> None:
     area = plate([(3, 2, 3), (-5, -3, 2)])
-    beads = skin_beads(area, Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, in_order=True))
+    beads = skin_beads(area, Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, pattern="monotonic"))
     placed = order_beads(beads, area, profile().process, np.array([20.0, 20.0]))
     printed = [Bead(row.kind, row.points, WIDTH, 2) for row in rows_of(placed) if row.kind is Kind.TOP_SKIN]
     assert out_of_order(lines_of(printed, 45.0)) == 0

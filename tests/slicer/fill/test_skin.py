@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, offset
 from slicer.paths import Kind
+from slicer.slice import slice_part
+from tests.shapes import box
 from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, ring, square, strip
-from tests.slicer.hand import as_shapely, distances_mm
+from tests.slicer.hand import SOLID, as_shapely, distances_mm, profile, whole
 
 
 @pytest.mark.parametrize(("area", "more"), [(square, 0.003), (ring, 0.003), (strip, 0.01)])
@@ -33,6 +35,42 @@ def test_a_skin_covers_its_area_everywhere() -> None:
         for b in skin_beads(ring(), Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, OVERLAP))
     ]
     assert as_shapely(ring()).difference(shapely.union_all(lines)).area < 0.01 * ring().area()
+
+
+@pytest.mark.parametrize("area", [square, ring, strip])
+def test_a_concentric_skin_extrudes_its_area(area: Callable[[], Polygons]) -> None:
+    beads = skin_beads(area(), Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, OVERLAP, "concentric"))
+    assert plastic_mm2(beads) == pytest.approx(area().area(), rel=0.01)
+
+
+def test_the_lines_of_a_concentric_skin_are_squares_in_a_square_a_spacing_apart() -> None:
+    block = Polygons.square((20.0, 20.0), True)
+    rings = [bead for bead in skin_beads(block, Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, 0.0, "concentric")) if bead.closed]
+    sides = sorted(np.ptp(bead.points[:, 0]) for bead in rings)
+    spacing = WIDTH - HEIGHT * (1 - np.pi / 4)
+    assert sides == pytest.approx([20 - (2 * k + 1) * spacing for k in range(24, -1, -1)], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("key", "layer"),
+    [
+        ("bottom_skin_pattern=concentric", 0),
+        ("top_skin_pattern=concentric", 9),
+        ("skin_angle_deg=0", 5),
+    ],
+)
+def test_patterns_and_angle_of_skins_hold_where_they_are_asked_for(key: str, layer: int) -> None:
+    """Of a block all lines that are straight along x or y, as in no skin at 45 degrees."""
+    sliced = slice_part(whole(box(12, 12, 2)), profile(*SOLID, f"process.{key}"))
+
+    def upright(number: int) -> float:
+        paths = [path for path in sliced.layers[number].paths if path.kind in (Kind.SKIN, Kind.TOP_SKIN)]
+        steps = np.concatenate([np.abs(np.diff(path.points, axis=0)) for path in paths])
+        return float(steps[steps.min(axis=1) < 1e-3].sum() / steps.sum())
+
+    assert upright(layer) > 0.9
+    if "pattern" in key:
+        assert all(upright(number) < 0.2 for number in range(10) if number != layer)
 
 
 def test_a_skin_of_a_square_is_one_zigzag() -> None:

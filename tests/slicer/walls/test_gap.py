@@ -13,10 +13,15 @@ from hypothesis import strategies as st
 from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import length_mm
+from slicer.overhangs import find_overhangs
 from slicer.paths import Kind, bead_area_mm2
+from slicer.sectioning import section_part
+from slicer.shells import build_shells, lay_beads
 from slicer.strokes.strokes import in_pieces, strokes_of
+from slicer.support.support import own_supports
 from slicer.walls.walls import LEAST_GAP, MOST_WIDER, gaps
-from tests.slicer.hand import as_shapely, rows_of
+from tests.shapes import bowl
+from tests.slicer.hand import SOLID, as_shapely, profile, rows_of, whole
 
 WIDTH, HEIGHT = 0.45, 0.2
 
@@ -100,3 +105,16 @@ def test_beads_in_any_place_hold_no_more_than_it_and_keep_to_it(
     assert all(bead.width_mm <= 2.0 * WIDTH + 1e-9 for bead in beads)
     wider = 0.5 * (MOST_WIDER - 1.0) * 2.0 * WIDTH + 0.05 * WIDTH
     assert covered(beads).difference(as_shapely(area).buffer(wider)).area < 1e-6
+
+
+def test_gap_fill_shorter_than_asked_for_is_left_out() -> None:
+    sections = section_part(whole(bowl()), profile(*SOLID))
+    overhangs = find_overhangs(sections)
+    shells = build_shells(own_supports(sections, overhangs), overhangs)
+    strict = [replace(shell, process=shell.process.model_copy(update={"gap_least_mm": 2.0})) for shell in shells.layers]
+    for k in range(0, len(strict), 10):
+        of_all, of_long = (
+            [bead.length_mm for bead in lay_beads(some, k)[0] if bead.kind is Kind.GAP]
+            for some in (shells, replace(shells, layers=strict))
+        )
+        assert of_long == pytest.approx([length for length in of_all if length >= 2.0], abs=0.05)

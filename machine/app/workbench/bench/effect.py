@@ -32,7 +32,7 @@ UNREAD = frozenset(
         ),
         *("material.coast_mm", "material.pressure_advance"),
         *(f"process.{key}" for key in ("name", "interface_fan", "interface_first_layer_fan")),
-        *(f"machine.gcode.{key}" for key in ("start", "end", "before_part", "after_part", "resume")),
+        *(f"machine.gcode.{key}" for key in ("start", "end", "before_part", "after_part", "before_layer", "resume")),
         *(f"machine.{key}" for key in ("name", "sources", "uncalibrated", "thumbnails_px", "receive_bytes")),
         *(f"machine.{key}" for key in ("arcs", "arc_tolerance_mm", "nozzle_limit_c", "bed_limit_c", "lift_mm")),
     }
