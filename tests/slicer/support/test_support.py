@@ -201,7 +201,7 @@ def test_a_hanging_face_that_no_support_fits_under_is_told_unless_the_plastic_be
     sliced = slice_part(whole(standing(drawer)), profile("process.bridge_longest_mm=1", "process.support_bottom_gap_mm=0.6"))
     (face,) = sliced.unsupported
     assert face.mm2 == pytest.approx(400.0, rel=0.02)
-    assert sliced.layers[face.layer - 1].z_mm == pytest.approx(5.8)
+    assert sliced.layers[face.layer - 1].z_mm == pytest.approx(6.0)
     assert face.reason == "there is no room for support between it and the plastic below"
 
 
