@@ -66,7 +66,7 @@ class Supports:
     @property
     def unsupported_mm2(self) -> float:
         """Hanging area, seen from above, that none could reach."""
-        return float(sum(hanging.area() for hanging in self.missed))
+        return float(union(self.missed).area())
 
 
 def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
@@ -375,7 +375,7 @@ def _connected_areas(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, 
         mm2 = {k: piece.area() for k, piece in pieces.items()}
         worst = max(mm2, key=lambda k: mm2[k], default=-1)
         if worst >= 0 and mm2[worst] > 0.0:
-            yield sum(mm2.values()), worst, pieces[worst]
+            yield float(union(list(pieces.values())).area()), worst, pieces[worst]
 
 
 def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
