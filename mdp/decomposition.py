@@ -24,7 +24,8 @@ class Part:
     seam_mm is how long its base's rim is where that is seen, feather_share the share of it at which base and surface meet at less
     than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
-    up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up.
+    up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up;
+    support: where whatever overhangs is to be held up.
     """
 
     index: int
@@ -40,6 +41,7 @@ class Part:
     needing_upright: Mask | None = None
     no_seam: Marked = UNMARKED
     no_support: Marked = UNMARKED
+    support: Marked = UNMARKED
 
     @property
     def direction(self) -> Floats:

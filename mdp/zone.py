@@ -1,4 +1,5 @@
-"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam or no support.
+"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam, no support
+or support.
 
 Faces are named by a colour of the model's file or by a point and how far they reach around it. Which colour means what is the
 person's to say: a colour alone marks nothing.
@@ -155,22 +156,25 @@ def faces_of(mesh: Mesh, zone: Painted | Grown) -> Mask:
 
 @dataclass(frozen=True)
 class Zones:
-    """What a person keeps the program out of. keep: no plane passes through; no_seam: rims there weigh many times, and layers do
-    not begin there; no_support: what overhangs there is not held up, and weighs many times."""
+    """What a person wants of the program in places. keep: no plane passes through; no_seam: rims there weigh many times, and
+    layers do not begin there; no_support: what overhangs there is not held up, and weighs many times; support: whatever overhangs
+    there is held up.
+    """
 
     keep: tuple[AnyZone, ...] = ()
     no_seam: tuple[AnyZone, ...] = ()
     no_support: tuple[AnyZone, ...] = ()
+    support: tuple[AnyZone, ...] = ()
 
     def on(self, mesh: Mesh) -> "ZonesOnModel":
         """The zones with the faces that they mean on a model."""
         keep = tuple(zone if isinstance(zone, Zone) else Patches.of(mesh, faces_of(mesh, zone)) for zone in self.keep)
-        return ZonesOnModel(keep, Marked.of(mesh, self.no_seam), Marked.of(mesh, self.no_support))
+        return ZonesOnModel(keep, *(Marked.of(mesh, zones) for zones in (self.no_seam, self.no_support, self.support)))
 
 
 @dataclass(frozen=True, eq=False)
 class Marked:
-    """Where something is unwanted: in boxes of the workpiece frame, and on (m,) faces of a mesh; None: none is named."""
+    """What a person marks: in boxes of the workpiece frame, and on (m,) faces of a mesh; None: none is named."""
 
     boxes: tuple[Zone, ...] = ()
     faces: Mask | None = None
@@ -212,11 +216,12 @@ class ZonesOnModel:
     keep: tuple[Zone | Patches, ...] = ()
     no_seam: Marked = Marked()
     no_support: Marked = Marked()
+    support: Marked = Marked()
 
     @property
     def by_face(self) -> bool:
         """Whether it matters of which face of the model each face of a part is a piece."""
-        return self.no_seam.faces is not None or self.no_support.anywhere
+        return self.no_seam.faces is not None or self.no_support.anywhere or self.support.faces is not None
 
     def crossed(self, plane: Plane) -> int | None:
         """Number, from 1, of the first zone to keep whole that a plane passes through."""

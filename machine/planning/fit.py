@@ -115,6 +115,7 @@ def _part_moved(part: Part, shift: Floats) -> Part:
         base=_plane_moved(part.base, shift),
         no_seam=part.no_seam.repeated([(x, y, z)]),
         no_support=part.no_support.repeated([(x, y, z)]),
+        support=part.support.repeated([(x, y, z)]),
     )
 
 

@@ -71,6 +71,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
                 needing_upright=None if needs is None else _needing_upright(piece.mesh, needs, node.terms),
                 no_seam=zones.no_seam.among(piece.sources),
                 no_support=zones.no_support.among(piece.sources),
+                support=zones.support.among(piece.sources),
             )
         )
     return tuple(parts)

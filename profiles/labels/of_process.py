@@ -58,7 +58,7 @@ SUPPORT = {
     "arch_longest_mm": advanced("Widest arch without support", "arches holes"),
     "bridge_flow": advanced("Bridge flow", "bridge flow ratio bridging"),
     "infill_bridge_flow": rare("Flow of the first solid layer over infill", "internal bridge flow ratio"),
-    "support": simple("Support", "supports enable generate support material"),
+    "support": simple("Support", "supports enable generate support material enforcers only"),
     "support_style": simple("Support style", "supports tree organic grid snug type"),
     "support_on_part": simple("Support may stand on the part", "supports on build plate only everywhere"),
     "support_branch_angle_deg": advanced("Support lean at most", "tree support branch angle supports"),

@@ -96,6 +96,8 @@ def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Pol
         return [Polygons()] * len(outlines)
     free = []
     for k, hanging in enumerate(overhang.hanging for overhang in overhangs):
+        if process.support == "enforced":
+            hanging = hanging ^ sections.enforced[k] if sections.enforced else Polygons()
         if not hanging.is_empty():
             drop = float(heights.bottom_mm[k]) - process.support_gap_mm
             near = list(outlines[int(np.searchsorted(heights.tip_mm, drop - EVEN_MM)) : max(k - 1, 0)])

@@ -46,6 +46,7 @@ def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tup
         needing_upright=_tiled(part.needing_upright, count),
         no_seam=part.no_seam.repeated(shifts),
         no_support=part.no_support.repeated(shifts),
+        support=part.support.repeated(shifts),
     )
     risky_mm2, residual_mm2 = count * decomposition.risky_area_mm2, count * decomposition.residual_area_mm2
     plated = replace(decomposition, mesh=mesh, parts=(many,), risky_area_mm2=risky_mm2, residual_area_mm2=residual_mm2, front=())

@@ -17,7 +17,8 @@ def test_the_example_of_the_page_is_read_as_the_page_says(tmp_path: Path) -> Non
     assert plan.parts == (PlannedPart((0.0, 0.6, 0.8), 31.0), PlannedPart((-0.6, 0.0, 0.8), None))
     seams, whole = Zone((-20.0, -30.0, 30.0), (20.0, -10.0, 80.0)), Zone((-8.0, -14.0, 40.0), (8.0, -6.0, 52.0))
     hanging = Grown((0.0, -12.5, 41.0), 30.0)
-    assert plan.zones == Zones(keep=(whole, Painted(0xFF0000)), no_seam=(seams, Painted(0x00FF00)), no_support=(hanging,))
+    held = Zone((-20.0, -14.0, 20.0), (-8.0, -6.0, 41.0))
+    assert plan.zones == Zones((whole, Painted(0xFF0000)), (seams, Painted(0x00FF00)), (hanging,), (held,))
 
 
 def test_the_page_explains_every_key() -> None:
