@@ -24,8 +24,8 @@ class Part:
     seam_mm is how long its base's rim is where that is seen, feather_share the share of it at which base and surface meet at less
     than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
-    up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up.
-    modifiers: where other settings hold.
+    up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up;
+    support: where whatever overhangs is to be held up; modifiers: where other settings hold.
     """
 
     index: int
@@ -42,6 +42,7 @@ class Part:
     no_seam: Marked = UNMARKED
     no_support: Marked = UNMARKED
     modifiers: tuple[Modifier, ...] = ()
+    support: Marked = UNMARKED
 
     @property
     def direction(self) -> Floats:

@@ -1,5 +1,5 @@
-"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam or no support, and
-modifiers: volumes inside which other settings hold.
+"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam, no support or support,
+and modifiers: volumes inside which other settings hold.
 
 Faces are named by a colour of the model's file or by a point and how far they reach around it. Which colour means what is the
 person's to say: a colour alone marks nothing.
@@ -183,23 +183,25 @@ class Modifier:
 @dataclass(frozen=True)
 class Zones:
     """What a person says of places of a model. keep: no plane passes through; no_seam: rims there weigh many times, and layers do
-    not begin there; no_support: what overhangs there is not held up, and weighs many times. modifiers: where other settings hold,
-    those of a later one in place of an earlier one's."""
+    not begin there; no_support: what overhangs there is not held up, and weighs many times; support: whatever overhangs there is
+    held up. modifiers: where other settings hold, those of a later one in place of an earlier one's."""
 
     keep: tuple[AnyZone, ...] = ()
     no_seam: tuple[AnyZone, ...] = ()
     no_support: tuple[AnyZone, ...] = ()
+    support: tuple[AnyZone, ...] = ()
     modifiers: tuple[Modifier, ...] = ()
 
     def on(self, mesh: Mesh) -> "ZonesOnModel":
         """The zones with the faces that they mean on a model."""
         keep = tuple(zone if isinstance(zone, Zone) else Patches.of(mesh, faces_of(mesh, zone)) for zone in self.keep)
-        return ZonesOnModel(keep, Marked.of(mesh, self.no_seam), Marked.of(mesh, self.no_support), self.modifiers)
+        marked = (Marked.of(mesh, zones) for zones in (self.no_seam, self.no_support, self.support))
+        return ZonesOnModel(keep, *marked, modifiers=self.modifiers)
 
 
 @dataclass(frozen=True, eq=False)
 class Marked:
-    """Where something is unwanted: in boxes of the workpiece frame, and on (m,) faces of a mesh; None: none is named."""
+    """What a person marks: in boxes of the workpiece frame, and on (m,) faces of a mesh; None: none is named."""
 
     boxes: tuple[Zone, ...] = ()
     faces: Mask | None = None
@@ -241,12 +243,13 @@ class ZonesOnModel:
     keep: tuple[Zone | Patches, ...] = ()
     no_seam: Marked = Marked()
     no_support: Marked = Marked()
+    support: Marked = Marked()
     modifiers: tuple[Modifier, ...] = ()
 
     @property
     def by_face(self) -> bool:
         """Whether it matters of which face of the model each face of a part is a piece."""
-        return self.no_seam.faces is not None or self.no_support.anywhere
+        return self.no_seam.faces is not None or self.no_support.anywhere or self.support.faces is not None
 
     def crossed(self, plane: Plane) -> int | None:
         """Number, from 1, of the first zone to keep whole that a plane passes through."""

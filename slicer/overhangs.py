@@ -75,10 +75,11 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
 
     On the platform the first layer may lie. What carries itself by the search's definition (mdp.support_need) does not hang;
     what bridges layer by layer, as arches do, does not either. Without support whatever has an anchor to hold on to is printed as
-    a bridge, however long.
+    a bridge, however long. Whatever reaches over the layer below in a place where a person wants support hangs.
     """
     process, mesh, outlines, cuts_mm = sections.process, sections.mesh, sections.outlines, sections.heights.cut_mm
-    level_mm, arch_mm = (inf, inf) if process.support == "none" else (process.bridge_mm, process.arch_longest_mm)
+    level_mm, arch_mm = (inf, inf) if process.support != "auto" else (process.bridge_mm, process.arch_longest_mm)
+    enforces = process.support != "none" and len(sections.enforced) > 0
     overhangs = [Overhang()] * len(outlines)
     risky = facing_down(mesh, UP, process.self_supporting_angle_deg)
     needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_platform))
@@ -89,16 +90,27 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
         floating = _floating(outlines[i], below, beyond.area())
         hanging = beyond ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
         hanging = hanging if floating.is_empty() else hanging + floating
+        enforced = opening(beyond ^ sections.enforced[i], ROUNDING_MM) if enforces else Polygons()
+        overhang = Overhang()
         if not hanging.is_empty():
             all_need = len(needing.get(i, ())) == len(triangles)
             need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
             anchors = below + (outlines[i] - hanging)  # also slopes beside it that carry themselves
             overhang = _sort_islands(hanging, need, anchors, process, (level_mm, min(level_mm, arch_mm)))
-            if sections.no_support:
-                wanted = overhang.hanging - sections.no_support[i]
-                overhang = replace(overhang, hanging=wanted, unwanted=overhang.hanging - wanted)
-            overhangs[i] = overhang
+        if not enforced.is_empty():
+            overhang = _enforced(overhang, enforced)
+        if sections.no_support and not overhang.hanging.is_empty():
+            wanted = overhang.hanging - sections.no_support[i]
+            overhang = replace(overhang, hanging=wanted, unwanted=overhang.hanging - wanted)
+        overhangs[i] = overhang
     return overhangs
+
+
+def _enforced(overhang: Overhang, places: Polygons) -> Overhang:
+    """The overhang with some places that are held up, whatever they would do without."""
+    bridges = [replace(bridge, hanging=bridge.hanging - places) for bridge in overhang.bridges]
+    left = tuple(bridge for bridge in bridges if bridge.hanging.area() >= LEAST_MM2)
+    return replace(overhang, hanging=overhang.hanging + places, bridges=left, ledges=overhang.ledges - places)
 
 
 def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons:

@@ -18,7 +18,7 @@ from mdp.mesh import Floats, Indices, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
-from mdp.zone import Zone, touched
+from mdp.zone import Marked, Zone, touched
 from profiles.machine import Table
 from profiles.part_settings import SPEEDS_OF_A_PLACE
 from profiles.process import Process
@@ -81,8 +81,8 @@ class Sections:
     have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is its
     outline, of use to part 1. `joints`, (k, 6) segments, are where the part meets others on the surface.
     Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
-    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, () for nowhere. In
-    `places` other settings hold, those of a later one over those of an earlier one.
+    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, and what overhangs in its
+    `enforced` does, () for nowhere. In `places` other settings hold, those of a later one over those of an earlier one.
     pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold something, but nothing that gets a
     line.
     """
@@ -107,6 +107,7 @@ class Sections:
     grooves: Polygons = field(default_factory=Polygons)
     no_seam: Sequence[Floats] = ()
     no_support: Sequence[Polygons] = ()
+    enforced: Sequence[Polygons] = ()
     places: Sequence[Place] = ()
     pedestal_layers: int = 0
     too_thin: frozenset[int] = frozenset()
@@ -205,7 +206,8 @@ def section_part(
         pins=pins.get(part.index, np.zeros((0, 3))),
         grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),
         no_seam=no_seam_segments(part, mesh, cuts_mm),
-        no_support=no_support_areas(part, mesh, cuts_mm),
+        no_support=marked_areas(part.no_support, part, mesh, cuts_mm),
+        enforced=marked_areas(part.support, part, mesh, cuts_mm),
         places=places,
         pedestal_layers=pedestal,
         too_thin=too_thin,
@@ -394,13 +396,12 @@ def _within(segments: Floats, box: Zone) -> tuple[Floats, Floats]:
     return low, np.where(outside.any(axis=1), low, high)
 
 
-def no_support_areas(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
-    """For each layer the sections of the boxes and the shadows of the faces, as they belong to it, that get no support; [] for a
-    part that may have some everywhere.
+def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
+    """For each layer the sections of the boxes and the shadows of the faces, as they belong to it, that are marked on a part; []
+    where nothing is.
 
     mesh: the part's, in its frame; cuts_mm: the middles of the layers.
     """
-    marked = part.no_support
     if not marked.anywhere:
         return []
     named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))

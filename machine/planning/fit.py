@@ -116,6 +116,7 @@ def _part_moved(part: Part, shift: Floats) -> Part:
         no_seam=part.no_seam.repeated([(x, y, z)]),
         no_support=part.no_support.repeated([(x, y, z)]),
         modifiers=tuple(moved for modifier in part.modifiers for moved in modifier.repeated([(x, y, z)])),
+        support=part.support.repeated([(x, y, z)]),
     )
 
 

@@ -35,6 +35,10 @@
     z_mm = [10.0, 20.0]
     process = {walls = 4}
 
+    [[support]]                         # whatever overhangs in here is held up, however little
+    min_mm = [-20.0, -14.0, 20.0]
+    max_mm = [-8.0, -6.0, 41.0]
+
     [[front]]                           # the best decomposition of every other number of parts, for --parts
     planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ..., then the points of its limbs, if any
 
@@ -57,7 +61,7 @@ from profiles.part_settings import PartSettings
 
 VERSION = 1  # of what a plan's keys mean
 GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
-ZONE_KINDS = ("keep", "no_seam", "no_support")  # as mdp.zone.Zones has them
+ZONE_KINDS = ("keep", "no_seam", "no_support", "support")  # as mdp.zone.Zones has them
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "modifier", "front")
 PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
 ZONE_KEYS = ("min_mm", "max_mm", "axes", "colour", "point_mm", "angle_deg")

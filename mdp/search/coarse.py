@@ -32,7 +32,7 @@ def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
     the mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
     search, layer_mm = profile.search.effective, profile.process.layer_height_mm
     fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
-    marked = any(not isinstance(zone, Zone) for zone in (*zones.keep, *zones.no_seam, *zones.no_support))
+    marked = any(not isinstance(zone, Zone) for zone in (*zones.keep, *zones.no_seam, *zones.no_support, *zones.support))
     if not fine or marked:
         return None
     for tolerance, off in (COARSEST, *FINER):

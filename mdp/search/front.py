@@ -129,7 +129,7 @@ class Worth:
     def of(cls, profile: Profile) -> "Worth":
         """What they count by a profile; without support nothing, for then they are no reason to leave a model whole."""
         search = profile.search.effective
-        return cls() if profile.process.support == "none" else cls(search.second_mm2, 1e-3 * search.metre_mm2)
+        return cls() if profile.process.support != "auto" else cls(search.second_mm2, 1e-3 * search.metre_mm2)
 
     def of_print(self, time_s: float, filament_mm: float) -> float:
         """What a print counts by its time and filament."""

@@ -72,6 +72,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
                 no_seam=zones.no_seam.among(piece.sources),
                 no_support=zones.no_support.among(piece.sources),
                 modifiers=zones.modifiers,
+                support=zones.support.among(piece.sources),
             )
         )
     return tuple(parts)

@@ -68,7 +68,7 @@ class Problem:
         solid = solid_of(mesh, apart=self.zones.by_face)
         surface, need = ModelSurface.of(mesh, solid), None
         if settings.objective == "scar":
-            support_need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight)
+            support_need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight, self.zones.support.touched(mesh))
             need = ModelNeed(support_need, self.zones.no_support)
         self.terms = CostTerms(
             angle_deg=profile.process.self_supporting_angle_deg,

@@ -46,25 +46,28 @@ def needs_support(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
 @dataclass(frozen=True, eq=False)
 class SupportNeed:
     """Of a whole model, for all directions a search asks for. weight: how many times an area over air counts, which support can
-    only be given by leaning or from support of other parts."""
+    only be given by leaning or from support of other parts; enforced: (m,) faces that a person wants supported where they
+    overhang, also where they carry themselves."""
 
     surface: LinkedFaces
     process: Process
     weight: float
     axes: Floats
+    enforced: Mask
     _cached: dict[bytes, Classes] = field(default_factory=dict)
     _tables: dict[bytes, Classes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, mesh: Mesh, process: Process, weight: float) -> "SupportNeed":
-        """The need of a model that stands on the platform."""
-        return cls(link(mesh), process, weight, axes_along(azimuth_rad(mesh)))
+    def of(cls, mesh: Mesh, process: Process, weight: float, enforced: Mask | None = None) -> "SupportNeed":
+        """The need of a model that stands on the platform; enforced: None: no face is."""
+        enforced = np.zeros(len(mesh.faces), dtype=np.bool_) if enforced is None else enforced
+        return cls(link(mesh), process, weight, axes_along(azimuth_rad(mesh)), enforced)
 
     @cached_property
     def upright(self) -> Mask:
         """(m,) False for the faces that overhang printed straight up but carry themselves. Support stands on the platform."""
         limits = limits_of(self.process, PLATFORM_TOLERANCE_MM)
-        return _needing_upright(self.surface, limits, self.axes)
+        return _needing_upright(self.surface, limits, self.axes) | self.enforced
 
     def along(self, directions: Floats) -> Classes:
         """(k, m) for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, meant for the faces that are
@@ -93,7 +96,9 @@ class SupportNeed:
         for lean in nearest[1:]:
             over_air &= self._over_air[lean]
         limits = limits_of(self.process, NO_BASE_MM)
-        return _classify(self.surface, framed(directions, self.axes), limits, NEEDS_SUPPORT + over_air)
+        classes = _classify(self.surface, framed(directions, self.axes), limits, NEEDS_SUPPORT + over_air)
+        classes[:, self.enforced] = np.maximum(classes[:, self.enforced], np.uint8(NEEDS_SUPPORT))
+        return classes
 
     @cached_property
     def _coarse(self) -> Floats:

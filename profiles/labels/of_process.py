@@ -69,7 +69,7 @@ SUPPORT = {
     "bridge_angle_deg": advanced("Bridge angle", "bridging angle override direction"),
     "thick_bridges": advanced("Thick bridges", "bridging round threads external bridge"),
     "infill_bridge_flow": rare("Flow of the first solid layer over infill", "internal bridge flow ratio"),
-    "support": simple("Support", "supports enable generate support material"),
+    "support": simple("Support", "supports enable generate support material enforcers only"),
     "support_style": simple("Support style", "supports tree organic grid snug type"),
     "support_on_part": simple("Support may stand on the part", "supports on build plate only everywhere"),
     "support_branch_angle_deg": advanced("Support lean at most", "tree support branch angle supports"),

@@ -46,7 +46,10 @@ class Support(Frozen):
     infill_bridge_flow: float = Field(
         1.0, ge=0.3, le=2, description="factor on extruded volume of the first solid layer over sparse infill, which spans it"
     )
-    support: Literal["none", "auto"] = Field("auto", description="auto: support what the decomposition left risky")
+    support: Literal["none", "auto", "enforced"] = Field(
+        "auto",
+        description="auto: support what the decomposition left risky; enforced: only what overhangs in a plan's [[support]]",
+    )
     support_style: Literal["tree", "grid"] = Field(
         "tree",
         description="tree: what hangs is gathered into branches, which saves plastic and time; grid: columns straight down where "

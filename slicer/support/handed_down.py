@@ -18,7 +18,7 @@ from mdp.pose import shift
 from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union, unite_layers
 from slicer.interface.interface import BasePlane, frame_change, sections_of
 from slicer.overhangs import LEAST_MM2
-from slicer.sectioning import Sections, no_seam_segments, no_support_areas
+from slicer.sectioning import Sections, marked_areas, no_seam_segments
 from slicer.support.reachable import ReachableAreas, blocked_areas, near_table, reachable_areas, support_reach_mm
 from slicer.support.support import Supports, find_missed, grow, stand, widen_foot
 
@@ -163,7 +163,7 @@ def up_to(sections: Sections, top_mm: float) -> Sections:
         above=higher[end : end + known],
         standing=[*sections.standing, *sections_of(sections.earlier, part, heights.cut_mm[below:])] if sections.standing else (),
         no_seam=no_seam_segments(part, sections.mesh, heights.cut_mm),
-        no_support=no_support_areas(part, sections.mesh, heights.cut_mm),
+        no_support=marked_areas(part.no_support, part, sections.mesh, heights.cut_mm),
         places=[replace(place, areas=[*place.areas, *empty]) for place in sections.places],
     )
 

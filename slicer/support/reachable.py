@@ -39,6 +39,7 @@ SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so 
 AROUND_MM = 20.0  # support needs no more space around a part than its lean and this
 CELL_MM, COARSER = 0.5, 1.5  # grid on which the height of the tip is computed, and the factor by which it is coarsened
 MOST_PAIRS = 200_000_000  # of a grid cell and a point that stands
+STEEPEST = 0.5  # mm that a slope leans out per mm of height: support at its distance cannot hold what is steeper
 LOW_MM = 0.05  # up to this height above the base plane is the cut face itself
 
 
@@ -75,10 +76,12 @@ class ReachableAreas:
     def carrying_layers(self, layer: int) -> range:
         """The layers, from the highest down, on which what hangs in a layer may rest.
 
-        The distance across keeps support as much lower under a slope that is just too flat.
+        The distance across keeps support as much lower under a slope that is just too flat, or as steep as one that a person may
+        want to be held up.
         """
         process, drop_mm = self.process, float(self.heights.bottom_mm[layer]) - self.process.support_gap_mm
-        slack_mm = process.support_distance_mm / max(tan(radians(process.self_supporting_angle_deg)), 0.5)
+        steepest = 0.0 if self.sections.enforced else tan(radians(process.self_supporting_angle_deg))
+        slack_mm = process.support_distance_mm / max(steepest, STEEPEST)
         highest = int(np.searchsorted(self.heights.tip_mm, drop_mm + EVEN_MM, side="right")) - 1
         lowest = int(np.searchsorted(self.heights.tip_mm, drop_mm - slack_mm - EVEN_MM))
         return range(highest, min(lowest, highest) - 1, -1) if highest >= 0 else range(0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdp.clearance import least_tip_height_mm
 from mdp.mesh import Floats
-from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, larger, offset, opening, union
 from slicer.overhangs import LEAST_MM2, Overhang
 from slicer.paths import Unsupported
 from slicer.sectioning import RIM_MM, Sections
@@ -28,11 +28,20 @@ from slicer.support.reachable import (
     reachable_areas,
     support_reach_mm,
 )
-from slicer.support.tree import JOIN_MM, Branch, add_contact, carrying_area, lower_branches
+from slicer.support.tree import (
+    JOIN_MM,
+    Branch,
+    add_contact,
+    carrying_area,
+    least_section_mm2,
+    lower_branches,
+    places_about_needles,
+)
 
 SLACK_MM = 0.01  # what rounding may add to the lean
 LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
+TIP_MM = 0.8  # height over which support may be thinner than a branch
 MOST = 0.5  # share of a place that one reason has to hold for
 
 
@@ -57,7 +66,7 @@ class Supports:
     @property
     def unsupported_mm2(self) -> float:
         """Hanging area, seen from above, that none could reach."""
-        return float(sum(hanging.area() for hanging in self.missed))
+        return float(union(self.missed).area())
 
 
 def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
@@ -87,6 +96,8 @@ def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Pol
         return [Polygons()] * len(outlines)
     free = []
     for k, hanging in enumerate(overhang.hanging for overhang in overhangs):
+        if process.support == "enforced":
+            hanging = hanging ^ sections.enforced[k] if sections.enforced else Polygons()
         if not hanging.is_empty():
             drop = float(heights.bottom_mm[k]) - process.support_gap_mm
             near = list(outlines[int(np.searchsorted(heights.tip_mm, drop - EVEN_MM)) : max(k - 1, 0)])
@@ -133,7 +144,7 @@ def grow(
     for m in range(count - 1, -1, -1):
         pending += beginning.get(m, [])
         area = union([branch.area for branch in branches]) if is_tree else area
-        body = _body(area, radius)
+        body, about = _body(area, radius), places_about_needles(area, areas.reachable[m], areas)
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
             contact = _contact(union(asked), body, areas.reachable[m], radius)
@@ -146,7 +157,7 @@ def grow(
         left = [(hanging - body, last) for hanging, last in pending if last < m]
         pending = [(hanging, last) for hanging, last in left if hanging.area() >= LEAST_MM2]
         if not body.is_empty():
-            bodies[m] = body
+            bodies[m] = body if about.is_empty() else body + _body(about, radius)
             if is_tree and m:
                 branches = lower_branches(branches, areas, m)
             elif m and not (area - areas.reachable[m - 1]).is_empty():
@@ -183,22 +194,24 @@ def stand(
 def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
     """Support of every layer with the roots of what ends in the layers above.
 
-    A root is at most as deep as the steepest slope that support may not slide along is high under its disc.
+    A root is at most as deep as the steepest slope that support may not slide along is high under its disc; a thin one no deeper
+    than a tip may be long.
     """
     process = areas.process
     across = process.support_distance_mm + 2.0 * areas.radius_mm
     angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
     deep = across / max(tan(radians(angle)), 0.5)
-    grown = list(bodies)
+    grown, least_mm2 = list(bodies), least_section_mm2(process)
     roots: list[tuple[Polygons, float]] = []
     for m in range(len(bodies) - 2, -1, -1):
-        ends = _loose_ends(bodies, areas, m + 1)
+        bottom_mm, ends = areas.heights.bottom_mm[m : m + 2].tolist(), _loose_ends(bodies, areas, m + 1)
         if not ends.is_empty():
-            roots.append((ends, float(areas.heights.bottom_mm[m + 1]) - deep))
+            roots.append((ends, bottom_mm[1]))
         if roots:
             blocked = _blocked_area(union([root for root, _ in roots]), areas, m)
-            left = [(root - blocked, last) for root, last in roots if areas.heights.bottom_mm[m] >= last]
-            roots = [(root, last) for root, last in left if not _only_slivers(root)]
+            left = [(root - blocked, top_mm) for root, top_mm in roots if top_mm - bottom_mm[0] <= deep]
+            left = [(larger(root, least_mm2) if top_mm - bottom_mm[0] > TIP_MM else root, top_mm) for root, top_mm in left]
+            roots = [(root, top_mm) for root, top_mm in left if not _only_slivers(root)]
             grown[m] = union([bodies[m], *(root for root, _ in roots)])
     return grown
 
@@ -364,7 +377,7 @@ def _connected_areas(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, 
         mm2 = {k: piece.area() for k, piece in pieces.items()}
         worst = max(mm2, key=lambda k: mm2[k], default=-1)
         if worst >= 0 and mm2[worst] > 0.0:
-            yield sum(mm2.values()), worst, pieces[worst]
+            yield float(union(list(pieces.values())).area()), worst, pieces[worst]
 
 
 def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:

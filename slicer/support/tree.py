@@ -23,14 +23,14 @@ wide as a bead and does stand is sifted afterwards (support.stand); what hangs a
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import cos, floor, hypot, pi, radians, tan
+from math import cos, floor, hypot, pi, radians, sqrt, tan
 
 import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
-from slicer.geometry.polygons import Polygons, closing, contours, islands, offset, union
+from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, offset, union
 from slicer.support.reachable import EVEN_MM, FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
@@ -42,6 +42,8 @@ FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin re
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
 TIDY_EVERY = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
 INSET = 0.7  # of the lean: then right corners move by the lean
+LEAST_SECTION = 0.8  # of the section of a branch: support with less is a needle, which the nozzle knocks over
+STOUT = (0.3, 0.5, 0.8, 1.2)  # of a branch's diameter: how far from a needle's middle places are added to it
 
 
 STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
@@ -159,6 +161,33 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
         elif not old.full or 2.0 * (old.area - areas.placeable[layer]).area() >= old.area.area():
             left.append(old)  # less than half of it has come to ground
     return _drop_enclosed(low + _move_aside(left, areas, layer))
+
+
+def least_section_mm2(process: Process) -> float:
+    """The area, seen from above, below which a piece of support in a layer is a needle."""
+    return LEAST_SECTION * 0.25 * pi * process.support_branch_mm**2
+
+
+def places_about_needles(places: Polygons, reachable: Polygons, areas: ReachableAreas) -> Polygons:
+    """Of the places of a layer's support those of needles, with the reached ones about them that make each thick enough."""
+    radius, least_mm2, added = areas.radius_mm, least_section_mm2(areas.process), []
+    for piece in islands(places):
+        # No piece of that area has a smaller section than a round one (Brunn and Minkowski).
+        if (sqrt(piece.area()) + sqrt(pi) * radius) ** 2 < least_mm2 and dilate(piece, radius).area() < least_mm2:
+            added.append(_about(piece, reachable, areas, least_mm2))
+    return union(added)
+
+
+def _about(needle: Polygons, reachable: Polygons, areas: ReachableAreas, least_mm2: float) -> Polygons:
+    """A needle with the reached places about it, as far as it takes to get a section of least_mm2, or as there are any."""
+    middle, branch_mm = branch_of(needle, 0.0), areas.process.support_branch_mm
+    free, wider = reachable ^ bounding_box(needle, STOUT[-1] * branch_mm), needle
+    for share in STOUT:
+        about = trunk(middle.x, middle.y, share * branch_mm, 0.0).area ^ free
+        wider = union([needle, *(piece for piece in islands(about) if not (piece ^ needle).is_empty())])
+        if dilate(wider, areas.radius_mm).area() >= least_mm2:
+            break
+    return wider
 
 
 def _depths(branches: Sequence[Branch], borders: EdgeIndex) -> Floats:

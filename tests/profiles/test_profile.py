@@ -89,7 +89,7 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
         ("process.walls=true", "process.walls is true: it must be a whole number from 0 to 50"),
         ("process.walls=many", 'process.walls is "many": it must be a whole number from 0 to 50'),
         ("search.clearance=maybe", 'search.clearance is "maybe": it must be true or false'),
-        ("process.support=some", 'process.support is "some": it must be one of "none", "auto"'),
+        ("process.support=some", 'process.support is "some": it must be one of "none", "auto", "enforced"'),
         ("machine.name=5", "machine.name is 5: it must be a text"),
         ("machine.tilt.letter=Q", 'machine.tilt.letter is "Q": it must be one letter of ABCUVWIJK'),
         ("machine.tilt.stepper=my stepper", 'machine.tilt.stepper is "my stepper": it must be a name of letters, digits and _'),

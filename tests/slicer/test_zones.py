@@ -2,20 +2,21 @@
 
 from dataclasses import replace
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
 from mdp.decomposition import Part
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Mesh
 from mdp.zone import AnyZone, Grown, Marked, Zone
 from profiles.frozen import Vector
 from slicer.estimate.estimate import estimate
 from slicer.heights import Heights
 from slicer.paths import Kind, SlicedPart
-from slicer.sectioning import no_seam_segments, no_support_areas
+from slicer.sectioning import marked_areas, no_seam_segments
 from slicer.slice import slice_part, slice_parts
 from slicer.support.reachable import unwanted_areas
-from tests.shapes import box, tee
+from tests.shapes import box, standing, tee
 from tests.slicer.hand import BARE, cut, of_kind, profile, sections_at, volume_mm3, whole
 
 BACK = Grown((0.0, 10.0, 5.0), 1.0)
@@ -36,6 +37,11 @@ def bare(part: Part) -> Part:
 
 def begins(sliced: SlicedPart) -> Floats:
     return np.array([path.points[0] for path in of_kind(sliced, Kind.OUTER_WALL)])
+
+
+def leaning_out() -> Mesh:
+    """A wedge 10 mm wide on the platform and 26 mm 10 mm higher, 12 mm deep: its sides are 38.7 deg from upright."""
+    return standing(m3.CrossSection([[(-5, 0), (5, 0), (13, 10), (-13, 10)]]).extrude(12).rotate((90, 0, 0)))
 
 
 def support_x_mm(sliced: SlicedPart) -> Floats:
@@ -99,7 +105,7 @@ def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> N
     marked = replace(block, no_support=Marked.of(block.mesh, [Grown((0.0, 0.0, 4.0), 1.0)]))
     heights = Heights(tips_mm, np.full(100, 0.08), tips_mm - 0.04)
     sections = sections_at(block.mesh, heights.cut_mm, "process.layer_height_mm=0.3", "process.support_bottom_gap_mm=0.3")
-    unwanted = no_support_areas(marked, block.mesh, heights.cut_mm)
+    unwanted = marked_areas(marked.no_support, marked, block.mesh, heights.cut_mm)
     stands = int(np.searchsorted(heights.bottom_mm, 4.3))  # the first layer that support on it would have
     shut = unwanted_areas(replace(sections, part=marked, heights=heights, no_support=unwanted))
     assert (shut[stands].area(), shut[-1].area()) == (pytest.approx(400.0, rel=0.01), 0.0)
@@ -110,5 +116,28 @@ def test_a_box_that_leans_shuts_of_each_layer_what_lies_in_it() -> None:
     leaning = Zone((-5.0, -10.0, -5.0), (5.0, 10.0, 5.0), ((half, 0.0, -half), (0.0, 1.0, 0.0), (half, 0.0, half))).moved(
         (0, 0, 10)
     )
-    shut = no_support_areas(replace(part, no_support=Marked((leaning,))), part.mesh, np.array([2.0, 6.0, 10.0]))
+    shut = marked_areas(Marked((leaning,)), part, part.mesh, np.array([2.0, 6.0, 10.0]))
     assert shut[-1].area() == pytest.approx(20.0 * 10.0 * 2.0**0.5)  # as wide as its side's diagonal half way up
+
+
+LEFT = Zone((-30.0, -30.0, -1.0), (0.0, 30.0, 40.0))
+
+
+@pytest.mark.parametrize("zone", [LEFT, Grown((-9.0, 0.0, 5.0), 1.0)])
+def test_a_slope_that_carries_itself_is_supported_where_a_person_wants_it(zone: AnyZone) -> None:
+    wedge = whole(leaning_out())
+    assert volume_mm3(slice_part(wedge, SUPPORTED), Kind.SUPPORT) == 0.0
+    marked = replace(wedge, support=Marked.of(wedge.mesh, (zone,)))
+    for which in ("process.support=auto", "process.support=enforced"):
+        sliced = slice_part(marked, profile("process.skirt_loops=0", which))
+        assert -18.0 < support_x_mm(sliced).min() < -11.0
+        assert support_x_mm(sliced).max() < 0.0
+        assert sliced.unsupported_mm2 == 0.0
+
+
+def test_enforced_holds_up_nothing_else_and_a_place_without_support_comes_first() -> None:
+    enforced = profile("process.skirt_loops=0", "process.support=enforced")
+    assert not of_kind(slice_part(whole(tee()), enforced), Kind.SUPPORT)
+    right = replace(whole(tee()), support=Marked((RIGHT_ARM,)))
+    assert support_x_mm(slice_part(right, enforced)).min() > 0.0
+    assert not of_kind(slice_part(replace(right, no_support=Marked((RIGHT_ARM,))), enforced), Kind.SUPPORT)

@@ -47,6 +47,7 @@ def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tup
         no_seam=part.no_seam.repeated(shifts),
         no_support=part.no_support.repeated(shifts),
         modifiers=tuple(copy for modifier in part.modifiers for copy in modifier.repeated(shifts)),
+        support=part.support.repeated(shifts),
     )
     risky_mm2, residual_mm2 = count * decomposition.risky_area_mm2, count * decomposition.residual_area_mm2
     plated = replace(decomposition, mesh=mesh, parts=(many,), risky_area_mm2=risky_mm2, residual_area_mm2=residual_mm2, front=())

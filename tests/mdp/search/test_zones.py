@@ -1,6 +1,7 @@
 """What a person marks on a model, in a search: no support where none is wanted, faces around a point."""
 
 import pytest
+from manifold3d import Manifold
 
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
@@ -37,6 +38,15 @@ def test_area_that_may_not_be_supported_counts_a_hundred_times_in_the_cost_and_o
     assert marked.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 150.0)
     assert marked.front[0].support_area_mm2 == pytest.approx(free.front[0].support_area_mm2)
     assert marked.residual_area_mm2 == free.residual_area_mm2 == pytest.approx(300.0)
+
+
+def test_a_bridge_that_a_person_wants_supported_counts_as_in_need_of_support() -> None:
+    posts = Manifold.cube((6, 10, 15)) + Manifold.cube((6, 10, 15)).translate((10, 0, 0))
+    gate = shapes.standing(posts + Manifold.cube((16, 10, 5)).translate((0, 0, 15)))
+    under = Zone((-1.9, -9.0, 14.0), (1.9, 9.0, 16.0))
+    marked = cut_by_plan(gate, "gate", DEAR_SEAMS, PlanFile("mine.toml", zones=Zones(support=(under,))))
+    free = cut_by_plan(gate, "gate", DEAR_SEAMS, PlanFile("mine.toml"))
+    assert (free.residual_area_mm2, marked.residual_area_mm2) == (0.0, pytest.approx(4 * 10))
 
 
 def test_no_plane_passes_through_the_faces_around_a_point_that_stay_whole() -> None:

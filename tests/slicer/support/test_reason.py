@@ -58,3 +58,12 @@ def test_an_arm_farther_out_than_support_may_lean_from_its_part_s_own_foot() -> 
 
 def test_a_print_that_hangs_nowhere_has_no_reason_to_give() -> None:
     assert slice_part(whole(standing(BLOCK((10, 10, 5)))), profile()).unsupported == ()
+
+
+def test_shelves_one_above_the_other_that_get_no_support_count_as_the_area_seen_from_above() -> None:
+    shelves = [BLOCK((20, 8, 1)).translate((0, 0, 10 + 1.7 * k)) for k in range(4)]
+    comb = sum(shelves, BLOCK((8, 8, 16.1)))
+    settings = (*NO_BRIDGES, "process.support_bottom_gap_mm=0.6")
+    (bare,) = slice_part(whole(standing(comb)), profile(*settings)).unsupported
+    assert bare.mm2 == pytest.approx((20 - 8) * 8, rel=0.02)
+    assert bare.reason == "there is no room for support between it and the plastic below"

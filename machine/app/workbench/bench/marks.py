@@ -1,4 +1,4 @@
-"""Marks: boxes and faces on which a person wants no cut, no seam or no support: the zones of the plan."""
+"""Marks: boxes and faces on which a person wants no cut, no seam, no support or support: the zones of the plan."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,7 +15,12 @@ from mdp.plans.reading import MOST_ZONES
 from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones, faces_of
 from profiles.errors import PlanError
 
-WORDS = {"keep": "mark: no cut here", "no_seam": "mark: no seam here", "no_support": "mark: no support here"}
+WORDS = {
+    "keep": "mark: no cut here",
+    "no_seam": "mark: no seam here",
+    "no_support": "mark: no support here",
+    "support": "mark: support here",
+}
 
 
 def mark(bench: Bench, asked: Asked) -> tuple[str, Zones]:

@@ -118,4 +118,4 @@ def test_what_would_carry_a_box_beyond_what_a_plan_may_have_is_refused() -> None
 
 def test_faces_of_several_kinds_are_told_of_each() -> None:
     both = replace(BENCH, zones=Zones(no_seam=(Grown((0.0, 5.0, 10.0), 1.0),), no_support=(ARM,)))
-    assert named_faces(both).sum(axis=1).tolist() == [0, 6, 2]
+    assert named_faces(both).sum(axis=1).tolist() == [0, 6, 2, 0]

@@ -1,4 +1,4 @@
-// Marks: boxes and faces that are left alone: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
+// Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
 import { add, bounds, scaled } from "../../../../view/template/math.js";
 import { $, made, swatch } from "../../../../view/template/page.js";
@@ -12,6 +12,7 @@ import { wordOf } from "./triangles.js";
 
 const MARK_KINDS = {
   keep: { word: "no cut", colour: [118, 66, 214] }, no_seam: { word: "no seam", colour: [0, 128, 122] }, no_support: { word: "no support", colour: [196, 24, 126] },
+  support: { word: "support", colour: [196, 128, 0] },
 };
 const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a face's byte
 const BOX_SIDES = [0, 1, 2].flatMap((axis) => [{ axis, end: "min_mm", name: `least ${"xyz"[axis]}` }, { axis, end: "max_mm", name: `greatest ${"xyz"[axis]}` }]);
