@@ -109,8 +109,8 @@ class Sections:
 
     @property
     def on_platform(self) -> bool:
-        """Whether the part is the first one."""
-        return self.part.index == 1
+        """Whether the part stands on the platform."""
+        return self.part.on_platform
 
     @property
     def process(self) -> Process:
@@ -146,7 +146,7 @@ def section_part(
     mesh is not closed, or too high to be meant.
     """
     of_print, profile = profile, vase_profile(profile.of_part(part.index))
-    process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
+    process, mesh, on_platform = profile.process, part.in_part_frame(), part.on_platform
     heights = part_heights(part, later, profile)
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
@@ -241,7 +241,9 @@ def _model_around(
     before, after = (near_parts(part, others, far_mm) for others in (earlier, later))
     others, count = sections_of(after, part, np.concatenate([heights.cut_mm, over])), len(heights.cut_mm)
     deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
-    beneath = [closing(model, CLOSING_MM) for model in sections_of([*before, *after], part, deep)[::-1]] if earlier else []
+    known = bool(earlier) and not part.on_platform
+    under = sections_of([*before, *after], part, deep)[::-1] if known else []
+    beneath = [closing(model, CLOSING_MM) for model in under]
     return others[:count], others[count:], beneath
 
 

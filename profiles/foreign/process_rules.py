@@ -182,6 +182,7 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.ironing_spacing_mm", "ironing_spacing", number),
     ("process.ironing_speed_mm_s", "ironing_speed", number),
     ("process.bridge_flow", "bridge_flow_ratio", _bridge_flow),
+    ("process.complete_objects", "complete_objects", flag),
     ("process.skirt_loops", "skirts", whole),
     ("process.skirt_distance_mm", "skirt_distance", number),
     ("process.brim_mm", "brim_width", _brim),
