@@ -44,6 +44,7 @@ from slicer.geometry.polygons import (
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights, pedestal_layers, shell_layers
 from slicer.interface.interface import (
+    AROUND_MM,
     Pins,
     cut_grooves,
     cut_out,
@@ -170,6 +171,7 @@ def section_part(
         own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
     below = plastic_below(part, earlier, outlines[0])
     is_limb = part.base.limbs_mm is not None and bool(earlier)
+    near_limb = near_parts(part, earlier, AROUND_MM + process.support_distance_mm) if is_limb else []  # as far as its support
     return Sections(
         part=part,
         earlier=earlier,
@@ -185,7 +187,7 @@ def section_part(
         plate=plate_outline(profile.machine.table),
         above=above,
         beneath=beneath,
-        standing=sections_of(earlier, part, cuts_mm) if is_limb and process.support != "none" else (),
+        standing=sections_of(near_limb, part, cuts_mm) if is_limb and process.support != "none" else (),
         joints=joints(part, later, outlines[0], below),
         pins=pins.get(part.index, np.zeros((0, 3))),
         grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),

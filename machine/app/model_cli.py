@@ -67,7 +67,7 @@ def export(
     force: options.Force = False,
     given: options.ModelProfileOptions,
 ) -> int:
-    """Write the G-code of a model, or of several on one plate, dry-run first."""
+    """Write the G-code of one or several models, dry-run first."""
     for model in dict.fromkeys(options.named_models(models)):
         options.check_model(model)
     from machine.app.commands.export import export

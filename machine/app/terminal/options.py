@@ -35,7 +35,7 @@ ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a
 Models = Annotated[
     list[str],
     typer.Argument(
-        metavar="MODEL...",
+        metavar="MODEL",
         show_default=False,
         help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 is three of it",
     ),
@@ -43,7 +43,7 @@ Models = Annotated[
 ModelsOrGcode = Annotated[
     list[str],
     typer.Argument(
-        metavar="MODEL...|FILE.gcode", show_default=False, help="model files or demo:NAME, as of export, or a G-code file"
+        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as of export, or a G-code file"
     ),
 ]
 MachineName = Annotated[str, _profile_option("machine")]
