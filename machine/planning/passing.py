@@ -15,8 +15,10 @@ from mdp.mesh import Floats
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.pose import Pose, least_rotation, level, poses
 from profiles.profile import Profile
+from slicer.interface.interface import AROUND_MM
 
 ROUNDING_DIGITS = 6
+CELLS_MM = (2.0, 0.6)  # finer ones would bring models nearer to each other by 2 mm at most, and take many times as long
 SIDES = 8  # of a brim's corner
 _ROUND = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)])
 Turn = tuple[int, int]  # a model of the plate and one of its parts, both by their places in the lists, from 0
@@ -34,6 +36,7 @@ class Passing:
     ) -> None:
         self.models, self.together, self.alone, self.brim_mm = models, together, alone, brim_mm
         self._profile = profile
+        self._around_mm = {model.parts[0]: self._width_around(model) for model in dict.fromkeys(models)}
         self._hulls: dict[Part, Floats] = {}
         self._known: dict[tuple[object, ...], bool] = {}
 
@@ -50,6 +53,11 @@ class Passing:
             return bool(self._allowed(position - len(begins), places, [pose]))
 
         return least_rotation(self._profile.machine, [*begins, *options], fits)[len(begins) :]
+
+    def _width_around(self, model: Decomposition) -> float:
+        """How far what is printed around a model on the plate may reach: its brim, which goes round its support, too."""
+        has_support = self._profile.process.support != "none" and any(part.risky_area_mm2 > 0.0 for part in model.parts)
+        return self.brim_mm + (AROUND_MM if has_support else 0.0)
 
     def _part(self, turn: Turn) -> Part:
         return self.models[turn[0]].parts[turn[1]]
@@ -84,16 +92,16 @@ class Passing:
         key = part, pose, standing, away_mm
         if key not in self._known:
             beside = self._hull(standing) + np.array([*away_mm, 0.0])
-            self._known[key] = passes_clear(self._profile.machine, pose, self._hull(part), beside, part.base.offset_mm)
+            self._known[key] = passes_clear(self._profile.machine, pose, self._hull(part), beside, part.base.offset_mm, CELLS_MM)
         return self._known[key]
 
     def _hull(self, part: Part) -> Floats:
-        """(m, 3, 3) corners of the faces of a part's hull, of one on the plate with its brim."""
+        """(m, 3, 3) corners of the faces of a part's hull, of one on the plate with what is around its base."""
         if part not in self._hulls:
             hull = convex_hull(part.mesh.vertices)
-            if part.on_platform and self.brim_mm > 0.0:
+            if self._around_mm.get(part, 0.0) > 0.0:
                 low = hull.vertices[hull.vertices[:, 2] <= PLATFORM_TOLERANCE_MM]
-                brims = low[:, None] + self.brim_mm / np.cos(np.pi / SIDES) * _ROUND
+                brims = low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND
                 hull = convex_hull(np.vstack([hull.vertices, brims.reshape(-1, 3)]))
             self._hulls[part] = hull.vertices[hull.faces]
         return self._hulls[part]
