@@ -12,6 +12,7 @@ height of the underside. h never decreases with r, so within a layer the outline
 the two surfaces. Both are divided into triangles so small that the slack covers every point of them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import NamedTuple
@@ -222,16 +223,19 @@ class _Meeting:
         return _find_close(tips, points, slack_mm, Head(self.head.silhouette, wide), self.clearance_mm, reached)
 
 
-def passes_clear(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> bool:
+def passes_clear(
+    machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float, cells_mm: Sequence[float] = CELLS_MM
+) -> bool:
     """Whether the head clears everything that stands while a limb is printed.
 
     limb, standing: (m, 3, 3) corners of the faces of both surfaces in the workpiece frame; base_mm: the base plane's offset.
-    Triangles below the base plane are ignored. False also where there are too many triangles to compare.
+    Triangles below the base plane are ignored. False also where there are too many triangles to compare, and where the finest of
+    cells_mm leaves it in doubt, which is so within five of them.
     """
     tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
     if meeting.close(_few(tips), _few(stands), 0.0)[0].any():
         return False
-    for cell_mm in CELLS_MM:
+    for cell_mm in cells_mm:
         if max(count_divided(corners, cell_mm) for corners in (tips, stands)) > MOST_TRIANGLES:
             return False
         tips, stands = (_above(subdivide(corners, cell_mm)) for corners in (tips, stands))

@@ -6,7 +6,7 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask
-from mdp.plane import Plane
+from mdp.plane import UP, Plane
 from mdp.pose import Pose
 from mdp.zone import UNMARKED, Marked, Modifier
 from profiles.errors import DecompositionError
@@ -49,6 +49,11 @@ class Part:
         """Unit printing direction in the workpiece frame: the base plane's normal."""
         return self.base.normal
 
+    @property
+    def on_platform(self) -> bool:
+        """Whether it stands on the platform: the first part of each model does."""
+        return self.base.offset_mm == 0.0 and bool((self.base.normal == UP).all())
+
     def in_part_frame(self) -> Mesh:
         """The part's mesh in its own frame: direction is +z, base plane is z = 0."""
         return self.mesh.transform(self.rotation, (0.0, 0.0, -self.base.offset_mm))
@@ -81,7 +86,7 @@ class FrontRow:
 
 @dataclass(frozen=True, eq=False)
 class Decomposition:
-    """A model and its parts in print order (index 1, 2, ...); part 1 stands on the platform.
+    """A model, or several on one plate, and their parts in print order (index 1, 2, ...); part 1 stands on the platform.
 
     risky_area_mm2 is what printing the whole model straight up leaves to support, residual_area_mm2 what the parts do.
     folded_mm3 is how far the mesh's volume may be from what the parts add up to, because its surface passes through itself.

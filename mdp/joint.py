@@ -61,7 +61,9 @@ def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
         return ()
     pieces, crumb_mm = _pieces(parts), float(np.sqrt(profile.search.least_interface_mm2))
     joints = []
-    for part in parts[1:]:
+    for part in parts:
+        if part.on_platform:
+            continue
         own = [k for k, piece in enumerate(pieces) if piece.part is part]
         high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= crumb_mm] or own
         several = [_joint(pieces, k, profile.material.cold_weld_mpa) for k in high]

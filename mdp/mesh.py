@@ -1,6 +1,7 @@
 """Mesh: a closed, oriented triangle mesh in mm, its measures, and what its file paints its faces with: whole numbers 0xRRGGBB."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -148,3 +149,14 @@ def parse_colour(text: str) -> int | None:
 def colour_text(colour: int) -> str:
     """A colour as #rrggbb."""
     return f"#{colour:06x}"
+
+
+def together(meshes: Sequence[Mesh]) -> Mesh:
+    """The surfaces of several meshes as one mesh, their vertices and faces one after the other."""
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + begin for mesh, begin in zip(meshes, first, strict=False)]
+    colours = None
+    if any(mesh.colours is not None for mesh in meshes):
+        bare = [np.full(len(mesh.faces), NO_COLOUR) if mesh.colours is None else mesh.colours for mesh in meshes]
+        colours = np.concatenate(bare)
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces), colours)

@@ -175,9 +175,9 @@ class Modifier:
     volume: Zone | MeshVolume
     process: dict[str, Any]
 
-    def repeated(self, shifts_mm: Sequence[Vector]) -> tuple["Modifier", ...]:
-        """The same at several places, each shifted otherwise."""
-        return tuple(replace(self, volume=self.volume.moved(shift)) for shift in shifts_mm)
+    def moved(self, shift_mm: Vector) -> "Modifier":
+        """The same somewhere else."""
+        return replace(self, volume=self.volume.moved(shift_mm))
 
 
 @dataclass(frozen=True)
@@ -195,8 +195,8 @@ class Zones:
     def on(self, mesh: Mesh) -> "ZonesOnModel":
         """The zones with the faces that they mean on a model."""
         keep = tuple(zone if isinstance(zone, Zone) else Patches.of(mesh, faces_of(mesh, zone)) for zone in self.keep)
-        marked = (Marked.of(mesh, zones) for zones in (self.no_seam, self.no_support, self.support))
-        return ZonesOnModel(keep, *marked, modifiers=self.modifiers)
+        no_seam, no_support, support = (Marked.of(mesh, zones) for zones in (self.no_seam, self.no_support, self.support))
+        return ZonesOnModel(keep, no_seam, no_support, support, self.modifiers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,10 +225,18 @@ class Marked:
         known = (sources >= 0) & (sources < len(self.faces))
         return replace(self, faces=known & self.faces[np.where(known, sources, 0)])
 
-    def repeated(self, shifts_mm: Sequence[Vector]) -> "Marked":
-        """The same for a mesh that is there so many times, each shifted otherwise."""
-        boxes = tuple(box.moved(shift) for shift in shifts_mm for box in self.boxes)
-        return Marked(boxes, None if self.faces is None else np.tile(self.faces, len(shifts_mm)))
+    def moved(self, shift_mm: Vector) -> "Marked":
+        """The same for a mesh that is moved."""
+        return replace(self, boxes=tuple(box.moved(shift_mm) for box in self.boxes))
+
+    @classmethod
+    def together(cls, marks: Sequence[tuple["Marked", int]]) -> "Marked":
+        """What is marked of several meshes that become one; with each how many faces its mesh has."""
+        boxes = tuple(box for mark, _ in marks for box in mark.boxes)
+        if all(mark.faces is None for mark, _ in marks):
+            return cls(boxes)
+        faces = [np.zeros(count, dtype=np.bool_) if mark.faces is None else mark.faces for mark, count in marks]
+        return cls(boxes, np.concatenate(faces))
 
     def touched(self, mesh: Mesh) -> Mask:
         """(m,) the faces of the mesh that are marked or reach into a box."""

@@ -16,7 +16,7 @@ class Material(Frozen):
     )
     currency: str = Field("", max_length=12, description="what the price is counted in, as EUR; stands behind it in reports")
     nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature, deg C")
-    first_layer_nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature of part 1's first layer, deg C")
+    first_layer_nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature of the first layer on the plate, deg C")
     homing_nozzle_c: float = Field(
         150.0, ge=0, le=450, description="nozzle while the machine homes and the bed heats, deg C: nothing may ooze at 150"
     )

@@ -95,8 +95,8 @@ def part_heights(part: Part, later: Sequence[Part], profile: Profile) -> Heights
     """The layers of a part printed before `later` ones, with the planes of limbs that are level there; profile: its own."""
     limbs = [limb.base for limb in later if limb.base.limbs_mm is not None]
     planes_mm = {base.offset_mm - part.base.offset_mm for base in limbs if float(base.normal @ part.base.normal) > 1.0 - LEVEL}
-    pedestal_mm = profile.search.pedestal_mm if part.index == 1 else 0.0
-    return layer_heights(part.in_part_frame(), profile, part.index == 1, pedestal_mm, sorted(planes_mm))
+    pedestal_mm = profile.search.pedestal_mm if part.on_platform else 0.0
+    return layer_heights(part.in_part_frame(), profile, part.on_platform, pedestal_mm, sorted(planes_mm))
 
 
 def pedestal_layers(heights: Heights, pedestal_mm: float) -> int:

@@ -45,6 +45,7 @@ from slicer.geometry.polygons import (
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights, pedestal_layers
 from slicer.interface.interface import (
+    AROUND_MM,
     Pins,
     cut_grooves,
     cut_out,
@@ -114,8 +115,8 @@ class Sections:
 
     @property
     def on_platform(self) -> bool:
-        """Whether the part is the first one."""
-        return self.part.index == 1
+        """Whether the part stands on the platform."""
+        return self.part.on_platform
 
     @property
     def process(self) -> Process:
@@ -161,7 +162,7 @@ def section_part(
     mesh is not closed, or too high to be meant.
     """
     of_print, profile = profile, vase_profile(profile.of_part(part.index))
-    process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
+    process, mesh, on_platform = profile.process, part.in_part_frame(), part.on_platform
     heights = part_heights(part, later, profile)
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
@@ -186,6 +187,7 @@ def section_part(
         own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
     below = plastic_below(part, earlier, outlines[0])
     is_limb = part.base.limbs_mm is not None and bool(earlier)
+    near_limb = near_parts(part, earlier, AROUND_MM + process.support_distance_mm) if is_limb else []  # as far as its support
     return Sections(
         part=part,
         earlier=earlier,
@@ -201,7 +203,7 @@ def section_part(
         plate=plate_outline(profile.machine.table),
         above=above,
         beneath=beneath,
-        standing=sections_of(earlier, part, cuts_mm) if is_limb and process.support != "none" else (),
+        standing=sections_of(near_limb, part, cuts_mm) if is_limb and process.support != "none" else (),
         joints=joints(part, later, outlines[0], below),
         pins=pins.get(part.index, np.zeros((0, 3))),
         grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),
@@ -259,7 +261,9 @@ def _model_around(
     before, after = (near_parts(part, others, far_mm) for others in (earlier, later))
     others, count = sections_of(after, part, np.concatenate([heights.cut_mm, over])), len(heights.cut_mm)
     deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
-    beneath = [closing(model, CLOSING_MM) for model in sections_of([*before, *after], part, deep)[::-1]] if earlier else []
+    known = bool(earlier) and not part.on_platform
+    under = sections_of([*before, *after], part, deep)[::-1] if known else []
+    beneath = [closing(model, CLOSING_MM) for model in under]
     return others[:count], others[count:], beneath
 
 

@@ -439,7 +439,8 @@ def interface_mm3(shells: Shells) -> dict[int, float]:
     sections, regions = shells.sections, [shell.region for shell in shells.layers]
     part, process, heights = sections.part, sections.process, sections.heights
     planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
-    planes |= {upper.index: plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in sections.later}
+    upper_parts = [upper for upper in sections.later if not upper.on_platform]
+    planes |= {upper.index: plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in upper_parts}
     more, near = dict.fromkeys(planes, 0.0), limb_planes(part, sections.later, heights, NEAR_MM)
     for layer, (section, region) in enumerate(zip(sections.own, regions, strict=True)):
         height_mm, z_mm = heights.height_mm[layer], heights.cut_mm[layer]

@@ -216,6 +216,7 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     fan, add_c = 1.0, 0.0
     if on_platform:
         fan = rising_fan(material, index)
+        add_c = material.first_layer_nozzle_c - material.nozzle_c if index == 0 else 0.0
     elif index < process.interface_layers:
         fan = process.interface_fan if index else process.interface_first_layer_fan
         add_c = process.interface_temperature_add_c

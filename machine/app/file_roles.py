@@ -58,13 +58,11 @@ def _identity(path: Path) -> object:
 
 
 def _read_by(request: ModelRequest) -> list[Role]:
-    model: Path | None = None
-    if not request.model.startswith(DEMO):
-        model = Path(request.model)
+    models = [("the model", Path(name)) for name in (request.model, *request.beside) if not name.startswith(DEMO)]
     profiles = zip(("--machine", "--material", "--process"), request.profile_names, strict=False)
     ranker = Path(request.ranker) if request.ranker.endswith(SUFFIX) else None
     own = [(option, Path(name)) for option, name in profiles if name is not None and is_file_name(name)]
-    return [("the model", model), ("--plan", request.cuts.plan), ("--planes", request.cuts.planes), ("--ranker", ranker), *own]
+    return [*models, ("--plan", request.cuts.plan), ("--planes", request.cuts.planes), ("--ranker", ranker), *own]
 
 
 def _written(outputs: Outputs) -> list[Role]:

@@ -53,7 +53,7 @@ def decompose(
 
 
 def export(
-    model: options.Model,
+    models: options.Models,
     *,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write; - for standard output")],
     program: options.ProgramOptions,
@@ -67,16 +67,17 @@ def export(
     force: options.Force = False,
     given: options.ModelProfileOptions,
 ) -> int:
-    """Write the G-code of a model, dry-run first."""
-    options.check_model(model)
+    """Write the G-code of one or several models, dry-run first."""
+    for model in dict.fromkeys(options.named_models(models)):
+        options.check_model(model)
     from machine.app.commands.export import export
 
     outputs = Outputs(gcode=out, json=json, html=html, svg=svg, layer=layer)
-    return export(options.program_request(model, program, given, outputs=outputs, compare=compare, force=force))
+    return export(options.program_request(models, program, given, outputs=outputs, compare=compare, force=force))
 
 
 def simulate(
-    model: options.ModelOrGcode,
+    models: options.ModelsOrGcode,
     *,
     program: options.ProgramOptions,
     json: options.JsonFile = None,
@@ -92,11 +93,11 @@ def simulate(
     """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
     from machine.app.commands.simulate import simulate
 
-    return simulate(options.program_request(model, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
+    return simulate(options.program_request(models, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
 
 
 def view(
-    model: options.ModelOrGcode,
+    models: options.ModelsOrGcode,
     *,
     program: options.ProgramOptions,
     out: Annotated[
@@ -109,7 +110,7 @@ def view(
     """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
     from machine.app.commands.view import view
 
-    return view(options.program_request(model, program, given, outputs=Outputs(html=out), compare=compare), open_)
+    return view(options.program_request(models, program, given, outputs=Outputs(html=out), compare=compare), open_)
 
 
 def edit(

@@ -14,7 +14,7 @@ BAUD = PrintRequest.baud
 
 
 def print_(
-    model: options.ModelOrGcode,
+    models: options.ModelsOrGcode,
     *,
     port: options.PortOrSim,
     program: options.ProgramOptions,
@@ -30,7 +30,7 @@ def print_(
     force: options.ForceAll = False,
     given: options.ProfileOptions,
 ) -> int:
-    """Print a model or a G-code file on a printer or a simulated one.
+    """Print models or a G-code file on a printer or a simulated one.
 
     PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT, or a print server: octoprint:HOST, moonraker:HOST,
     duet:HOST, to which the program is handed over first. The printer is asked who it is before anything moves.
@@ -39,7 +39,7 @@ def print_(
     from machine.app.commands.print import print_model
 
     printing = PrintRequest(port, baud, speed, log, journal, options.page_port(watch, watch_port), not no_browser)
-    return print_model(options.program_request(model, program, given, force=force), printing)
+    return print_model(options.program_request(models, program, given, force=force), printing)
 
 
 def send(

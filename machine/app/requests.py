@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from profiles.errors import PlanError
+
 if TYPE_CHECKING:
     from machine.planning.stops import Stop
     from mdp.batch.pool import Workers
@@ -14,7 +16,14 @@ STDOUT = Path("-")  # stands for standard output where a file is asked for
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
 UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
+MOST_COPIES = 1000
 FORCE_GOES_ON = "--force goes on"  # how a sentence says that its error is forcible
+
+
+def check_copies(count: int, said: str) -> None:
+    """Raise PlanError for a number of copies, as it was said, that cannot be."""
+    if not 1 <= count <= MOST_COPIES:
+        raise PlanError(f"{said} is {count}: 1 to {MOST_COPIES} is allowed")
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,8 @@ class ModelRequest:
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down the way that costs least; None: where nothing says how it lies. compare: with the same model in one part. force:
     go on although the dry run found errors. profile_names: of machine, material and process as the user has given them, names or
-    files. stops: where the print waits for a person. copies: how many of the model on the plate."""
+    files. stops: where the print waits for a person. copies: how many of each model on the plate; beside: what else
+    stands there."""
 
     model: str
     profile: "Profile"
@@ -72,10 +82,11 @@ class ModelRequest:
     profile_names: tuple[str | None, ...] = ()
     stops: "tuple[Stop, ...]" = ()
     copies: int = 1
+    beside: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
-        """The name that files and messages carry: the file's name without its folder."""
+        """The name that files and messages carry: the file's name without its folder, of the first of several models."""
         return self.model if self.model.startswith("demo:") else Path(self.model).name
 
     @property

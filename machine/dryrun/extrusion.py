@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, by_part
-from machine.dryrun.strokes import Beads
+from machine.dryrun.strokes import Beads, parts_on_plate
 from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats, Indices
 from profiles.profile import Profile
@@ -38,6 +38,7 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     remarks = program.remarks
     sized = ((remarks.width_mm > 0) & (remarks.height_mm > 0))[program.remark[deposited.rows]]
     uneven = program.rows_of_types(*UNEVEN)[deposited.rows] | _fills_grooves(program, deposited.rows, profile)
+    on_plate = parts_on_plate(program, deposited)
     counted = ~uneven & ~_climbs(program, deposited)
     length = deposited.length_mm
     yield from _fast(program, deposited.rows, length)
@@ -46,7 +47,7 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
         mine = counted & (sized == known)
         if mine.any():
-            area_mm2 = _area(program, deposited.rows[mine], profile) if known else np.ones(len(remarks.part))
+            area_mm2 = _area(program, deposited.rows[mine], on_plate, profile) if known else np.ones(len(remarks.part))
             beads = Counted(program, deposited.rows, length, mine, area_mm2, profile.material.diameter_mm)
             whole_file = _whole_file(beads, profile) if known else []
             yield from whole_file or (_odd(beads) if known else ())
@@ -108,16 +109,17 @@ def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Pro
     return fills
 
 
-def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:
+def _area(program: ParsedProgram, rows: NDArray[np.int64], begin: list[int], profile: Profile) -> Floats:
     """(k,) cross-section that the stated width and height of each remark need, with the factors of the profile and of its parts;
-    rows: of beads, the lowest layer of which lies on the plate.
+    rows: of beads, the lowest layer of which lies on the plate, as does the first one of parts that begin there.
     """
     remarks = program.remarks
     width, height = remarks.width_mm, remarks.height_mm
     area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
     on_plate = (remarks.layer == remarks.layer[program.remark[rows]].min()) & (remarks.part <= 1)
+    on_plate |= np.isin(remarks.part, begin) & (remarks.layer == 1)
     factor = np.where(on_plate, profile.process.first_layer_flow, 1.0)
-    for part in np.unique(remarks.part[remarks.part > 1]):
+    for part in np.setdiff1d(remarks.part[remarks.part > 1], begin):
         on_part = (remarks.part == part) & (remarks.layer == 1)
         factor[on_part] = profile.of_part(int(part)).process.interface_flow
     needed: Floats = area * factor * profile.material.flow

@@ -156,12 +156,11 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Findin
 
 def _without_fan(part: int, profile: Profile) -> int:
     """How many layers of a part are meant to have no fan at first."""
+    process, on_plate = profile.of_part(part).process, profile.material.fan_off_layers
     if part <= 1:
-        return profile.material.fan_off_layers
-    process = profile.of_part(part).process
-    if process.interface_fan == 0.0:
-        return process.interface_layers
-    return 1 if process.interface_first_layer_fan == 0.0 else 0
+        return on_plate
+    on_part = process.interface_layers if process.interface_fan == 0.0 else int(process.interface_first_layer_fan == 0.0)
+    return max(on_part, on_plate) if process.complete_objects else on_part  # a part may begin another model
 
 
 def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:

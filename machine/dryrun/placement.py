@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
-from machine.dryrun.strokes import CROSSING_MM, Beads, lengths_of
+from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, Beads, lengths_of
 from machine.planning.fit import over_edge_mm
 from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats
@@ -25,7 +25,6 @@ LEAST_MM = 10.0
 STRETCH_MM = 30.0  # of beads in air that follow each other
 HANGING_SHARE = 0.8  # of a move's length
 ROUNDING_MM = 0.02
-ON_PLATE = 1.5  # heights of a bead: so low its top is where it lies on the plate
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> Iterator[Finding]:

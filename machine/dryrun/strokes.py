@@ -19,6 +19,7 @@ from slicer.support.beads import support_cell_mm
 
 SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
 LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose
+ON_PLATE = 1.5  # heights of a bead: so low its top is where it lies on the plate
 CROSSING_MM = 0.2  # on the way to a turn of the table, or from it to the next bead, the tip keeps so far above the print
 ACROSS_MM, WAY_MM = 0.5, 3.0  # a shorter way next to a bead is a wipe
 FEWEST_LEVELS = 3  # of beads, for a file's layers to be known by them
@@ -120,6 +121,19 @@ def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) 
         own[some, 0], own[some, 1] = np.where(width_mm > 0, width_mm, by_flow), height
     size[unsized] = len(sizes) + np.arange(len(unsized), dtype=np.int32)
     return replace(beads, sizes=np.concatenate([sizes, own]))
+
+
+def parts_on_plate(program: ParsedProgram, deposited: Beads) -> list[int]:
+    """The parts after part 1 whose first layer lies on the plate: they begin further models, printed one after the other."""
+    part, layer = program.remarks[:2]
+    used = np.unique(program.remark[deposited.rows])
+    lowest = np.full(int(part.max(initial=0)) + 1, np.iinfo(np.int64).max)
+    np.minimum.at(lowest, part[used], layer[used])
+    begins = (part > 1) & (layer == lowest[part])
+    first = np.flatnonzero(begins[program.remark[deposited.rows]])
+    of_part = part[program.remark[deposited.rows[first]]]
+    high = deposited.segments(first)[:, :, 2].max(axis=1, initial=0.0) > ON_PLATE * deposited.sizes[deposited.size[first], 1]
+    return sorted(set(of_part.tolist()) - set(of_part[high].tolist()))
 
 
 def lengths_of(segments: Floats) -> Floats:

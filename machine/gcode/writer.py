@@ -216,10 +216,7 @@ def _before_layer(move: BeginLayer, top_mm: float, pen: Pen) -> Iterator[str]:
 
 def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:
     """How hot a layer is printed."""
-    material = profile.material
-    if layer.part == 1 and layer.index == 1:
-        return material.first_layer_nozzle_c
-    return min(material.nozzle_c + layer.nozzle_add_c, profile.machine.nozzle_limit_c)
+    return min(profile.material.nozzle_c + layer.nozzle_add_c, profile.machine.nozzle_limit_c)
 
 
 def _set_nozzle(wanted_c: float, pen: Pen) -> Iterator[str]:

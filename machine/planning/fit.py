@@ -1,11 +1,9 @@
-"""Fit: whether a machine has room for parts, known before slicing: every axis reaches them, they stand on the plate; and places
-on the plate: of a model, and of several of one size, in rows and columns about it.
+"""Fit: whether a machine has room for parts, known before slicing: every axis reaches them, they stand on the plate; and a model
+moved to its place there.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import product
-from math import ceil, hypot
 
 import numpy as np
 
@@ -16,11 +14,9 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.plane import Plane
 from profiles.errors import MoveError
-from profiles.machine import Machine, Table
+from profiles.machine import Table
 from profiles.profile import Profile
 from profiles.settings.plate import MIDDLE
-
-EDGE_MM = 2.0  # kept to the plate's edge
 
 Place = tuple[float, float]
 
@@ -34,7 +30,7 @@ def check_parts(parts: Sequence[Part], profile: Profile) -> None:
     for part in parts:
         inset_mm = 0.5 * profile.of_part(part.index).process.line_width_mm
         _check_reach(part, inset_mm, profile)
-        if part.index == 1:
+        if part.on_platform:
             check_standing(part.mesh, profile)
 
 
@@ -113,48 +109,13 @@ def _part_moved(part: Part, shift: Floats) -> Part:
         part,
         mesh=mesh_moved(part.mesh, (x, y)),
         base=_plane_moved(part.base, shift),
-        no_seam=part.no_seam.repeated([(x, y, z)]),
-        no_support=part.no_support.repeated([(x, y, z)]),
-        modifiers=tuple(moved for modifier in part.modifiers for moved in modifier.repeated([(x, y, z)])),
-        support=part.support.repeated([(x, y, z)]),
+        no_seam=part.no_seam.moved((x, y, z)),
+        no_support=part.no_support.moved((x, y, z)),
+        support=part.support.moved((x, y, z)),
+        modifiers=tuple(modifier.moved((x, y, z)) for modifier in part.modifiers),
     )
 
 
 def _plane_moved(plane: Plane, shift: Floats) -> Plane:
     limbs_mm = None if plane.limbs_mm is None else plane.limbs_mm + shift
     return Plane(plane.normal, plane.offset_mm + float(plane.normal @ shift), limbs_mm)
-
-
-def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine, about_mm: Place = MIDDLE) -> list[Place]:
-    """Up to `count` middles (workpiece x, y, mm) of boxes of that size, gap_mm apart, the nearest to a place first.
-
-    Rows and columns may have a box or a gap at that place, or in the middle of the plate: what holds most is taken, among equals
-    what stays nearer to the place.
-    """
-    best: list[Place] = []
-    for anchor in dict.fromkeys((about_mm, MIDDLE)):
-        for shift in product((0.0, 0.5), (0.0, 0.5)):
-            inside = _lattice(size_mm, gap_mm, shift, machine, anchor)
-            lattice = sorted(inside, key=lambda middle: (round(_away(middle, about_mm), 6), middle[1], middle[0]))[:count]
-            if (len(lattice), -_farthest_mm(lattice, about_mm)) > (len(best), -_farthest_mm(best, about_mm)):
-                best = lattice
-    return best
-
-
-def _away(middle: Place, about_mm: Place) -> float:
-    return hypot(middle[0] - about_mm[0], middle[1] - about_mm[1])
-
-
-def _farthest_mm(places: list[Place], about_mm: Place) -> float:
-    return max((_away(place, about_mm) for place in places), default=0.0)
-
-
-def _lattice(size_mm: Place, gap_mm: float, shift: Place, machine: Machine, anchor_mm: Place) -> list[Place]:
-    """Those of its places whose boxes lie on the plate."""
-    steps = [side + gap_mm for side in size_mm]
-    reach_mm = machine.table.radius_mm + hypot(*anchor_mm)
-    counts = [ceil(2.0 * reach_mm / step) + 1 for step in steps]
-    columns, rows = ([(k + part) * step for k in range(-n, n + 1)] for n, part, step in zip(counts, shift, steps, strict=True))
-    middles = np.array(list(product(columns, rows))) + np.array(anchor_mm)
-    over_mm, _ = over_edge_mm(np.abs(middles) + 0.5 * np.array(size_mm) + EDGE_MM, machine.table)
-    return [(x, y) for x, y in middles[over_mm <= 0.0].tolist()]

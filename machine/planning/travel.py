@@ -29,6 +29,7 @@ from slicer.strokes.travels import STANDING_MM, distance, first_length, runs_rou
 
 TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
 NOWHERE = np.zeros((0, 3))
+NO_ENDS = np.zeros(0, dtype=np.int64)
 STEP_MM = 0.5  # between the points that sample ways and beads, and size of the cells in which only the highest point counts
 
 
@@ -249,27 +250,31 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
     for part, piece in printed:
         turn, shift = frame_change(part, limb)
         for layer in piece.layers:
-            placed = layer.points_mm @ turn.T + shift
-            for a, b, width_mm in zip(
-                layer.starts[:-1].tolist(), layer.starts[1:].tolist(), layer.width_mm.tolist(), strict=True
-            ):
-                if placed[a:b, 2].max() > width_mm:
-                    points = _resampled(placed[a:b])
-                    tops.append(points[points[:, 2] > width_mm])
-                    widest_mm = max(widest_mm, width_mm)
+            placed, width_mm = layer.points_mm @ turn.T + shift, np.repeat(layer.width_mm, np.diff(layer.starts))
+            high = placed[:, 2] > width_mm
+            if not high.any():
+                continue
+            points, before = _resampled(placed, layer.starts[1:-1] - 1)
+            tops.append(points[points[:, 2] > width_mm[before]])
+            widest_mm = max(widest_mm, float(width_mm[high].max()))
     slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of way and of bead, half a cell's diagonal
     return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
 
 
 def clear_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> float:
     """The least height of at least height_mm at which the tip may go along a way (n, 2) in the limb's frame."""
-    return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm), height_mm).max()))
+    return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm)[0], height_mm).max()))
 
 
-def _resampled(way_mm: Floats) -> Floats:
-    """A way (n, d) with points added so that they are at most STEP_MM apart."""
+def _resampled(way_mm: Floats, ends: Indices = NO_ENDS) -> tuple[Floats, Indices]:
+    """A way (n, d) with points added so that they are at most STEP_MM apart, and the point of the way that each comes from.
+
+    ends: points from which no way leads to the next one.
+    """
     steps = np.diff(way_mm, axis=0)
     counts = np.maximum(np.ceil(np.linalg.norm(steps, axis=1) / STEP_MM), 1).astype(np.int64)
+    counts[ends] = 1
     share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / np.repeat(counts, counts)
     points: Floats = np.repeat(way_mm[:-1], counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
-    return np.concatenate([points, way_mm[-1:]])
+    before = np.append(np.repeat(np.arange(len(counts)), counts), len(counts))
+    return np.concatenate([points, way_mm[-1:]]), before

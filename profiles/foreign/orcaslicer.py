@@ -49,6 +49,7 @@ KEYS = {
     "minimum_sparse_infill_area": "solid_infill_below_area",
     "spiral_mode": "spiral_vase",
     "brim_object_gap": "brim_separation",
+    "print_sequence": "complete_objects",
     "skirt_loops": "skirts",
     "bridge_flow": "bridge_flow_ratio",
     "ironing_flow": "ironing_flowrate",
@@ -102,6 +103,7 @@ WORDS = {  # values that are called otherwise
     "fill_pattern": {"zig-zag": "rectilinear", "tri-hexagon": "stars"},
     "top_fill_pattern": {"zig-zag": "rectilinear"},
     "bottom_fill_pattern": {"zig-zag": "rectilinear"},
+    "complete_objects": {"by layer": "0", "by object": "1"},
     "seam_position": {"back": "rear", "aligned_back": "rear"},
     "support_material_pattern": {"default": "rectilinear"},
 }

@@ -206,6 +206,7 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.bridge_flow", "bridge_flow_ratio", number),
     ("process.bridge_angle_deg", "bridge_angle", number),
     ("process.thick_bridges", "thick_bridges", flag),
+    ("process.complete_objects", "complete_objects", flag),
     ("process.skirt_loops", "skirts", whole),
     ("process.skirt_distance_mm", "skirt_distance", number),
     ("process.brim_mm", "brim_width", _brim),

@@ -90,6 +90,7 @@ SUPPORT = {
 }
 PLATE = {
     "place_mm": advanced("Place on the plate", "position move offset centre center xy arrange"),
+    "complete_objects": advanced("One model after the other", "complete individual objects sequential print sequence by object"),
     "skirt_loops": simple("Skirt loops", "skirts outline"),
     "skirt_distance_mm": advanced("Skirt distance", "skirts from object"),
     "brim_mm": simple("Brim width", "adhesion"),

@@ -13,7 +13,10 @@ class Plate(Frozen):
 
     place_mm: tuple[float, float] = Field(
         MIDDLE,
-        description="where the middle of the model stands on the plate: x and y from the turn axis; copies stand about it, mm",
+        description="where the middle of the model stands on the plate: x and y from the turn axis; several stand about it, mm",
+    )
+    complete_objects: bool = Field(
+        False, description="several models on one plate are printed one after the other, each whole, not layer by layer together"
     )
     skirt_loops: int = Field(1, ge=0, le=20, description="loops around part 1's first layer, not touching it")
     skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from part 1, mm")

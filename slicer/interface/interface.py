@@ -206,7 +206,7 @@ class BasePlane:
 
 def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:
     """Plastic just below the base plane; None on the platform. Parts not handed over are taken to fill the section."""
-    if part.index == 1:
+    if part.on_platform:
         return None
     if not earlier:
         return section
@@ -261,7 +261,7 @@ def plan_pins(parts: Sequence[Part], profile: Profile) -> Pins:
 
     profile: of the whole print; the part that fills pins says how they are made.
     """
-    wanted = [part.index for part in parts[1:] if profile.of_part(part.index).process.interlock == "pins"]
+    wanted = [part.index for part in parts if not part.on_platform and profile.of_part(part.index).process.interlock == "pins"]
     planned: dict[int, Floats] = {}
     for part in parts if wanted else ():
         planned[part.index] = _pins_of(part, parts, planned, profile) if part.index in wanted else np.zeros((0, 3))

@@ -16,11 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.decomposition import Part
 from mdp.directions.spread import spread_like_light
 from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import helper, kernel
-from mdp.mesh import Floats, Indices, Mesh
+from mdp.mesh import Floats, Indices, Mesh, together
 from mdp.overhang import Mask
 from mdp.sweep.rays import blocked_shares, faces_met, triangle_tree
 from mdp.topology.components import vertex_components
@@ -112,7 +111,7 @@ def light_samples(sections: Sections, outlines: Sequence[Sequence[Floats]]) -> t
     lifted = np.hstack([places + LIFT_MM * outward, heights_mm]) @ of.rotation
     along = np.hstack([-outward[:, 1:], outward[:, :1], level])
     frames = np.stack([along, np.hstack([level, level, up]), np.hstack([outward, level])], axis=1) @ of.rotation
-    mesh = _together([*sections.earlier, of, *sections.later])
+    mesh = together([part.mesh for part in (*sections.earlier, of, *sections.later)])
     bodies = _bodies(mesh)
     own, blocked = np.full(len(lifted), bodies[sum(len(part.mesh.faces) for part in sections.earlier)]), np.zeros(len(lifted))
     if (bodies != bodies[0]).any():
@@ -139,13 +138,6 @@ def _samples(loops: Sequence[Floats]) -> Floats:
         places = loop[at] + (along - ends[at] + lengths[at])[:, None] * way
         samples.append(np.column_stack([places, way[:, 1], -way[:, 0]]))
     return np.concatenate(samples)
-
-
-def _together(parts: Sequence[Part]) -> Mesh:
-    """The surfaces of parts as one."""
-    first = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
-    faces = [part.mesh.faces + begin for part, begin in zip(parts, first, strict=False)]
-    return Mesh(np.concatenate([part.mesh.vertices for part in parts]), np.concatenate(faces).astype(parts[0].mesh.faces.dtype))
 
 
 def _bodies(mesh: Mesh) -> Indices:

@@ -7,6 +7,7 @@ tilted, and comes off by hand.
 """
 
 from collections.abc import Sequence
+from itertools import takewhile
 from math import ceil
 
 import numpy as np
@@ -55,7 +56,10 @@ def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Be
     if layer < sections.pedestal_layers:
         beads += pedestal_beads(outline, layer, sections.pedestal_layers, process, height_mm)
     if on_plate:
-        top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in (sections.part, *sections.later))
+        own = (sections.part, *takewhile(lambda part: not part.on_platform, sections.later))  # until the next model begins
+        top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in own)
+        if sections.part.index > 1:  # where a skirt would go other models may stand
+            process = process.model_copy(update={"skirt_loops": 0})
         footprint = union([outline, supports.areas[0]])
         beads += brim(footprint, outline, sections.plate, process, top_mm=top_mm, height_mm=height_mm)
     return beads

@@ -418,6 +418,6 @@ def _part_at_table(hanging: Polygons, z_mm: float, sections: Sections) -> int | 
         return sections.part.index
     earlier = [part for part in reversed(sections.earlier) if part.base.limbs_mm is None]
     lower = next((part for part in earlier if part.base.heights_mm(under[None])[0] > 0.0), None)
-    if lower is None or lower.index == 1 or under[2] >= least_tip_height_mm(machine, lower.pose):
+    if lower is None or lower.on_platform or under[2] >= least_tip_height_mm(machine, lower.pose):
         return None
     return lower.index

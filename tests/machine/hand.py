@@ -40,7 +40,8 @@ def part(index: int, mesh: Mesh, base: Plane, pose: Pose, machine: Machine) -> P
 
 def squares(piece: Part, profile: Profile, layers: int = 3) -> SlicedPart:
     """Two squares a layer along the part's bounding box: the outer one reached with a retraction, the inner one without."""
-    process = profile.process
+    process, material = profile.process, profile.material
+    add_c = material.first_layer_nozzle_c - material.nozzle_c if piece.on_platform else 0.0
     lo, hi = piece.in_part_frame().bounds_mm
     layers_made = []
     for k in range(layers):
@@ -49,7 +50,7 @@ def squares(piece: Part, profile: Profile, layers: int = 3) -> SlicedPart:
             x0, y0, x1, y1 = lo[0] + inset * 0.45, lo[1] + inset * 0.45, hi[0] - inset * 0.45, hi[1] - inset * 0.45
             ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
             paths.append(Path(kind, ring, process.line_width_mm, 40.0, 1.0, NO_APPROACH, kind is Kind.OUTER_WALL))
-        layers_made.append(Layer.of((k + 1) * 0.2, 0.2, tuple(paths), 0.0 if k == 0 else 1.0))
+        layers_made.append(Layer.of((k + 1) * 0.2, 0.2, tuple(paths), 0.0 if k == 0 else 1.0, add_c if k == 0 else 0.0))
     return SlicedPart(piece.index, tuple(layers_made))
 
 

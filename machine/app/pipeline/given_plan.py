@@ -14,6 +14,18 @@ from profiles.part_settings import problems_of_place
 from profiles.profile import Profile, with_part_settings
 
 
+def check_alone(request: ModelRequest) -> None:
+    """Raise PlanError for what goes with a single model where there are several."""
+    if not any(name != request.model for name in request.beside):
+        return
+    named = [("--plan", request.cuts.plan), ("--planes", request.cuts.planes), ("--record", request.outputs.record)]
+    given = [f"{option} {value}" for option, value in named if value is not None]
+    given += [f"--part {settings.part}" for settings in request.profile.parts] + ["--compare"] * request.compare
+    if given:
+        models = ", ".join(dict.fromkeys((request.model, *request.beside)))
+        raise PlanError(f"{given[0]} goes with one model, here are several: {models}")
+
+
 def read_given_plan(request: ModelRequest) -> PlanFile | None:
     """The plan to cut by or the planes to start from; None: all is searched. Raises PlanError, also for options that do not go
     together."""

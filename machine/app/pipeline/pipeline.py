@@ -11,11 +11,18 @@ import numpy as np
 from machine.app.output import write_bytes
 from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
-from machine.app.pipeline.copies import check_copies, in_copies
-from machine.app.pipeline.given_plan import as_turned, check_parts_named, lays_down, read_given_plan, with_plan_settings
+from machine.app.pipeline.given_plan import (
+    as_turned,
+    check_alone,
+    check_parts_named,
+    lays_down,
+    read_given_plan,
+    with_plan_settings,
+)
 from machine.app.pipeline.memory import keep_modules, return_unused
+from machine.app.pipeline.plate import on_one_plate
 from machine.app.pipeline.pricing import pricing
-from machine.app.requests import ModelRequest
+from machine.app.requests import ModelRequest, check_copies
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
@@ -28,7 +35,7 @@ from machine.planning.plan import plan
 from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
 from machine.program import Program
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.model_file import locate
@@ -61,14 +68,26 @@ class Decomposed:
 
 
 def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed:
-    """Read a model and find its parts; repairs and notes go to stderr.
+    """Read a model and find its parts, or those of all models of a plate, each for itself; repairs and notes go to stderr.
 
     to_build: `build` comes next, the first run may compile what it needs meanwhile, and the rows of the front that need not be
-    chosen from get no time.
+    chosen from get no time. Raises PlanError where models have no room beside each other, and for what goes with one alone.
     """
     keep_modules()
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
-    check_copies(request.copies)
+    check_copies(request.copies, "--copies")
+    check_alone(request)
+    began = perf_counter()
+    models = [name for name in (request.model, *request.beside) for _ in range(request.copies)]
+    each = {name: _decompose_alone(replace(request, model=name), to_build) for name in dict.fromkeys(models)}
+    first = each[request.model]
+    profile = first.profile if len(each) == 1 else request.profile  # each lies in its own way
+    decomposition, profile = on_one_plate([each[name].decomposition for name in models], profile)
+    return replace(first, decomposition=decomposition, profile=profile, total_s=perf_counter() - began)
+
+
+def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
+    """One of the models, as if it were the only one."""
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)
     if to_build:
@@ -100,8 +119,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     for note in (*decomposition.notes, *notes):
         say(f"{request.name}: {note}")
     plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
-    decomposition, profile = in_copies(decomposition, request.copies, as_turned(profile, orientation))
-    return Decomposed(decomposition, profile, plan, read_s, perf_counter() - began)
+    return Decomposed(decomposition, as_turned(profile, orientation), plan, read_s, perf_counter() - began)
 
 
 class _Search:
@@ -179,7 +197,7 @@ def build(
         sliced = slice_parts(parts, profile, show)
         tell("planning moves")
         program = plan(decomposition, sliced, profile, stops)
-        for note in (*_too_thin(sliced, profile), *_without_pins(sliced, profile), *_left_out(program, profile)):
+        for note in (*_too_thin(sliced, profile), *_without_pins(parts, sliced, profile), *_left_out(program, profile)):
             say(f"{decomposition.name}: {note}")
         lines = write_gcode(program, profile)
         if pictures and profile.machine.thumbnails_px:
@@ -213,11 +231,11 @@ def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
             yield f"{where}, hold nothing wide enough for {nozzle}, so what is above them hangs: {wanted}"
 
 
-def _without_pins(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
+def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
     """Which parts were to have pins and have no room for any."""
-    for part in sliced:
+    for part, piece in zip(parts, sliced, strict=True):
         own = profile.of_part(part.index)
-        if part.index > 1 and own.process.interlock == "pins" and not part.pins:
+        if not part.on_platform and own.process.interlock == "pins" and not piece.pins:
             room_mm = pin_width_mm(own) + 2.0 * room_around_mm(own.process)
             deep = f"{own.process.pin_depth_mm:g} mm deep into the part below"
             yield f"no pins under part {part.index}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"

@@ -58,6 +58,8 @@ def _refuse_cuts(request: ModelRequest) -> None:
     for option, value in (("--plan", request.cuts.plan), ("--parts", request.cuts.parts)):
         if value is not None:
             raise PlanError(f"{option} {value}: {request.model} is G-code, which is cut already; it goes with a model")
+    if request.beside:
+        raise PlanError(f"{request.model} is G-code, which is a plate of its own: {request.beside[0]} cannot go beside it")
     if request.copies != 1:
         raise PlanError(f"--copies {request.copies}: {request.model} is G-code, which is sliced already; it goes with a model")
     for stop in request.stops:

@@ -1,13 +1,15 @@
 """Options: those that several commands share, alone or in groups, and what they ask for together."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from os.path import exists
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from machine.app.requests import Cuts, Given, ModelRequest, PortRequest, ProbeRequest
+from machine.app.requests import Cuts, Given, ModelRequest, PortRequest, ProbeRequest, check_copies
 
 if TYPE_CHECKING:
     from profiles.profile import Profile
@@ -30,6 +32,20 @@ def _profile_option(kind: str, otherwise: str = "") -> Any:
 
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
 ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model file, demo:NAME, or a G-code file")]
+Models = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="MODEL",
+        show_default=False,
+        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 is three of it",
+    ),
+]
+ModelsOrGcode = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as of export, or a G-code file"
+    ),
+]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", "; else the G-code file's own")]
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
@@ -102,7 +118,7 @@ class ProgramOptions(SearchOptions):
         list[str] | None,
         typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
     ] = None
-    copies: Annotated[int, typer.Option("--copies", metavar="N", help="so many on the plate, of a model printed in one part")] = 1
+    copies: Annotated[int, typer.Option("--copies", metavar="N", help="so many of each model on the plate")] = 1
 
 
 @dataclass(frozen=True)
@@ -147,6 +163,19 @@ class ModelProfileOptions(ProfileOptions):
     process: Annotated[str, _profile_option("process")] = Given.process
 
 
+def named_models(models: list[str]) -> list[str]:
+    """The models of a plate as often as they are to stand there: MODEL:N is a model N times. Raises PlanError."""
+    named: list[str] = []
+    for text in models:
+        counted = re.fullmatch(r"(.+[^:]):(\d{1,9})", text)
+        if counted is None or exists(text):
+            named.append(text)
+            continue
+        check_copies(int(counted[2]), f"the number of {counted[1]}")
+        named += int(counted[2]) * [counted[1]]
+    return named
+
+
 def check_model(model: str) -> None:
     """Refuse what is no model file before the command is loaded, which takes a second. Raises MeshError."""
     from mdp.model_file import check_file, locate
@@ -160,12 +189,14 @@ def model_request(model: str, search: SearchOptions, given: ProfileOptions, **fu
     return ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names, **further)
 
 
-def program_request(model: str, program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
-    """What is asked for of a model's program, or of a G-code file. Raises SliceError, ProfileError."""
+def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
+    """What is asked for of the program of models on a plate, or of a G-code file. Raises PlanError, SliceError, ProfileError."""
     from machine.planning.stops import parse_stops
 
     stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(program.plan, program.parts)
-    return model_request(model, program, given, cuts=cuts, stops=stops, copies=program.copies, **further)
+    first, *others = named_models(models)
+    plate = {"copies": program.copies, "beside": tuple(others)}
+    return model_request(first, program, given, cuts=cuts, stops=stops, **plate, **further)
 
 
 def machine_profile(machine: str | None, settings: list[str] | None = None) -> "Profile":

@@ -12,7 +12,7 @@ import numpy as np
 
 from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
 from machine.dryrun.findings import Finding, at_row
-from machine.dryrun.strokes import Beads, lengths_of
+from machine.dryrun.strokes import Beads, lengths_of, parts_on_plate
 from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose, rotation
@@ -110,9 +110,12 @@ def findings(program: ParsedProgram, balances: Sequence[InterfaceBalance], profi
 
 def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Interface]:
     """The interface of every part that stands on others, in print order."""
+    on_plate = parts_on_plate(program, deposited)
     (part, layer), remark = program.remarks[:2], program.remark[deposited.rows]
     own = ~np.isin(program.remarks.type, [k for k, name in enumerate(program.types) if name in NO_PART]) & (part > 0)
     for index in np.unique(part[remark[own[remark]]])[1:].tolist():
+        if index in on_plate:
+            continue
         mine = np.flatnonzero((own & (part == index))[remark])
         first = mine[layer[remark[mine]] == layer[remark[mine]].min()]
         turn = rotation(profile.machine, Pose(*program.end[deposited.rows[first[0]], 3:].tolist()))

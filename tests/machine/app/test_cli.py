@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from machine.app import start
@@ -77,6 +78,20 @@ WRONG = [
     (["export", "demo:tree", "-o", "x.gcode", "--part", "walls=4"], "--part walls=4: PART:KEY=VALUE,... is expected"),
     (["export", "demo:tree", "-o", "x.gcode", "--part", "2:walls=-4"], "part 2: process.walls is -4: it must be a whole number"),
     (["export", "demo:tree", "-o", "x.gcode", "--copies", "0"], "--copies is 0: 1 to 1000 is allowed"),
+    (["export", "demo:tree:0", "-o", "x.gcode"], "the number of demo:tree is 0: 1 to 1000 is allowed"),
+    (["export", "demo:tree", "nowhere.stl:2", "-o", "x.gcode"], "nowhere.stl: there is no such file"),
+    (
+        ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--plan", "box.toml"],
+        "--plan box.toml goes with one model, here are",
+    ),
+    (
+        ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--part", "1:walls=4"],
+        "--part 1 goes with one model, here are several",
+    ),
+    (
+        ["simulate", "short.gcode", "demo:tree"],
+        "short.gcode is G-code, which is a plate of its own: demo:tree cannot go beside it",
+    ),
     (["simulate", "short.gcode", "--copies", "2"], "--copies 2: short.gcode is G-code, which is sliced already"),
     (["export", "demo:tree", "-o", "x.gcode", "--pause", "2"], "--pause 2: PART:LAYER or PART:HEIGHTmm is expected"),
     (["simulate", "short.gcode", "--filament-change", "1:2"], "--filament-change 1:2: short.gcode is G-code, which says itself"),
@@ -237,6 +252,20 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
         "axes", "interfaces", "findings",
     }  # fmt: skip
     assert first == again
+
+
+def test_several_models_are_exported_as_one_plate_and_a_number_stands_for_copies(folder: Path) -> None:
+    Path("large.stl").write_bytes(stl(shapes.box(30, 20, 2)))
+    Path("small.stl").write_bytes(stl(shapes.box(10, 10, 1)))
+    plate = ["--as-is", *FAST, "--set", "process.skirt_loops=0"]
+    assert main(["export", "large.stl", "small.stl:2", *plate, "-o", "a.gcode", "--json", "a.json"]) == 0
+    assert main(["export", "large.stl", "small.stl", "small.stl", *plate, "-o", "b.gcode"]) == 0
+    assert Path("a.gcode").read_bytes() == Path("b.gcode").read_bytes()
+    figures = json.loads(Path("a.json").read_text())
+    assert (figures["parts"], [finding["code"] for finding in figures["findings"]]) == (1, ["uncalibrated"])
+    assert np.ptp(figures["bounds_mm"], axis=0)[1] == pytest.approx(0.6 * (10 + 20 + 10) + 2 * 5, abs=0.7)  # a line less
+    assert main(["simulate", "large.stl", "small.stl:2", *plate, "--json", "model.json"]) == 0
+    assert json.loads(Path("model.json").read_text())["model"]["outside"] == 0.0
 
 
 @pytest.mark.parametrize("turned", [[], ["--set", "process.rotate_deg=[0, 30, 20]", "--orient"], ["--as-is"]])

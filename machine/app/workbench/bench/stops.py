@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from machine.app.pipeline.copies import MOST
+from machine.app.requests import MOST_COPIES
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.values import Asked, whole
 from machine.planning.stops import parse_stops
@@ -34,5 +34,14 @@ def remove_stop(bench: Bench, asked: Asked) -> Bench:
 
 def set_copies(bench: Bench, asked: Asked) -> Bench:
     """So many copies (`count`) on the plate. Raises PlanError."""
-    count = whole({"--copies": asked.get("count")}, "--copies", 1, MOST)  # as the option is refused
+    count = whole({"--copies": asked.get("count")}, "--copies", 1, MOST_COPIES)  # as the option is refused
     return bench if count == bench.copies else replace(bench, copies=count)
+
+
+def check_one_piece(bench: Bench) -> None:
+    """Raise PlanError for copies of a model in several parts, whose places are known only once it is cut."""
+    if bench.copies > 1 and bench.parts > 1 and bench.model is not None:
+        name = bench.model.name
+        raise PlanError(
+            f"--copies {bench.copies}: {name} is cut into {bench.parts} parts, copies are printed in one piece each: --parts 1"
+        )

@@ -4,17 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machine.app.pipeline.copies import places_of_copies
+from machine.app.pipeline.plate import places_of
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import mesh_blocks
+from machine.app.workbench.bench.stops import check_one_piece
 from machine.app.workbench.bench.values import vector_of
 from machine.app.workbench.work.cutting import turned_mesh
 from machine.app.workbench.work.pieces import out_of_reach
 from machine.planning.fit import Place
+from mdp.decomposition import Decomposition
 from mdp.kernels.workers import Tell
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.pedestal import on_pedestal, pedestal_under
+from mdp.ranking.ranker import CLASSIC
 from mdp.search.parts import one_piece
 from profiles.errors import MeshError, PlanError
 from profiles.frozen import Vector
@@ -59,8 +62,11 @@ def _copies(mesh: Mesh, bench: Bench) -> tuple[tuple[Place, ...], str]:
     """Where the copies stand, and why they cannot."""
     if bench.copies == 1 or bench.model is None:
         return (MIDDLE,), ""
+    machine, (x, y) = bench.profile.machine, bench.profile.process.place_mm
+    whole = Decomposition(bench.model.name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
     try:
-        places, _ = places_of_copies(mesh, bench.model.name, bench.parts, bench.copies, bench.profile)
+        check_one_piece(bench)
+        places, _ = places_of([whole] * bench.copies, bench.profile)
     except PlanError as error:
         return (MIDDLE,), str(error)
-    return tuple(places), ""
+    return tuple((at_x - x, at_y - y) for at_x, at_y in places), ""

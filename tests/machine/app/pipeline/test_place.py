@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from machine.app.pipeline.comparison import compare_with_one_part
-from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
+from machine.app.pipeline.plate import on_one_plate
 from machine.dryrun.conformity.agreement import agreement
-from machine.planning.fit import places_on_plate, standing_at
+from machine.planning.arrange import places_on_plate
+from machine.planning.fit import standing_at
 from mdp.decomposition import Decomposition
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.by_plan import cut_by_plan
@@ -92,5 +93,6 @@ def test_copies_stand_about_the_place_and_where_they_have_no_room_there_anywhere
     near = np.array(places_on_plate((20.0, 20.0), 5.0, 4, machine, (30.0, 10.0)))
     assert near.mean(axis=0) == pytest.approx([30.0, 10.0])
     assert len(places_on_plate((20.0, 20.0), 5.0, 37, machine, (60.0, 0.0))) == 37
-    many, _ = in_copies(Decomposition("box", box(), (whole(box()),), 1, "classic", 0.0, 0.0, 0, 0, 0.0), 4, at(30, 10))
+    model = Decomposition("box", box(), (whole(box()),), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    many, _ = on_one_plate([model] * 4, at(30, 10))
     assert standing_at(many, (30.0, 10.0)).mesh.bounds_mm[:, :2].mean(axis=0) == pytest.approx([30.0, 10.0])

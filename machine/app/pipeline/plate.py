@@ -1,0 +1,166 @@
+"""Plate: several models on one plate, copies of one among them: where they stand, in which order their parts are printed.
+
+Layer by layer: the first parts of all models are one part of the print, the others follow one after the other, as limbs that are
+printed beside what stands. Or one model after the other (process.complete_objects): then the first parts are such limbs, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from machine.planning.arrange import Misfit, arrange
+from machine.planning.fit import Place, standing_at
+from machine.planning.passing import Passing
+from mdp.cost.footing import tips_over
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Mesh, together
+from mdp.overhang import Mask
+from mdp.plane import Plane
+from mdp.pose import Pose, rotation
+from mdp.topology.cross_section import cross_sections
+from mdp.zone import Marked
+from profiles.errors import PlanError
+from profiles.machine import Machine
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.geometry.polygons import clean
+
+GAP_MM = 5.0  # between models, or between their brims
+
+
+def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Decomposition, Profile]:
+    """Models side by side about their place on the plate as one print, and what it is printed with. Copies of a model are one and
+    the same value. Settings of single parts hold for those of every model.
+
+    Raises PlanError for models that the plate, or the head beside the others, has no room for.
+    """
+    if len(models) == 1:
+        return models[0], profile
+    places, passing = places_of(models, profile)
+    x, y = profile.process.place_mm  # all are moved to that place together
+    moved = [standing_at(model, (at_x - x, at_y - y)) for model, (at_x, at_y) in zip(passing.models, places, strict=True)]
+    parts = [_first_of_all([moved[k].parts[n] for k, n in passing.together])] if passing.together else []
+    for (k, n), pose in zip(passing.alone, passing.poses(dict(enumerate(places))), strict=True):
+        parts.append(_beside(moved[k].parts[n], len(parts) + 1, pose, profile.machine))
+    numbers = [*([1] if passing.together else []), *(n + 1 for _, n in passing.alone)]
+    settings = [
+        given.model_copy(update={"part": number})
+        for number, own in enumerate(numbers, start=1)
+        for given in profile.parts
+        if given.part == own
+    ]
+    process = profile.process
+    if passing.together:
+        process = process.model_copy(update={"brim_mm": passing.brim_mm})  # judged alone: together they stand wider
+    return _one_print(moved, parts), profile.model_copy(update={"process": process, "parts": settings})
+
+
+def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[Place], Passing]:
+    """Where the middles of models stand on the plate, and in which order the head prints their parts there. Raises PlanError."""
+    about_axis = {model: _about_axis(model) for model in models}
+    lowest_first = sorted(range(len(models)), key=lambda k: (float(models[k].mesh.bounds_mm[1, 2]), k))
+    together = [] if profile.process.complete_objects else [(k, 0) for k in range(len(models))]
+    alone = [(k, n) for k in lowest_first for n in range(1 if together else 0, len(models[k].parts))]
+    passing = Passing([about_axis[model] for model in models], together, alone, profile, _brim_mm(models, profile))
+    gap_mm = _gap_mm(profile.process, passing.brim_mm)
+    sizes = [_size_mm(model.mesh) for model in models]
+    found = arrange(sizes, gap_mm, profile.machine, profile.process.place_mm, passing.is_clear)
+    if isinstance(found, Misfit):
+        raise PlanError(_reason(found, models, sizes, gap_mm, profile))
+    return found, passing
+
+
+def _about_axis(model: Decomposition) -> Decomposition:
+    """A model moved so that the middle of its box is at the turn axis."""
+    x, y = model.mesh.bounds_mm[:, :2].mean(axis=0).tolist()
+    return standing_at(model, (-x, -y))
+
+
+def _brim_mm(models: Sequence[Decomposition], profile: Profile) -> float:
+    """Width of the brim that all models have, or those that would tip over alone."""
+    process = profile.process
+    small = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0
+    if small and any(_tips_over(model.mesh, profile) for model in dict.fromkeys(models)):
+        return process.small_base_brim_mm
+    return process.brim_mm
+
+
+def _tips_over(mesh: Mesh, profile: Profile) -> bool:
+    """Whether a model alone would tip off the plate."""
+    base = cross_sections(mesh, np.array([0.5 * profile.process.first_layer_height_mm]))[0]
+    return tips_over(clean(base), float(mesh.bounds_mm[1, 2]))
+
+
+def _gap_mm(process: Process, brim_mm: float) -> float:
+    """What is kept between the boxes of models."""
+    skirt_mm = process.skirt_distance_mm + (process.skirt_loops + 1) * process.line_width_mm
+    if process.complete_objects and brim_mm == 0.0 and process.skirt_loops:  # round the first model alone
+        return max(GAP_MM, skirt_mm)
+    return GAP_MM + 2.0 * brim_mm
+
+
+def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[Place], gap_mm: float, profile: Profile) -> str:
+    """Why models do not go on the plate together, in a sentence."""
+    (width, depth), alike = sizes_mm[misfit.number], len(dict.fromkeys(models)) == 1
+    what = f"{models[misfit.number].name} measures {width:.1f} x {depth:.1f} mm, the plate of {profile.machine.name} has"
+    if alike:
+        what = f"--copies {len(models)}: {what}"
+    if misfit.is_met:
+        others = "another one" if misfit.standing == 1 else f"{misfit.standing} others"
+        wanted = "--parts 1 prints each in one piece, all layer by layer"
+        if profile.process.complete_objects:
+            wanted = "process.complete_objects = false prints them layer by layer"
+        return f"{what} no place beside {others} at which the head passes what stands while it prints: {wanted}"
+    if alike:
+        return f"{what} room for {misfit.standing} with {gap_mm:g} mm between them"
+    return f"{what} no room for it beside {misfit.standing} other model(s), {gap_mm:g} mm from each"
+
+
+def _size_mm(mesh: Mesh) -> Place:
+    width, depth = np.ptp(mesh.vertices[:, :2], axis=0).tolist()
+    return width, depth
+
+
+def _first_of_all(parts: Sequence[Part]) -> Part:
+    """The first parts of several models as one."""
+    mesh = together([part.mesh for part in parts])
+    return replace(
+        parts[0],
+        mesh=mesh,
+        volume_mm3=mesh.volume_mm3,
+        risky_area_mm2=sum(part.risky_area_mm2 for part in parts),
+        needing=_joined([part.needing for part in parts]),
+        needing_upright=_joined([part.needing_upright for part in parts]),
+        no_seam=Marked.together([(part.no_seam, len(part.mesh.faces)) for part in parts]),
+        no_support=Marked.together([(part.no_support, len(part.mesh.faces)) for part in parts]),
+        support=Marked.together([(part.support, len(part.mesh.faces)) for part in parts]),
+        modifiers=tuple(modifier for part in parts for modifier in part.modifiers),
+    )
+
+
+def _joined(masks: Sequence[Mask | None]) -> Mask | None:
+    given = [mask for mask in masks if mask is not None]
+    return np.concatenate(given) if len(given) == len(masks) else None
+
+
+def _beside(part: Part, index: int, pose: Pose, machine: Machine) -> Part:
+    """A part that is printed alone, where others stand: a limb, but for the very first one."""
+    base = part.base
+    if index > 1 and base.limbs_mm is None:
+        base = Plane(base.normal, base.offset_mm, part.mesh.vertices[[int(np.argmax(base.heights_mm(part.mesh.vertices)))]])
+    return replace(part, index=index, base=base, pose=pose, rotation=rotation(machine, pose))
+
+
+def _one_print(models: Sequence[Decomposition], parts: Sequence[Part]) -> Decomposition:
+    """The models of a plate as one."""
+    return replace(
+        models[0],
+        name=", ".join(dict.fromkeys(model.name for model in models)),
+        mesh=together([model.mesh for model in models]),
+        parts=tuple(parts),
+        risky_area_mm2=sum(model.risky_area_mm2 for model in models),
+        residual_area_mm2=sum(model.residual_area_mm2 for model in models),
+        folded_mm3=sum(model.folded_mm3 for model in models),
+        front=(),
+    )
