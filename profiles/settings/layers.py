@@ -59,5 +59,5 @@ class Layers(Frozen):
         "model, 0.049 heals coarser meshes, mm",
     )
     resolution_mm: float = Field(
-        0.025, ge=0, le=0.5, description="no printed path leaves the one that is worked out by more than this, mm"
+        0.02, ge=0, le=0.5, description="no printed path leaves the one that is worked out by more than this, mm"
     )

@@ -21,7 +21,7 @@ from slicer.bead import (
     spacing_mm,
     varying,
 )
-from slicer.geometry.polygons import RESOLUTION_MM, Polygons, contours, islands, larger, offset, offset_round, opening, strips
+from slicer.geometry.polygons import Polygons, contours, islands, larger, offset, offset_round, opening, strips
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 from slicer.walls.skeleton import ROOM, SPLIT, Rule
@@ -32,6 +32,7 @@ NARROW = 0.1  # of the line width: what walls leave that is narrower than that i
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner
 LEAST_REST = 0.12  # of the line width: narrower places without a core behind them are corners, which walls run into
 LEAST_REST_MM2 = 1e-3  # smaller areas are rounding
+CORE_MM = 0.0125  # by which what the walls so far enclose is simplified
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
 RANK = 1  # behind walls, which have 0 and less
 LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
@@ -129,7 +130,7 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
         line = offset(area, -half)
         core = offset(line, -behind)
         levels.append(tuple(contours(_backed(area, line, core, half_mm=half, behind_mm=behind, least_mm=least_mm))))
-        area = core.simplify(RESOLUTION_MM)
+        area = core.simplify(CORE_MM)
         if core.is_empty():
             break
     core = offset(area, -spacing)
@@ -152,7 +153,7 @@ def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, b
 
 def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polygons:
     """What the walls leave inside, where it has room for more than one bead."""
-    inside = offset_round(section, -_wall_mm(rule)).simplify(RESOLUTION_MM)
+    inside = offset_round(section, -_wall_mm(rule)).simplify(CORE_MM)
     middle = [wall.course for wall in varying if wall.level == rule.walls]
     if middle:
         reach_mm = [0.25 * (course[1:, 2] + course[:-1, 2]) for course in middle]

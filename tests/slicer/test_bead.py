@@ -81,4 +81,4 @@ def test_walls_of_a_fine_mesh_have_no_specks() -> None:
     for path in of_kind(slice_part(column, profile(*SOLID)), Kind.OUTER_WALL, Kind.INNER_WALL):
         lengths = np.hypot(*np.diff(path.points, axis=0).T)
         assert (lengths < 0.1).sum() <= 1, "but for the rest before the seam"
-        assert np.ptp(np.hypot(*path.points[1:-1].T)) < 0.025
+        assert np.ptp(np.hypot(*path.points[1:-1].T)) < 0.02

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from mdp.topology.cross_section import cross_sections
 from slicer.bead import spacing_mm
-from slicer.geometry.polygons import RESOLUTION_MM, Polygons
+from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, bead_area_mm2
 from slicer.shells import wall_beads
-from slicer.walls.walls import walls
+from slicer.walls.walls import CORE_MM, walls
 from tests.slicer.hand import distances_mm, profile, section_at, shared
 
 WIDTH, HEIGHT = 0.45, 0.2
@@ -61,7 +61,7 @@ def test_walls_stay_inside_any_polygon(points: Points) -> None:
     polygon = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(2.0, 24)
     for level, loops in enumerate(walls(polygon, 3, PROCESS, HEIGHT).loops):
         for loop in loops:
-            coarse = 0.01 + level * RESOLUTION_MM
+            coarse = 0.01 + level * CORE_MM
             assert distances_mm(polygon, loop).min() > WIDTH / 2 + level * SPACING - coarse
 
 
