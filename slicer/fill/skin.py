@@ -62,18 +62,23 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
     """The lines that fill an area, those of each connected piece spread evenly, and the places that they leave in each.
 
     The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
-    it; but lines still touch each other in narrow places, which are all line ends.
+    it. Where lines would no longer touch each other for that, in narrow places that are all line ends, they do not reach into the
+    walls.
     """
     spacing, width_mm, in_order = solid.spacing_mm, solid.width_mm, solid.pattern == "monotonic"
     beads, rests = list[Bead](), list[Polygons]()
     least_flow = 1.0 + TOUCHING - solid.height_mm * ROUND_SIDES / spacing
     for island in islands(area):
-        lines = _lines(offset(island, -(0.5 * spacing - solid.overlap * width_mm)), solid)
-        rest = uncovered_area(island, lines, width_mm)
+        for overlap in (solid.overlap, 0.0):
+            lines = _lines(offset(island, -(0.5 * spacing - overlap * width_mm)), solid)
+            rest = uncovered_area(island, lines, width_mm)
+            total = sum(length_mm(line) for line in lines)
+            flow = (island.area() - rest.area()) / (total * spacing) if total > 0 else 0.0
+            if flow >= least_flow or total <= 0:
+                break
         rests.append(rest)
-        total = sum(length_mm(line) for line in lines)
         if total > 0:
-            flow = min(max((island.area() - rest.area()) / (total * spacing), least_flow), MOST_FLOW)
+            flow = min(max(flow, least_flow), MOST_FLOW)
             beads += [Bead(kind, line, width_mm, RANK, flow, follows=in_order and k > 0) for k, line in enumerate(lines)]
     return beads, rests
 
