@@ -54,15 +54,36 @@ def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -
 
 
 def combined(places: Sequence[Place], keys: Collection[str]) -> list[Place]:
-    """The places in which some keys have values of their own. Where some meet there is a further one with the values of all: the
-    last place at a point has all that hold there."""
+    """The places in which some keys have values of their own, each with all that hold there: none overlaps another, and no two
+    have the same values."""
     found = list[Place]()
     for place in places:
         settings = {key: value for key, value in place.settings.items() if key in keys}
         if settings:
-            new = Place(settings, place.areas)
-            found += [new, *(both for old in found if (both := _overlap(old, new)) is not None)]
+            found = _with_place(found, Place(settings, place.areas))
     return found
+
+
+def _with_place(found: Sequence[Place], new: Place) -> list[Place]:
+    """Places that do not overlap, with one that lies over them: where they meet, its values replace theirs."""
+    pieces, alone = list[Place](), list(new.areas)
+    for old in found:
+        both = [a ^ b for a, b in zip(old.areas, new.areas, strict=True)]
+        if all(area.is_empty() for area in both):
+            pieces.append(old)
+            continue
+        pieces.append(Place(old.settings, [a - b for a, b in zip(old.areas, both, strict=True)]))
+        pieces.append(Place({**old.settings, **new.settings}, both))
+        alone = [a - b for a, b in zip(alone, both, strict=True)]
+    merged = list[Place]()
+    for piece in (*pieces, Place(new.settings, alone)):
+        same = next((k for k, place in enumerate(merged) if place.settings == piece.settings), None)
+        if same is None:
+            merged.append(piece)
+        else:
+            areas = [union([a, b]) for a, b in zip(merged[same].areas, piece.areas, strict=True)]
+            merged[same] = Place(piece.settings, areas)
+    return [place for place in merged if any(not area.is_empty() for area in place.areas)]
 
 
 def _check(process: Process, settings: Mapping[str, Any]) -> None:
@@ -80,13 +101,6 @@ def _areas(part: Part, modifiers: Sequence[Modifier], mesh: Mesh, cuts_mm: Float
     meshes = [volume.mesh if isinstance(volume, MeshVolume) else convex_hull(volume.corners) for volume in volumes]
     sections = [cross_sections(own.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm)), cuts_mm) for own in meshes]
     return [union([clean(loops, 0.0) for loops in layer]) ^ window for layer in zip(*sections, strict=True)]
-
-
-def _overlap(old: Place, new: Place) -> Place | None:
-    """Where two places meet; None where they do not, or the later one's values are all."""
-    settings = {**old.settings, **new.settings}
-    areas = [] if settings == new.settings else [a ^ b for a, b in zip(old.areas, new.areas, strict=True)]
-    return Place(settings, areas) if any(not area.is_empty() for area in areas) else None
 
 
 def most_shell_layers(process: Process, places: Sequence[Place]) -> tuple[int, int]:
@@ -123,14 +137,14 @@ class WallCounts:
         """What of an area has more walls than a level, so far from where it has fewer."""
         if all(count > level for count in self.all):
             return within
-        shrunk = [(offset(area, -short_mm if count > level else short_mm), count) for area, count in self.others]
-        return WallCounts(self.usual, shrunk).overlaid(lambda count: within if count > level else Polygons())
+        fewer = self.overlaid(lambda count: Polygons() if count > level else within)
+        return within - offset(fewer, short_mm)
 
 
 def wall_counts(section: Polygons, layer: int, walls: int, more: int, places: Sequence[Place]) -> WallCounts:
-    """The walls of a section of a layer: the process's, or those of places; more: all have so many more."""
+    """The walls of a section of a layer: the process's, or those of places, combined by that key; more: all have so many more."""
     usual, others = walls + more, list[tuple[Polygons, int]]()
-    for place in combined(places, ["walls"]):
+    for place in places:
         count, area_mm2 = place.settings["walls"] + more, (section ^ place.areas[layer]).area()
         if section.area() - area_mm2 < LEAST_MM2:
             usual, others = count, []

@@ -40,8 +40,8 @@ class Passing:
         self._hulls: dict[Part, Floats] = {}
         self._known: dict[tuple[object, ...], bool] = {}
 
-    def is_clear(self, model: int, places: Mapping[int, Place]) -> bool:
-        """Whether the parts of a model and of those others that have places can be printed there."""
+    def is_clear(self, places: Mapping[int, Place]) -> bool:
+        """Whether the parts of the models that have places can be printed there."""
         return all(self._allowed(number, places) for number, (k, _) in enumerate(self.alone) if k in places)
 
     def poses(self, places: Mapping[int, Place]) -> list[Pose]:

@@ -145,7 +145,7 @@ def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indic
         long = np.hypot(nodes[k, 0] - nodes[p, 0], nodes[k, 1] - nodes[p, 1])
         if left >= long:
             children[p] -= 1
-            cut[p] = left - long
+            cut[p] = min(cut[p], left - long) if cut[p] >= 0.0 else left - long  # of its branches the longest counts
             continue
         keep[k] = True
         for axis in range(2):

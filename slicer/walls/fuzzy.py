@@ -18,6 +18,7 @@ from slicer.geometry.polygons import Polygons, area_mm2, offset, union
 from slicer.paths import Kind
 
 SPREAD = 0.25  # of the distance of points: as much nearer or farther
+FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays even, or nothing would be left of it
 
 
 def fuzzy_walls(beads: Sequence[Bead], process: Process, joints: Sequence[Polygons], seed: tuple[int, int]) -> list[Bead]:
@@ -49,6 +50,8 @@ def _roughened(points: Floats, process: Process, even: EdgeIndex, seed: tuple[in
     most = int(along[-1] / ((1.0 - SPREAD) * apart_mm)) + 1
     sampled = np.cumsum(apart_mm * random.uniform(1.0 - SPREAD, 1.0 + SPREAD, most))
     sampled = sampled[sampled < along[-1] - (1.0 - SPREAD) * apart_mm]
+    if len(sampled) < FEWEST:
+        return points
     moved_mm = process.fuzzy_skin_thickness_mm * random.uniform(-1.0, 1.0, len(sampled))
     step = np.minimum(np.searchsorted(along, sampled, side="right") - 1, len(steps) - 1)
     lengths = np.maximum(np.diff(along), 1e-9)

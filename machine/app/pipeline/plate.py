@@ -58,7 +58,7 @@ def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Dec
 
 def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[Place], Passing]:
     """Where the middles of models stand on the plate, and in which order the head prints their parts there. Raises PlanError."""
-    about_axis = {model: _about_axis(model) for model in models}
+    about_axis = {model: _about_axis(model) for model in dict.fromkeys(models)}
     lowest_first = sorted(range(len(models)), key=lambda k: (float(models[k].mesh.bounds_mm[1, 2]), k))
     together = [] if profile.process.complete_objects else [(k, 0) for k in range(len(models))]
     alone = [(k, n) for k in lowest_first for n in range(1 if together else 0, len(models[k].parts))]
@@ -114,7 +114,10 @@ def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[
         return f"{what} no place beside {others} at which the head passes what stands while it prints: {wanted}"
     if alike:
         return f"{what} room for {misfit.standing} with {gap_mm:g} mm between them"
-    return f"{what} no room for it beside {misfit.standing} other model(s), {gap_mm:g} mm from each"
+    if misfit.standing == 0:
+        return f"{what} no room for it"
+    beside = "another model" if misfit.standing == 1 else f"{misfit.standing} other models"
+    return f"{what} no room for it {gap_mm:g} mm from {beside}"
 
 
 def _size_mm(mesh: Mesh) -> Place:

@@ -201,7 +201,7 @@ def test_a_model_without_room_is_named_with_the_room_that_it_needs() -> None:
     models.append(decomposed(whole(box(40, 160, 3)), name="long"))
     with pytest.raises(PlanError) as refused:
         on_one_plate(models, plate())
-    sentence = "second measures 90.0 x 90.0 mm, the plate of generic A/C table has no room for it beside 1 other model(s)"
+    sentence = "second measures 90.0 x 90.0 mm, the plate of generic A/C table has no room for it 5 mm from another model"
     assert str(refused.value).startswith(sentence)
 
 
