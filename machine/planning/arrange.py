@@ -1,5 +1,5 @@
-"""Arrangement: where models stand on the plate: those of one size in rows and columns, others one after the other, the largest
-first, each as near to the plate's place for them as it may.
+"""Arrangement: where models stand on the plate: those of one size in rows and columns, others one by one, the largest first, each
+as near as possible to the place that the plate has for them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
