@@ -170,14 +170,16 @@ class MeshVolume:
 
 @dataclass(frozen=True)
 class Modifier:
-    """A volume inside which other values of the process hold, by their keys."""
+    """A volume inside which other values of the process hold, by their keys. room: a box around its model, outside of which are
+    others that it does not change; None: there are no others."""
 
     volume: Zone | MeshVolume
     process: dict[str, Any]
+    room: Zone | None = None
 
     def moved(self, shift_mm: Vector) -> "Modifier":
         """The same somewhere else."""
-        return replace(self, volume=self.volume.moved(shift_mm))
+        return replace(self, volume=self.volume.moved(shift_mm), room=None if self.room is None else self.room.moved(shift_mm))
 
 
 @dataclass(frozen=True)

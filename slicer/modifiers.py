@@ -15,7 +15,7 @@ from mdp.cut import convex_hull
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.topology.cross_section import cross_sections
-from mdp.zone import MeshVolume, Modifier
+from mdp.zone import MeshVolume, Modifier, Zone
 from profiles.errors import SliceError
 from profiles.part_settings import process_of_part
 from profiles.process import Process
@@ -23,7 +23,7 @@ from slicer.geometry.polygons import Polygons, clean, closing, offset, union
 from slicer.heights import SHELL_KEYS, shell_layers
 
 AROUND_MM = 5.0  # beside a part, which is more than its outlines may reach beyond its mesh
-LEAST_MM2 = 0.01  # of a layer: less of it is no place
+LEAST_MM2 = 0.01  # smaller areas of a layer are rounding
 SLIT_MM = 0.001  # places that meet are joined over the rounding of their borders
 
 
@@ -54,15 +54,36 @@ def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -
 
 
 def combined(places: Sequence[Place], keys: Collection[str]) -> list[Place]:
-    """The places in which some keys have values of their own. Where some meet there is a further one with the values of all: the
-    last place at a point has all that hold there."""
+    """The places in which some keys have values of their own, each with all that hold there: none overlaps another, and no two
+    have the same values."""
     found = list[Place]()
     for place in places:
         settings = {key: value for key, value in place.settings.items() if key in keys}
         if settings:
-            new = Place(settings, place.areas)
-            found += [new, *(both for old in found if (both := _overlap(old, new)) is not None)]
+            found = _with_place(found, Place(settings, place.areas))
     return found
+
+
+def _with_place(found: Sequence[Place], new: Place) -> list[Place]:
+    """Places that do not overlap, with one that lies over them: where they meet, its values replace theirs."""
+    pieces, alone = list[Place](), list(new.areas)
+    for old in found:
+        both = [a ^ b for a, b in zip(old.areas, new.areas, strict=True)]
+        if all(area.is_empty() for area in both):
+            pieces.append(old)
+            continue
+        pieces.append(Place(old.settings, [a - b for a, b in zip(old.areas, both, strict=True)]))
+        pieces.append(Place({**old.settings, **new.settings}, both))
+        alone = [a - b for a, b in zip(alone, both, strict=True)]
+    merged = list[Place]()
+    for piece in (*pieces, Place(new.settings, alone)):
+        same = next((k for k, place in enumerate(merged) if place.settings == piece.settings), None)
+        if same is None:
+            merged.append(piece)
+        else:
+            areas = [union([a, b]) for a, b in zip(merged[same].areas, piece.areas, strict=True)]
+            merged[same] = Place(piece.settings, areas)
+    return [place for place in merged if any(not area.is_empty() for area in place.areas)]
 
 
 def _check(process: Process, settings: Mapping[str, Any]) -> None:
@@ -73,30 +94,32 @@ def _check(process: Process, settings: Mapping[str, Any]) -> None:
 
 
 def _areas(part: Part, modifiers: Sequence[Modifier], mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
-    """What volumes have of each layer, near the part."""
+    """The sections of volumes in each layer, near the part."""
     (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
     window = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
-    volumes = [modifier.volume for modifier in modifiers]
-    meshes = [volume.mesh if isinstance(volume, MeshVolume) else convex_hull(volume.corners) for volume in volumes]
-    sections = [cross_sections(own.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm)), cuts_mm) for own in meshes]
-    return [union([clean(loops, 0.0) for loops in layer]) ^ window for layer in zip(*sections, strict=True)]
+    sections = [_sections(part, modifier.volume, cuts_mm) for modifier in modifiers]
+    for k, modifier in enumerate(modifiers):
+        if modifier.room is not None:
+            rooms = _sections(part, modifier.room, cuts_mm)
+            sections[k] = [area ^ room for area, room in zip(sections[k], rooms, strict=True)]
+    return [union(layer) ^ window for layer in zip(*sections, strict=True)]
 
 
-def _overlap(old: Place, new: Place) -> Place | None:
-    """Where two places meet; None where they do not, or the later one's values are all."""
-    settings = {**old.settings, **new.settings}
-    areas = [] if settings == new.settings else [a ^ b for a, b in zip(old.areas, new.areas, strict=True)]
-    return Place(settings, areas) if any(not area.is_empty() for area in areas) else None
+def _sections(part: Part, volume: Zone | MeshVolume, cuts_mm: Floats) -> list[Polygons]:
+    """The sections of one volume in each layer of a part."""
+    mesh = volume.mesh if isinstance(volume, MeshVolume) else convex_hull(volume.corners)
+    in_part = mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
+    return [clean(loops, 0.0) for loops in cross_sections(in_part, cuts_mm)]
 
 
 def most_shell_layers(process: Process, places: Sequence[Place]) -> tuple[int, int]:
-    """Solid layers under and over a surface, as many as the process or any place has."""
+    """The number of solid layers under and over a surface: the most that the process or any place has."""
     counts = [shell_layers(own) for own in (process, *(place.over(process) for place in combined(places, SHELL_KEYS)))]
     return max(top for top, _ in counts), max(bottom for _, bottom in counts)
 
 
 def overlaid(base: Polygons, others: Sequence[tuple[Polygons, Polygons]]) -> Polygons:
-    """An area that in some places is another one; the last of them that has a place wins. others: places, and what is there."""
+    """An area with others in its place within some places; where places overlap the last one wins. others: places and areas."""
     there = [(place, area) for place, area in others if not place.is_empty()]
     for place, area in there:
         base = (base - place) + (area ^ place)
@@ -105,7 +128,7 @@ def overlaid(base: Polygons, others: Sequence[tuple[Polygons, Polygons]]) -> Pol
 
 @dataclass(frozen=True, eq=False)
 class WallCounts:
-    """How many walls a layer has, and the areas where it has another number, the last of which wins."""
+    """How many walls a layer has, and the areas in which it has another number; where they overlap the last one wins."""
 
     usual: int
     others: Sequence[tuple[Polygons, int]] = ()
@@ -120,17 +143,17 @@ class WallCounts:
         return overlaid(of_count(self.usual), [(area, of_count(count)) for area, count in self.others])
 
     def where_more(self, level: int, within: Polygons, short_mm: float) -> Polygons:
-        """What of an area has more walls than a level, so far from where it has fewer."""
+        """The part of an area that has more walls than a level, at a distance from where it has fewer."""
         if all(count > level for count in self.all):
             return within
-        shrunk = [(offset(area, -short_mm if count > level else short_mm), count) for area, count in self.others]
-        return WallCounts(self.usual, shrunk).overlaid(lambda count: within if count > level else Polygons())
+        fewer = self.overlaid(lambda count: Polygons() if count > level else within)
+        return within - offset(fewer, short_mm)
 
 
 def wall_counts(section: Polygons, layer: int, walls: int, more: int, places: Sequence[Place]) -> WallCounts:
-    """The walls of a section of a layer: the process's, or those of places; more: all have so many more."""
+    """The walls of a section of a layer: the process's, or those of places, combined by that key; more: all have so many more."""
     usual, others = walls + more, list[tuple[Polygons, int]]()
-    for place in combined(places, ["walls"]):
+    for place in places:
         count, area_mm2 = place.settings["walls"] + more, (section ^ place.areas[layer]).area()
         if section.area() - area_mm2 < LEAST_MM2:
             usual, others = count, []

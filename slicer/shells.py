@@ -47,7 +47,7 @@ from slicer.geometry.polygons import (
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.interface.interface import limb_planes, plane_in_frame_of
-from slicer.modifiers import WallCounts, wall_counts
+from slicer.modifiers import WallCounts, combined, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import Sections
@@ -112,10 +112,9 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
     model = model_sections(sections)
     heights_mm, count = sections.heights.height_mm.tolist(), len(processes)
+    walled_places = combined(sections.places, ["walls"])
     counts = [
-        wall_counts(
-            section, layer, process.walls, own.walls - process.walls, sections.places if own.walls >= process.walls else ()
-        )
+        wall_counts(section, layer, process.walls, own.walls - process.walls, walled_places if own.walls >= process.walls else ())
         for layer, (section, own) in enumerate(zip(sections.own, processes, strict=True))
     ]
     over = [mine if whole is None else whole for mine, whole in zip(sections.own, model, strict=True)][1:]

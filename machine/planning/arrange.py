@@ -1,5 +1,5 @@
-"""Arrangement: where models stand on the plate: those of one size in rows and columns, others one after the other, the largest
-first, each as near to the plate's place for them as it may.
+"""Arrangement: where models stand on the plate: those of one size in rows and columns, others one by one, the largest first, each
+as near as possible to the place that the plate has for them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,7 @@ EDGE_MM = 2.0  # kept to the plate's edge
 STEP_MM = 2.5  # between places that are tried beside those where boxes touch
 ROUNDING_MM = 1e-6
 
-IsClear = Callable[[int, Mapping[int, Place]], bool]
+IsClear = Callable[[Mapping[int, Place]], bool]
 
 
 class Misfit(NamedTuple):
@@ -33,14 +33,13 @@ def arrange(
 ) -> list[Place] | Misfit:
     """The middles (workpiece x, y, mm) of boxes of these sizes, gap_mm apart about a place on the plate; or what does not fit.
 
-    is_clear: whether the head passes a box, by its number, and those that stand, given the places of all of them.
+    is_clear: whether the head passes boxes, given the places of those that stand, by their numbers.
     """
     if len(set(sizes_mm)) == 1:
         rows = places_on_plate(sizes_mm[0], gap_mm, len(sizes_mm), machine, about_mm)
         if len(rows) < len(sizes_mm):
             return Misfit(len(rows), len(rows), False)
-        standing = dict(enumerate(rows))
-        if all(is_clear(k, standing) for k in standing):
+        if is_clear(dict(enumerate(rows))):
             return rows
     corner = -machine.table.radius_mm, -machine.table.radius_mm
     found = _one_by_one(sizes_mm, gap_mm, machine, about_mm, is_clear)
@@ -60,7 +59,7 @@ def _one_by_one(
     for k in sorted(range(len(sizes_mm)), key=lambda k: (-sizes_mm[k][0] * sizes_mm[k][1], k)):
         is_met = False
         for place in _free_places(k, standing, sizes_mm, gap_mm, machine, near_mm):
-            if is_clear(k, {**standing, k: place}):
+            if is_clear({**standing, k: place}):
                 standing[k] = place
                 break
             is_met = True
@@ -96,8 +95,8 @@ def _about(places: list[Place], sizes_mm: Sequence[Place], machine: Machine, abo
     moved = middles + np.array(about_mm) - covered
     if (over_edge_mm(np.abs(moved) + halves + EDGE_MM, machine.table)[0] > ROUNDING_MM).any():
         return places
-    standing: dict[int, Place] = {k: (x, y) for k, (x, y) in enumerate(moved.tolist())}
-    return list(standing.values()) if all(is_clear(k, standing) for k in standing) else places
+    together: list[Place] = [(x, y) for x, y in moved.tolist()]
+    return together if is_clear(dict(enumerate(together))) else places
 
 
 def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine, about_mm: Place = MIDDLE) -> list[Place]:

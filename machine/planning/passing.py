@@ -1,6 +1,6 @@
 """Passing: whether the head passes the models that stand on the plate while it prints another, and at which poses of the table.
 
-What other models have on the plate by then stands beside a part as it stands beside a limb. Both are tried as convex hulls.
+The finished parts of other models stand beside a part as a print stands beside a limb. All are taken as their convex hulls.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,8 +40,8 @@ class Passing:
         self._hulls: dict[Part, Floats] = {}
         self._known: dict[tuple[object, ...], bool] = {}
 
-    def is_clear(self, model: int, places: Mapping[int, Place]) -> bool:
-        """Whether the parts of a model and of those others that have places can be printed there."""
+    def is_clear(self, places: Mapping[int, Place]) -> bool:
+        """Whether the parts of the models that have places can be printed there."""
         return all(self._allowed(number, places) for number, (k, _) in enumerate(self.alone) if k in places)
 
     def poses(self, places: Mapping[int, Place]) -> list[Pose]:
@@ -55,7 +55,7 @@ class Passing:
         return least_rotation(self._profile.machine, [*begins, *options], fits)[len(begins) :]
 
     def _width_around(self, model: Decomposition) -> float:
-        """How far what is printed around a model on the plate may reach: its brim, which goes round its support, too."""
+        """How far brim and support reach around a model on the plate, mm; the brim runs round the support."""
         has_support = self._profile.process.support != "none" and any(part.risky_area_mm2 > 0.0 for part in model.parts)
         return self.brim_mm + (AROUND_MM if has_support else 0.0)
 

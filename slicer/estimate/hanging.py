@@ -63,6 +63,7 @@ def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
         above=(),
         standing=of_middles(sections.standing),
         no_support=of_middles(sections.no_support),
+        enforced=of_middles(sections.enforced),
         places=(),
     )
     hanging = [Overhang(union([area for area in wanted[a:b] if not area.is_empty()])) for a, b in zip(begins, ends, strict=True)]

@@ -40,8 +40,8 @@ def lightning_lines(
 ) -> list[list[Floats]]:
     """The lines (n, 2), from root to tip, of every layer of a part, the lowest first.
 
-    insides: where a layer's infill may be; solid: what of a layer is not sparse, so that the layer below must hold it; cell_mm:
-    between branches under it; heights_mm: (n,) of the layers.
+    insides: where a layer's infill may be; solid: the area of a layer that is not sparse, so that the layer below must hold it;
+    cell_mm: distance between branches under it; heights_mm: (n,) of the layers.
     """
     trees, lines = NO_TREES, []
     for layer in range(len(insides) - 1, -1, -1):
@@ -87,7 +87,7 @@ def _every(loop: Floats, step_mm: float) -> Floats:
 
 
 def _lower(trees: Trees, inside: Polygons, wanting: Floats, sizes_mm: tuple[float, float]) -> Trees:
-    """The trees of the layer below some: shorter and straighter, clipped to its inside, with what else is wanted there.
+    """The trees of the layer below: shorter and straighter, clipped to its inside, with new branches to the places that want one.
 
     sizes_mm: by how much a tip may lean, and a cell.
     """
@@ -145,7 +145,7 @@ def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indic
         long = np.hypot(nodes[k, 0] - nodes[p, 0], nodes[k, 1] - nodes[p, 1])
         if left >= long:
             children[p] -= 1
-            cut[p] = left - long
+            cut[p] = min(cut[p], left - long) if cut[p] >= 0.0 else left - long  # of its branches the longest counts
             continue
         keep[k] = True
         for axis in range(2):
@@ -155,7 +155,7 @@ def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indic
 
 @helper
 def _kept(nodes: Floats, parent: Indices, keep: np.ndarray) -> tuple[Floats, Indices]:
-    """The nodes that are kept; parents of these are, too."""
+    """The nodes that are kept. The parent of a kept node must be kept, too."""
     number, n = longs(len(nodes), -1), 0
     for k in range(len(nodes)):
         if keep[k]:
@@ -171,8 +171,8 @@ def _kept(nodes: Floats, parent: Indices, keep: np.ndarray) -> tuple[Floats, Ind
 
 @kernel
 def _ground(nodes: Floats, parent: Indices, border: EdgeIndex, step: float) -> tuple[Floats, Indices]:
-    """The trees clipped to a border: what is cut off stands on the wall where it was cut, and roots that do not get there go
-    on to the nearest wall."""
+    """The trees clipped to a border: a branch that is cut stands on the wall at the cut, and a root away from all walls is
+    continued to the nearest one."""
     n, room = len(nodes), 0
     ends = table(n, 2)  # where a node's way to its parent meets the wall, or the place of the wall that a root goes on to
     inside, cut = flags(n), flags(n)

@@ -85,7 +85,7 @@ def _of_strokes(strokes: Strokes, process: Process) -> Floats:
 
 
 def kinds_apart(processes: Sequence[Process]) -> list[Kind]:
-    """The kinds of beads that have not the same speed by all of some processes."""
+    """The kinds of beads whose speeds differ between some processes."""
 
     def differ(*keys: str) -> bool:
         return len({tuple(getattr(process, key) for key in keys) for process in processes}) > 1

@@ -55,7 +55,7 @@ class Strokes:
     small: Mask
     varies: Mask
     retract: Mask
-    place: NDArray[np.int8]
+    place: NDArray[np.int16]
     approach: Floats
     approach_starts: Indices
 
@@ -121,7 +121,7 @@ def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Fl
         small=small,
         varies=np.array([bead.course is not None for bead in beads], dtype=np.bool_),
         retract=retract,
-        place=np.zeros(len(beads), np.int8),
+        place=np.zeros(len(beads), np.int16),
         approach=np.concatenate([np.zeros((0, 2)), *passed]),
         approach_starts=np.cumsum([0, *(len(way) for way in passed)]),
     )
@@ -261,7 +261,7 @@ def split_places(strokes: Strokes, areas: Sequence[Polygons], kinds: Sequence[Ki
     for number, area in enumerate(areas, start=1):
         if kinds and not area.is_empty():
             strokes, within = split(strokes, area, strokes.is_of(*kinds), shortest_mm)
-            strokes = replace(strokes, place=np.where(within, number, strokes.place).astype(np.int8))
+            strokes = replace(strokes, place=np.where(within, number, strokes.place).astype(np.int16))
     return strokes
 
 

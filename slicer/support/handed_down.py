@@ -164,6 +164,7 @@ def up_to(sections: Sections, top_mm: float) -> Sections:
         standing=[*sections.standing, *sections_of(sections.earlier, part, heights.cut_mm[below:])] if sections.standing else (),
         no_seam=no_seam_segments(part, sections.mesh, heights.cut_mm),
         no_support=marked_areas(part.no_support, part, sections.mesh, heights.cut_mm),
+        enforced=marked_areas(part.support, part, sections.mesh, heights.cut_mm),
         places=[replace(place, areas=[*place.areas, *empty]) for place in sections.places],
     )
 

@@ -65,7 +65,7 @@ class Supports:
 
     @property
     def unsupported_mm2(self) -> float:
-        """Hanging area, seen from above, that none could reach."""
+        """Hanging area, seen from above, that no support could reach."""
         return float(union(self.missed).area())
 
 

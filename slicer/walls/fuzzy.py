@@ -1,8 +1,8 @@
-"""Fuzzy skin: walls whose points are moved at random, by which layers hide and hands find a grip.
+"""Fuzzy skin: walls whose points are moved at random, which hides the layers and gives a better grip.
 
 A wall is sampled anew at random distances, and every point moved across the wall, as PrusaSlicer does (PerimeterGenerator.cpp,
-fuzzy_polygon). It begins and ends where it did, so seams stay where they are hidden. What is random depends on where the wall
-stands in the print alone: the same print is the same on any number of cores.
+fuzzy_polygon). It begins and ends where it did, so seams stay where they are hidden. The random numbers depend only on where
+the wall comes in the print, so the bytes are the same on any number of cores.
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,15 @@ from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons, area_mm2, offset, union
 from slicer.paths import Kind
 
-SPREAD = 0.25  # of the distance of points: as much nearer or farther
+SPREAD = 0.25  # of the distance of points, by which it varies
+FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays even, or nothing would be left of it
 
 
 def fuzzy_walls(beads: Sequence[Bead], process: Process, joints: Sequence[Polygons], seed: tuple[int, int]) -> list[Bead]:
     """The beads of a layer, begun at their seams, with the walls that are to be rough moved.
 
-    joints: what other parts take of this layer and of those next to it, beside which walls stay; seed: numbers of part and layer.
+    joints: the areas of other parts in this layer and its neighbours, beside which walls stay as they are; seed: numbers of
+    part and layer.
     """
     reach_mm = process.line_width_mm + process.fuzzy_skin_thickness_mm
     even = index_edges(offset(union(joints), reach_mm) if joints else Polygons())
@@ -49,6 +51,8 @@ def _roughened(points: Floats, process: Process, even: EdgeIndex, seed: tuple[in
     most = int(along[-1] / ((1.0 - SPREAD) * apart_mm)) + 1
     sampled = np.cumsum(apart_mm * random.uniform(1.0 - SPREAD, 1.0 + SPREAD, most))
     sampled = sampled[sampled < along[-1] - (1.0 - SPREAD) * apart_mm]
+    if len(sampled) < FEWEST:
+        return points
     moved_mm = process.fuzzy_skin_thickness_mm * random.uniform(-1.0, 1.0, len(sampled))
     step = np.minimum(np.searchsorted(along, sampled, side="right") - 1, len(steps) - 1)
     lengths = np.maximum(np.diff(along), 1e-9)

@@ -16,6 +16,8 @@ from mdp.mesh import Mesh
 from mdp.zone import MeshVolume, Modifier, Zone
 from profiles.errors import SliceError
 from slicer.estimate.estimate import estimate
+from slicer.geometry.polygons import Polygons
+from slicer.modifiers import Place, combined
 from slicer.paths import Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.slice import slice_part, slice_parts
 from tests.shapes import box, from_manifold, standing
@@ -242,3 +244,19 @@ def test_a_ball_of_dense_infill_grows_and_shrinks_with_the_layers() -> None:
     for k in (12, 25, 37):
         radius = np.sqrt(64.0 - (0.2 * k + 0.1 - 5.0) ** 2)
         assert mm3(layers[k], whole_block, Kind.SKIN, Kind.GAP, Kind.BRIDGE) == pytest.approx(0.2 * np.pi * radius**2, rel=0.1)
+
+
+def test_many_modifiers_one_over_the_other_take_no_more_places_than_there_are_values() -> None:
+    square = [Polygons.square((10.0, 10.0))]
+    places = [Place({key: k % 2}, square) for k in range(30) for key in ("walls", "infill_density")]
+    over = combined(places, ["walls", "infill_density"])
+    assert [dict(place.settings) for place in over] == [{"walls": 1, "infill_density": 1}]
+
+
+def test_combined_places_do_not_overlap_and_have_the_last_value_of_every_key() -> None:
+    left, right = (Polygons.square((20.0, 10.0)).translate((x, 0.0)) for x in (0.0, 10.0))
+    found = combined([Place({"walls": 4}, [left]), Place({"walls": 5, "ironing": True}, [right])], ["walls", "ironing"])
+    assert [(dict(place.settings), place.areas[0].area()) for place in found] == [
+        ({"walls": 4}, pytest.approx(100.0)),
+        ({"walls": 5, "ironing": True}, pytest.approx(200.0)),
+    ]

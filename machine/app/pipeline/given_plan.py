@@ -15,7 +15,7 @@ from profiles.profile import Profile, with_part_settings
 
 
 def check_alone(request: ModelRequest) -> None:
-    """Raise PlanError for what goes with a single model where there are several."""
+    """Raise PlanError for several models with an option that takes a single one."""
     if not any(name != request.model for name in request.beside):
         return
     named = [("--plan", request.cuts.plan), ("--planes", request.cuts.planes), ("--record", request.outputs.record)]
@@ -23,7 +23,7 @@ def check_alone(request: ModelRequest) -> None:
     given += [f"--part {settings.part}" for settings in request.profile.parts] + ["--compare"] * request.compare
     if given:
         models = ", ".join(dict.fromkeys((request.model, *request.beside)))
-        raise PlanError(f"{given[0]} goes with one model, here are several: {models}")
+        raise PlanError(f"{given[0]} goes with one model, and several are given: {models}")
 
 
 def read_given_plan(request: ModelRequest) -> PlanFile | None:

@@ -1,4 +1,4 @@
-"""Plate: several models on one plate, copies of one among them: where they stand, in which order their parts are printed.
+"""Plate: several models or copies on one plate: where they stand, and in which order their parts are printed.
 
 Layer by layer: the first parts of all models are one part of the print, the others follow one after the other, as limbs that are
 printed beside what stands. Or one model after the other (process.complete_objects): then the first parts are such limbs, too.
@@ -19,7 +19,7 @@ from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.topology.cross_section import cross_sections
-from mdp.zone import Marked
+from mdp.zone import Marked, Zone
 from profiles.errors import PlanError
 from profiles.machine import Machine
 from profiles.process import Process
@@ -58,7 +58,7 @@ def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Dec
 
 def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[Place], Passing]:
     """Where the middles of models stand on the plate, and in which order the head prints their parts there. Raises PlanError."""
-    about_axis = {model: _about_axis(model) for model in models}
+    about_axis = {model: _about_axis(model) for model in dict.fromkeys(models)}
     lowest_first = sorted(range(len(models)), key=lambda k: (float(models[k].mesh.bounds_mm[1, 2]), k))
     together = [] if profile.process.complete_objects else [(k, 0) for k in range(len(models))]
     alone = [(k, n) for k in lowest_first for n in range(1 if together else 0, len(models[k].parts))]
@@ -78,7 +78,7 @@ def _about_axis(model: Decomposition) -> Decomposition:
 
 
 def _brim_mm(models: Sequence[Decomposition], profile: Profile) -> float:
-    """Width of the brim that all models have, or those that would tip over alone."""
+    """Width of the brim around all models: that of a small base as soon as one of them would tip over alone."""
     process = profile.process
     small = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0
     if small and any(_tips_over(model.mesh, profile) for model in dict.fromkeys(models)):
@@ -93,7 +93,7 @@ def _tips_over(mesh: Mesh, profile: Profile) -> bool:
 
 
 def _gap_mm(process: Process, brim_mm: float) -> float:
-    """What is kept between the boxes of models."""
+    """The distance that the boxes of models keep."""
     skirt_mm = process.skirt_distance_mm + (process.skirt_loops + 1) * process.line_width_mm
     if process.complete_objects and brim_mm == 0.0 and process.skirt_loops:  # round the first model alone
         return max(GAP_MM, skirt_mm)
@@ -114,7 +114,10 @@ def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[
         return f"{what} no place beside {others} at which the head passes what stands while it prints: {wanted}"
     if alike:
         return f"{what} room for {misfit.standing} with {gap_mm:g} mm between them"
-    return f"{what} no room for it beside {misfit.standing} other model(s), {gap_mm:g} mm from each"
+    if misfit.standing == 0:
+        return f"{what} no room for it"
+    beside = "another model" if misfit.standing == 1 else f"{misfit.standing} other models"
+    return f"{what} no room for it {gap_mm:g} mm from {beside}"
 
 
 def _size_mm(mesh: Mesh) -> Place:
@@ -135,8 +138,14 @@ def _first_of_all(parts: Sequence[Part]) -> Part:
         no_seam=Marked.together([(part.no_seam, len(part.mesh.faces)) for part in parts]),
         no_support=Marked.together([(part.no_support, len(part.mesh.faces)) for part in parts]),
         support=Marked.together([(part.support, len(part.mesh.faces)) for part in parts]),
-        modifiers=tuple(modifier for part in parts for modifier in part.modifiers),
+        modifiers=tuple(replace(modifier, room=_room(part)) for part in parts for modifier in part.modifiers),
     )
+
+
+def _room(part: Part) -> Zone:
+    """The box around a model's first part that reaches half of the gap to other models."""
+    low, high = part.mesh.bounds_mm + 0.5 * GAP_MM * np.array([[-1.0], [1.0]])
+    return Zone((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
 
 def _joined(masks: Sequence[Mask | None]) -> Mask | None:

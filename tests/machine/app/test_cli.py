@@ -86,7 +86,7 @@ WRONG = [
     ),
     (
         ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--part", "1:walls=4"],
-        "--part 1 goes with one model, here are several",
+        "--part 1 goes with one model, and several are given",
     ),
     (
         ["simulate", "short.gcode", "demo:tree"],

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from mdp.mesh import Floats
-from slicer.fill.lightning import LEAN_DEG, lightning_lines
+from slicer.fill.lightning import LEAN_DEG, _prune, lightning_lines
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
@@ -109,3 +109,10 @@ def test_the_floor_of_a_pocket_is_held_as_a_roof_is() -> None:
     ]
     assert held
     assert max(held) < 60  # the floor lies at 12 mm
+
+
+@pytest.mark.parametrize("branches", [(0.1, 0.5), (0.5, 0.1)])
+def test_a_trunk_loses_no_more_than_its_longest_branch_has_left(branches: tuple[float, float]) -> None:
+    nodes = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, branches[0]], [1.0, -branches[1]]])
+    left, _ = _prune(nodes, np.array([-1, 0, 1, 1]), 0.6)
+    assert left == pytest.approx(np.array([[0.0, 0.0], [0.9, 0.0]]))

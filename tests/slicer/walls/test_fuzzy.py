@@ -11,6 +11,7 @@ from tests.shapes import box, standing
 from tests.slicer.hand import SOLID, content, cut, profile, whole
 
 FUZZY = (*SOLID, "process.fuzzy_skin=external", "process.fuzzy_skin_thickness_mm=0.3")
+DISTANT = "process.fuzzy_skin_point_distance_mm=5"
 SIDE = 10.0 - 0.225  # of the middle of the outer wall of a block of 20 mm, from its axis
 
 
@@ -81,3 +82,10 @@ def test_the_face_of_a_cut_stays_even_in_all_layers() -> None:
     on_face = points[(points[:, 0] > face - 1.0) & (np.abs(points[:, 1]) < 8.5)]
     assert on_face[:, 0] == pytest.approx(face - 0.225, abs=1e-6)
     assert len(points) > 40
+
+
+def test_a_pin_too_thin_for_the_distance_of_points_keeps_its_wall() -> None:
+    pin = whole(box(2, 2, 4))
+    even, rough = (slice_part(pin, profile(*SOLID, f"process.fuzzy_skin={name}", DISTANT)) for name in ("none", "external"))
+    for layer in range(1, 20):
+        assert off_mm(rough, layer) == pytest.approx(off_mm(even, layer))

@@ -18,10 +18,13 @@ from machine.program import Program
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh, together
 from mdp.topology.components import vertex_components
+from mdp.topology.cross_section import cross_sections
 from mdp.zone import Grown, Marked, MeshVolume, Modifier, Zone
 from profiles.errors import PlanError
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, load, with_part_settings
+from slicer.geometry.polygons import of_contours
+from slicer.modifiers import modified_places
 from tests.shapes import box, standing, tee
 from tests.slicer.hand import cut, whole
 
@@ -74,6 +77,14 @@ def test_every_copy_has_the_settings_of_its_modifiers() -> None:
     meshes = [float(volume.mesh.bounds_mm[0, 1]) for volume, _ in volumes if isinstance(volume, MeshVolume)]
     assert sorted(boxes) == [-7.5, 7.5]  # 10 mm deep, 5 mm apart
     assert sorted(meshes) == [-9.5, 5.5]
+
+
+def test_a_modifier_that_reaches_beyond_its_model_changes_no_copy_beside_it() -> None:
+    half = Modifier(Zone((-99.0, 0.0, -1.0), (99.0, 99.0, 99.0)), {"infill_density": 1.0})
+    (many,) = in_copies(decomposed(replace(whole(box(10, 10, 9)), modifiers=(half,))), 2, plate())[0].parts
+    (place,) = modified_places(many, many.in_part_frame(), plate().process, np.array([4.5]))
+    section = of_contours(cross_sections(many.mesh, np.array([4.5]))[0])
+    assert (section ^ place.areas[0]).area() == pytest.approx(0.5 * section.area())
 
 
 def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> None:
@@ -201,7 +212,7 @@ def test_a_model_without_room_is_named_with_the_room_that_it_needs() -> None:
     models.append(decomposed(whole(box(40, 160, 3)), name="long"))
     with pytest.raises(PlanError) as refused:
         on_one_plate(models, plate())
-    sentence = "second measures 90.0 x 90.0 mm, the plate of generic A/C table has no room for it beside 1 other model(s)"
+    sentence = "second measures 90.0 x 90.0 mm, the plate of generic A/C table has no room for it 5 mm from another model"
     assert str(refused.value).startswith(sentence)
 
 
