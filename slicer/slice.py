@@ -223,8 +223,6 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)  # at least: accelerations are left out
     layer_fan = fan * fan_share(material, process, time_s)
     own_fan = own_fans(strokes, material, fan, layer_fan)
-    corners = mark_corners(strokes.points, strokes.starts, process.resolution_mm)
-    strokes = replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts])
     return Layer(
         z_mm=float(sections.heights.tip_mm[index]),
         height_mm=float(sections.heights.height_mm[index]),
@@ -271,7 +269,9 @@ def order_layer(
     if index == 0:
         flow *= process.first_layer_flow if on_platform else process.interface_flow
     fixed = None if index else first_layer_speeds(process, on_platform)
-    return strokes, speeds_mm_s(strokes, profile, height_mm, fixed, flow, of_places), flow
+    speeds = speeds_mm_s(strokes, profile, height_mm, fixed, flow, of_places)
+    corners = mark_corners(strokes.points, strokes.starts, process.resolution_mm)
+    return replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts]), speeds, flow
 
 
 def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:

@@ -70,8 +70,9 @@ def golden(dialect: str, coordinates: str) -> list[str]:
     around = np.linspace(0.0, 1.5 * np.pi, 60)
     ring = np.column_stack([3.0 * np.cos(around), 3.0 * np.sin(around)])
     hole = Path(Kind.OVERHANG, ring, 0.45, 25.0, 1.05, ring[:1], False, fan=0.6)
-    layers = tuple(Layer.of(layer.z_mm, layer.height_mm, (*layer.paths, hole), layer.fan) for layer in sliced[0].layers)
-    sliced[0] = replace(sliced[0], layers=layers, unsupported=())
+    first, *others = [Layer.of(layer.z_mm, layer.height_mm, (*layer.paths, hole), layer.fan) for layer in sliced[0].layers]
+    first = replace(first, nozzle_add_c=chosen.material.first_layer_nozzle_c - chosen.material.nozzle_c)
+    sliced[0] = replace(sliced[0], layers=(first, *others), unsupported=())
     program = plan(decomposition, sliced, chosen, parse_stops(["1:2"], ["2:2"]))
     return [line for line in write_gcode(program, chosen) if not line.startswith(";")]
 
