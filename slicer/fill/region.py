@@ -9,9 +9,7 @@ from slicer.heights import SHELL_KEYS, shell_layers
 from slicer.modifiers import Place, combined, most_shell_layers, overlaid
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
-BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it,
-MIDDLE = 0.5  # and up to this has its middle on it: farther out one solid layer carries it,
-HELD = 1.0  # which reaches so many line widths into the infill
+BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
 ANCHOR = 2.0  # line widths that solid layers under walls reach into the infill around, as a bridge reaches over its anchors
 FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
 LEAST_IRONED_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
@@ -167,21 +165,18 @@ def _without_footings(
     """The sparse places without those under walls which begin on them: a pocket's on its floor, a pillar's on its plate.
 
     sections, insides: of the layers over those of the sparse places, but for the last one, over which nothing is known.
-    The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill. A wall that
-    only lies beside the one below, where the shape shrinks, has one solid layer under it.
+    The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill.
     """
     width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
-    under = [
-        opening((area ^ section) - inside, 0.5 * MIDDLE * width_mm) if not area.is_empty() else area
+    footings = [
+        opening((area ^ section) - inside, 0.5 * BESIDE * width_mm) if not area.is_empty() else area
         for area, section, inside in zip(sparse, sections, insides, strict=False)
     ]
-    footings = [walls if walls.is_empty() else opening(walls, 0.5 * BESIDE * width_mm) for walls in under]
     left = list(sparse)
     for i, area in enumerate(sparse):
-        begun = [offset(footing, ANCHOR * width_mm) for footing in footings[i : i + deep] if not footing.is_empty()]
-        beside = [offset(walls, HELD * width_mm) for walls in under[i : i + 1] if not walls.is_empty()]
-        if (begun or beside) and not area.is_empty():
-            left[i] = _large(opening(area - union([*begun, *beside]), width_mm), process)
+        begun = [footing for footing in footings[i : i + deep] if not footing.is_empty()]
+        if begun and not area.is_empty():
+            left[i] = _large(opening(area - offset(union(begun), ANCHOR * width_mm), width_mm), process)
     return left
 
 
