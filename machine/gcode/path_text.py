@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.planning.moves import RICHER
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 
@@ -17,7 +18,6 @@ SPACE, MINUS, POINT, ZERO, LINE_END, FEED = 32, 45, 46, 48, 10, 70
 COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point
 PUSHING, TRAVELLING, STANDING = range(3)  # what a path does: strokes and wipes, travels, retractions
 X, Y, Z, PUSHED, F = range(5)  # what the firmware knows
-SAME = 1.02  # a stroke so much richer is not seen, and within what the dry run allows
 STEPS = 20  # a short stroke that must go slower does so by twentieths, or the speeds of its like would flicker
 
 
@@ -120,7 +120,7 @@ def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tu
     if shared == 0.0:
         return 0.0, 1.0
     more = whole / shared
-    return more, ceil(more * STEPS) / STEPS if more > SAME else 1.0
+    return more, ceil(more * STEPS) / STEPS if more > RICHER else 1.0
 
 
 @no_nrt

@@ -11,7 +11,7 @@ from math import inf, pi
 import numpy as np
 
 from machine.planning.limits import Speeds, path_speeds
-from machine.planning.moves import POINTS, RETRACT, SPEED, Moves, add_point, add_row
+from machine.planning.moves import POINTS, RETRACT, RICHER, SPEED, Moves, add_point, add_row
 from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
 from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
@@ -63,7 +63,9 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
     filament_mm2 = pi * material.diameter_mm**2 / 4.0
     area_mm2 = bead_area_mm2(layer.width_mm, layer.height_mm) * layer.flow
     with np.errstate(divide="ignore"):
-        fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s * filament_mm2) / np.maximum(area_mm2, 0.0)
+        fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s / RICHER * filament_mm2) / np.maximum(
+            area_mm2, 0.0
+        )
     accelerations = stroke_accelerations(profile, on_plate)
     by_kind = np.array([inf if accelerations is None else accelerations[kind] for kind in KINDS])
     speeds = path_speeds(points, layer.starts, np.minimum(layer.speed_mm_s, fastest), tip.speeds.axes_mm_s)
@@ -129,7 +131,7 @@ def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> fl
         return 0.0
     seen, taken_mm = layer.is_of(*SEEN), 0.0
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
-    fastest = min(profile.material.volumetric_limit_mm3_s / filament_mm2, profile.machine.extruder_speed_mm_s)
+    fastest = min(profile.material.volumetric_limit_mm3_s / filament_mm2, profile.machine.extruder_speed_mm_s / RICHER)
     needed_mm = bead_area_mm2(layer.width_mm, layer.height_mm) * profile.material.flow / filament_mm2  # for a millimetre
     ends = np.cumsum(strokes.rows[:, POINTS].astype(np.int64))
     for k in np.flatnonzero(~seen | seen.all()).tolist():

@@ -19,7 +19,7 @@ from slicer.geometry.polygons import Polygons, closing, edges, islands, of_conto
 
 NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
-HOLDS = 0.5  # line widths that a row may reach beyond what holds it
+HOLDS = 0.75  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
 KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid

