@@ -23,6 +23,7 @@ WIDTHS = (
 )
 
 MOST_SHARE = 0.9  # of a line's width: a higher bead does not stick
+ROUGHEST = 2.0  # line widths by which a rough wall may be moved
 
 
 class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
@@ -60,4 +61,12 @@ class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
             yield (
                 f"least_layer_height_mm is {self.least_layer_height_mm:g} mm: at most most_layer_height_mm "
                 f"({self.most_layer_height_mm:g} mm) is allowed"
+            )
+        if self.infill_pattern == "lightning" and self.walls == 0 and 0.0 < self.infill_density < 1.0:
+            yield "walls is 0: infill_pattern = lightning grows out of the walls and needs at least 1"
+        roughest_mm = ROUGHEST * self.line_width_mm
+        if self.fuzzy_skin != "none" and self.fuzzy_skin_thickness_mm > roughest_mm + 1e-9:
+            yield (
+                f"fuzzy_skin_thickness_mm is {self.fuzzy_skin_thickness_mm:g} mm: at most {ROUGHEST:g} times line_width_mm "
+                f"({roughest_mm:g} mm) is allowed, or walls would miss the layer below"
             )

@@ -82,6 +82,9 @@ def slice_parts(
     """
     if not parts:
         return ()
+    models = sum(part.on_platform for part in parts)
+    if profile.process.spiral_vase and models > 1:
+        raise SliceError(f"process.spiral_vase climbs round one model, {models} are on the plate")
     if profile.process.spiral_vase and len(parts) > 1:
         raise SliceError(
             f"process.spiral_vase climbs round a model in one part, this one is in {len(parts)}: --parts 1 prints it in one piece"

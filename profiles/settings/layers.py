@@ -58,6 +58,4 @@ class Layers(Frozen):
         description="slits of a layer narrower than twice this are closed; the default keeps plastic within 4 % of a line of the "
         "model, 0.049 heals coarser meshes, mm",
     )
-    resolution_mm: float = Field(
-        0.02, ge=0, le=0.5, description="no printed path leaves the one that is worked out by more than this, mm"
-    )
+    resolution_mm: float = Field(0.02, ge=0, le=0.5, description="printed paths are simplified by at most this, mm")

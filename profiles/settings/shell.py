@@ -56,7 +56,7 @@ class Shell(Frozen):
         ge=0,
         le=360,
         description="direction of straight skin lines in the part's frame, across it in every second layer; absent: "
-        "infill_angle_deg; the first ones over sparse infill cross its lines, deg",
+        "infill_angle_deg; the first skin over sparse infill crosses the infill lines, deg",
     )
     bottom_thickness_mm: float = Field(
         0.5, ge=0, le=100, description="least thickness of the layers over a surface that faces away, mm"
@@ -69,15 +69,18 @@ class Shell(Frozen):
         "than the plastic saved, mm2",
     )
     gap_least_mm: float = Field(
-        0.0, ge=0, le=1000, description="gap fill shorter than this is left out, which saves travels; 1000: all of it, mm"
+        0.0,
+        ge=0,
+        le=1000,
+        description="gap fill shorter than this is left out, which saves travels; 1000 leaves out all gap fill, mm",
     )
     fuzzy_skin: Literal["none", "external", "all", "allwalls"] = Field(
         "none",
-        description="walls are rough; external: outer ones on the outside; all: those of holes as well; allwalls: inner ones, "
-        "too. First layers, faces at cuts, single lines and what climbs in spiral_vase stay even",
+        description="which walls are roughened; external: outer walls on the outside; all: those of holes, too; allwalls: inner "
+        "walls as well. First layers, faces at cuts, single lines and the climbing wall of spiral_vase stay even",
     )
     fuzzy_skin_thickness_mm: float = Field(
-        0.3, gt=0, le=2, description="points of rough walls are moved by as much at most, inward or outward, mm"
+        0.3, gt=0, le=2, description="greatest distance by which points of rough walls are moved, inward or outward, mm"
     )
     fuzzy_skin_point_distance_mm: float = Field(
         0.8, ge=0.1, le=5, description="mean distance of the points of rough walls, by a quarter more or less, mm"

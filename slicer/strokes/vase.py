@@ -70,7 +70,7 @@ def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
     if holes != 1 or len(loops) != 1:
         instead = f"{holes} outlines" if holes != 1 else "a place too narrow for a wall"
         raise SliceError(
-            f"process.spiral_vase needs one outline without holes in every layer: at {z_mm:.2f} mm there is {instead}"
+            f"process.spiral_vase needs one outline without holes in every layer: the layer at {z_mm:.2f} mm has {instead}"
         )
     return close_loop(loops[0])
 

@@ -186,6 +186,28 @@ def test_what_keys_must_be_together_is_told_with_what_each_must_be_and_what_the_
     ]
 
 
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        (
+            ["process.infill_pattern=lightning", "process.walls=0"],
+            "process.walls is 0: infill_pattern = lightning grows out of the walls and needs at least 1",
+        ),
+        (
+            ["process.fuzzy_skin=all", "process.fuzzy_skin_thickness_mm=1"],
+            "process.fuzzy_skin_thickness_mm is 1 mm: at most 2 times line_width_mm (0.9 mm) is allowed, "
+            "or walls would miss the layer below",
+        ),
+    ],
+)
+def test_infill_without_the_walls_it_grows_from_and_walls_rougher_than_they_are_wide_are_refused(
+    settings: list[str], sentence: str
+) -> None:
+    with pytest.raises(ProfileError) as error:
+        load(settings=settings)
+    assert str(error.value) == sentence
+
+
 def test_adaptive_layers_are_not_thicker_than_the_nozzle_is_wide() -> None:
     thick = ("process.line_width_mm=0.9", "process.most_layer_height_mm=0.6")
     assert refusal(*thick, "process.adaptive_cusp_mm=0.1") == (

@@ -82,7 +82,7 @@ WRONG = [
     (["export", "demo:tree", "nowhere.stl:2", "-o", "x.gcode"], "nowhere.stl: there is no such file"),
     (
         ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--plan", "box.toml"],
-        "--plan box.toml goes with one model, here are",
+        "--plan box.toml goes with one model, and several are",
     ),
     (
         ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--part", "1:walls=4"],

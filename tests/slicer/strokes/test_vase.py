@@ -112,8 +112,8 @@ def stepped(low_mm: float, high_mm: float) -> Mesh:
     [
         (cut(box(), ((0.0, 0.0, 1.0), 8.0)), (), "climbs round a model in one part, this one is in 2: --parts 1"),
         ([whole(tee())], ("process.support=auto",), "prints no support, and at"),
-        ([whole(two_towers())], (), "one outline without holes in every layer: at 2.20 mm there is 2 outlines"),
-        ([whole(tube())], (), "at 2.20 mm there is 2 outlines"),
+        ([whole(two_towers())], (), "one outline without holes in every layer: the layer at 2.20 mm has 2 outlines"),
+        ([whole(tube())], (), "the layer at 2.20 mm has 2 outlines"),
         ([whole(stepped(10, 6))], (), "at 4.20 mm the model steps in or out by more than a wall's width, 0.45 mm: 36 mm of wall"),
     ],
 )
