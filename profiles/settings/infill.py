@@ -19,7 +19,7 @@ class Infill(Frozen):
         )
     )
     infill_angle_deg: float = Field(45.0, ge=0, le=360, description="direction of the infill lines in the part's frame, deg")
-    infill_overlap: float = Field(0.3, ge=0, le=0.5, description="reach of infill into the innermost wall, share of a line width")
+    infill_overlap: float = Field(0.2, ge=0, le=0.5, description="reach of infill into the innermost wall, share of a line width")
     infill_anchor_mm: float = Field(
         2.5,
         ge=0,

@@ -9,7 +9,7 @@ from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import length_mm
 from slicer.paths import bead_area_mm2
 
-WIDTH, HEIGHT, OVERLAP = 0.45, 0.2, 0.3
+WIDTH, HEIGHT, OVERLAP = 0.45, 0.2, 0.2
 STARS = st.lists(st.tuples(st.floats(-20, 20), st.floats(-20, 20)), min_size=4, max_size=9)
 
 
