@@ -62,14 +62,13 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
     """The lines that fill an area, those of each connected piece spread evenly, and the places that they leave in each.
 
     The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
-    it. Where lines would no longer touch each other for that, in narrow places that are all line ends, they do not reach into the
-    walls.
+    it. Where lines would no longer touch each other for that, in narrow places that are all line ends, they reach half as far.
     """
     spacing, width_mm, in_order = solid.spacing_mm, solid.width_mm, solid.pattern == "monotonic"
     beads, rests = list[Bead](), list[Polygons]()
     least_flow = 1.0 + TOUCHING - solid.height_mm * ROUND_SIDES / spacing
     for island in islands(area):
-        for overlap in (solid.overlap, 0.0):
+        for overlap in (solid.overlap, 0.5 * solid.overlap):
             lines = _lines(offset(island, -(0.5 * spacing - overlap * width_mm)), solid)
             rest = uncovered_area(island, lines, width_mm)
             total = sum(length_mm(line) for line in lines)
