@@ -159,7 +159,7 @@ LEANING, LEVEL = ((0.3, 0.1, 0.95), 9.0), ((0.0, 0.0, 1.0), 9.0)
         (tower(), (), 0.04),
         (thin_box(), (), 0.04),
         (box(24, 20, 40), (((0.3, 0.1, 0.95), 18.0),), 0.12),  # under its slanted top skins are bridged in bursts of layers
-        (vase(), (), 0.045),
+        (vase(), (), 0.05),
         (vase(), (LEANING,), 0.04),
         (comb(), (), 0.04),
         (comb(), (LEANING,), 0.04),
