@@ -43,10 +43,11 @@ def arrow_up(browser: Browser, event: str) -> None:
 def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "dragged.stl", stl(tee()))
     browser.wait("!$('rings').hasAttribute('hidden')")
-    standing = area(browser)
+    browser.wait("parseFloat($('overhang').textContent) === 300")  # two arms of 15 x 10 mm, once the picture is drawn
     start, end = (tuple(point) for point in browser.value(RING_Y))
     browser.hold(start, end)
-    browser.wait(f"parseFloat($('overhang').textContent) !== {standing}")  # told with the next picture
+    browser.wait("parseFloat($('overhang').textContent) !== 300")
+    browser.wait("window.seen === (window.seen = $('overhang').textContent)")  # the last picture of the drag is drawn
     live, angle = area(browser), told_by(browser, "y")
     browser.release(end)
     browser.wait(TURNED)
@@ -54,7 +55,7 @@ def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser
     assert area(browser) == pytest.approx(live, abs=0.2)
     browser.click("#undo")
     browser.wait("$('undo').getAttribute('aria-label').startsWith('undo: open')")
-    assert area(browser) == standing
+    browser.wait("parseFloat($('overhang').textContent) === 300")
 
 
 def test_a_click_on_the_edge_between_two_faces_meets_one_of_them(browser: Browser, bench: Running) -> None:
