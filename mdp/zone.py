@@ -31,11 +31,13 @@ MOST_PRODUCTS = 4_000_000  # of directions and points at a time
 
 @dataclass(frozen=True)
 class Zone:
-    """A box by its least and greatest x, y, z, mm; axes: rows of the rotation whose x, y, z they are, None: the frame's own."""
+    """A box by its least and greatest x, y, z, mm; axes: rows of the rotation whose x, y, z they are, None: the frame's own.
+    room: a box around its model, outside of which are others that it does not mark; None: there are no others."""
 
     min_mm: Vector
     max_mm: Vector
     axes: tuple[Vector, Vector, Vector] | None = None
+    room: "Zone | None" = None
 
     def along(self, places: Floats) -> Floats:
         """(..., 3) places or directions of the frame as the box's own x, y, z."""
@@ -50,7 +52,8 @@ class Zone:
     def moved(self, shift_mm: Vector) -> "Zone":
         """The box somewhere else."""
         low, high = (np.add(corner, self.along(np.array(shift_mm))).tolist() for corner in (self.min_mm, self.max_mm))
-        return replace(self, min_mm=(low[0], low[1], low[2]), max_mm=(high[0], high[1], high[2]))
+        room = None if self.room is None else self.room.moved(shift_mm)
+        return replace(self, min_mm=(low[0], low[1], low[2]), max_mm=(high[0], high[1], high[2]), room=room)
 
     def spans_mm(self, directions: Floats) -> Floats:
         """(k, 1, 2) least and greatest direction . p over the box for (k, 3) directions."""
@@ -70,7 +73,7 @@ class Zone:
         for axis in axes:
             heights, reach = np.einsum("fci,fi->fc", places, axis), np.abs(axis) @ half
             inside &= (heights.min(axis=1) <= reach) & (heights.max(axis=1) >= -reach)
-        return inside
+        return inside if self.room is None else inside & self.room.touches(mesh)
 
 
 @dataclass(frozen=True)
@@ -230,6 +233,10 @@ class Marked:
     def moved(self, shift_mm: Vector) -> "Marked":
         """The same for a mesh that is moved."""
         return replace(self, boxes=tuple(box.moved(shift_mm) for box in self.boxes))
+
+    def within(self, room: Zone) -> "Marked":
+        """The same, but nothing is marked outside of a box around the mesh."""
+        return replace(self, boxes=tuple(replace(box, room=room) for box in self.boxes))
 
     @classmethod
     def together(cls, marks: Sequence[tuple["Marked", int]]) -> "Marked":

@@ -409,15 +409,23 @@ def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> lis
     if not marked.anywhere:
         return []
     named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))
-    boxes = [convex_hull(box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm)) for box in marked.boxes]
-    sections = [cross_sections(box, cuts_mm) for box in boxes]
+    sections = [_of_box(box, part, cuts_mm) for box in marked.boxes]
     layers = []
     for k in range(len(cuts_mm)):
-        pieces = [Polygons(loops[k]) for loops in sections]
+        pieces = [areas[k] for areas in sections]
         if k in named:
             pieces.append(offset(Polygons([_upward(face) for face in named[k]]), RIM_MM))
         layers.append(union(pieces))
     return layers
+
+
+def _of_box(box: Zone, part: Part, cuts_mm: Floats) -> list[Polygons]:
+    """The sections of a box in each layer of a part, within its room."""
+    in_part = convex_hull(box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm))
+    areas = [Polygons(loops) for loops in cross_sections(in_part, cuts_mm)]
+    if box.room is None:
+        return areas
+    return [area ^ room for area, room in zip(areas, _of_box(box.room, part, cuts_mm), strict=True)]
 
 
 def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:

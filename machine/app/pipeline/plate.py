@@ -4,7 +4,7 @@ Layer by layer: the first parts of all models are one part of the print, the oth
 printed beside what stands. Or one model after the other (process.complete_objects): then the first parts are such limbs, too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -127,7 +127,12 @@ def _size_mm(mesh: Mesh) -> Place:
 
 def _first_of_all(parts: Sequence[Part]) -> Part:
     """The first parts of several models as one."""
-    mesh = together([part.mesh for part in parts])
+    mesh, rooms = together([part.mesh for part in parts]), [_room(part) for part in parts]
+
+    def joined(marks: Iterable[Marked]) -> Marked:
+        pairs = zip(marks, rooms, parts, strict=True)
+        return Marked.together([(mark.within(room), len(part.mesh.faces)) for mark, room, part in pairs])
+
     return replace(
         parts[0],
         mesh=mesh,
@@ -135,10 +140,10 @@ def _first_of_all(parts: Sequence[Part]) -> Part:
         risky_area_mm2=sum(part.risky_area_mm2 for part in parts),
         needing=_joined([part.needing for part in parts]),
         needing_upright=_joined([part.needing_upright for part in parts]),
-        no_seam=Marked.together([(part.no_seam, len(part.mesh.faces)) for part in parts]),
-        no_support=Marked.together([(part.no_support, len(part.mesh.faces)) for part in parts]),
-        support=Marked.together([(part.support, len(part.mesh.faces)) for part in parts]),
-        modifiers=tuple(replace(modifier, room=_room(part)) for part in parts for modifier in part.modifiers),
+        no_seam=joined(part.no_seam for part in parts),
+        no_support=joined(part.no_support for part in parts),
+        support=joined(part.support for part in parts),
+        modifiers=tuple(replace(own, room=room) for part, room in zip(parts, rooms, strict=True) for own in part.modifiers),
     )
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import manifold3d as m3
 import numpy as np
@@ -25,6 +26,7 @@ from profiles.part_settings import PartSettings
 from profiles.profile import Profile, load, with_part_settings
 from slicer.geometry.polygons import of_contours
 from slicer.modifiers import modified_places
+from slicer.sectioning import marked_areas
 from tests.shapes import box, standing, tee
 from tests.slicer.hand import cut, whole
 
@@ -110,6 +112,24 @@ def test_marks_go_along_with_every_copy() -> None:
         assert 0 < alone.sum() < len(alone)
         for copies in (many.no_support, many.no_seam):
             assert copies.touched(many.mesh).tolist() == 3 * alone.tolist()
+
+
+@pytest.mark.parametrize("axes", [None, ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))])
+def test_a_box_that_reaches_beyond_its_model_marks_no_copy_beside_it(axes: Any) -> None:
+    ring = together([box(4, 10, 9).transform(np.eye(3), (x, 0.0, 0.0)) for x in (-8.0, 8.0)])
+    right = Zone((2.0, -99.0, -1.0), (99.0, 99.0, 99.0))
+    if axes is not None:
+        right = Zone((-99.0, -99.0, -1.0), (99.0, -2.0, 99.0), axes)
+    marks = Marked((right,))
+    part = replace(whole(ring), no_seam=marks, no_support=marks, support=marks)
+    (many,) = in_copies(decomposed(part), 2, plate())[0].parts
+    alone, half = marks.touched(ring), 0.5 * len(ring.faces)
+    assert alone.sum() == half
+    cuts_mm, section = np.array([4.5]), of_contours(cross_sections(many.mesh, np.array([4.5]))[0])
+    for mark in (many.no_seam, many.no_support, many.support):
+        assert mark.touched(many.mesh).tolist() == 2 * alone.tolist()
+        (area,) = marked_areas(mark, many, many.in_part_frame(), cuts_mm)
+        assert (section ^ area).area() == pytest.approx(0.5 * section.area())
 
 
 def test_slender_copies_have_the_brim_that_one_alone_would_have() -> None:
