@@ -16,7 +16,7 @@ STDOUT = Path("-")  # stands for standard output where a file is asked for
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
 UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
-MOST_COPIES = 1000
+MOST_COPIES = 1000  # of a model, and models on a plate
 FORCE_GOES_ON = "--force goes on"  # how a sentence says that its error is forcible
 
 

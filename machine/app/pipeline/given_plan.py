@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from machine.app.requests import ModelRequest
+from machine.app.requests import MOST_COPIES, ModelRequest
 from mdp.directions.turns import turned_further
 from mdp.mesh import Floats
 from mdp.model_file import plan_beside
@@ -24,6 +24,14 @@ def check_alone(request: ModelRequest) -> None:
     if given:
         models = ", ".join(dict.fromkeys((request.model, *request.beside)))
         raise PlanError(f"{given[0]} goes with one model, and several are given: {models}")
+
+
+def check_number(request: ModelRequest) -> None:
+    """Raise PlanError for more models than a plate may have."""
+    count = request.copies * (1 + len(request.beside))
+    if count > MOST_COPIES:
+        of_each = f" with --copies {request.copies}" if request.copies > 1 else ""
+        raise PlanError(f"{count} models are to stand on the plate{of_each}: {MOST_COPIES} at most are allowed")
 
 
 def read_given_plan(request: ModelRequest) -> PlanFile | None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -14,13 +15,14 @@ from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import (
     as_turned,
     check_alone,
+    check_number,
     check_parts_named,
     lays_down,
     read_given_plan,
     with_plan_settings,
 )
 from machine.app.pipeline.memory import keep_modules, return_unused
-from machine.app.pipeline.plate import on_one_plate
+from machine.app.pipeline.plate import naming, on_one_plate
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest, check_copies
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
@@ -77,9 +79,13 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
     check_copies(request.copies, "--copies")
     check_alone(request)
+    check_number(request)
     began = perf_counter()
     models = [name for name in (request.model, *request.beside) for _ in range(request.copies)]
-    each = {name: _decompose_alone(replace(request, model=name), to_build) for name in dict.fromkeys(models)}
+    each = {}
+    for name in dict.fromkeys(models):
+        with naming(Path(name).name if request.beside else ""):
+            each[name] = _decompose_alone(replace(request, model=name), to_build)
     first = each[request.model]
     profile = first.profile if len(each) == 1 else request.profile  # each lies in its own way
     decomposition, profile = on_one_plate([each[name].decomposition for name in models], profile)

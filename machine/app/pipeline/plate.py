@@ -4,13 +4,14 @@ Layer by layer: the first parts of all models are one part of the print, the oth
 printed beside what stands. Or one model after the other (process.complete_objects): then the first parts are such limbs, too.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 
 from machine.planning.arrange import Misfit, arrange
-from machine.planning.fit import Place, standing_at
+from machine.planning.fit import Place, check_parts, standing_at
 from machine.planning.passing import Passing
 from mdp.cost.footing import tips_over
 from mdp.decomposition import Decomposition, Part
@@ -20,7 +21,7 @@ from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Marked, Zone
-from profiles.errors import PlanError
+from profiles.errors import MoveError, PlanError
 from profiles.machine import Machine
 from profiles.process import Process
 from profiles.profile import Profile
@@ -40,6 +41,9 @@ def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Dec
     places, passing = places_of(models, profile)
     x, y = profile.process.place_mm  # all are moved to that place together
     moved = [standing_at(model, (at_x - x, at_y - y)) for model, (at_x, at_y) in zip(passing.models, places, strict=True)]
+    for model in dict.fromkeys(moved):
+        with naming(model.name):
+            check_parts(model.parts[:1], profile)
     parts = [_first_of_all([moved[k].parts[n] for k, n in passing.together])] if passing.together else []
     for (k, n), pose in zip(passing.alone, passing.poses(dict(enumerate(places))), strict=True):
         parts.append(_beside(moved[k].parts[n], len(parts) + 1, pose, profile.machine))
@@ -54,6 +58,17 @@ def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Dec
     if passing.together:
         process = process.model_copy(update={"brim_mm": passing.brim_mm})  # judged alone: together they stand wider
     return _one_print(moved, parts), profile.model_copy(update={"process": process, "parts": settings})
+
+
+@contextmanager
+def naming(model: str) -> Iterator[None]:
+    """Have a MoveError name its model, one of several; "": there is only one."""
+    try:
+        yield
+    except MoveError as error:
+        if model:
+            error.args = (f"{model}: {error}",)
+        raise
 
 
 def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[Place], Passing]:
@@ -105,7 +120,7 @@ def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[
     (width, depth), alike = sizes_mm[misfit.number], len(dict.fromkeys(models)) == 1
     what = f"{models[misfit.number].name} measures {width:.1f} x {depth:.1f} mm, the plate of {profile.machine.name} has"
     if alike:
-        what = f"--copies {len(models)}: {what}"
+        what = f"{len(models)} copies: {what}"
     if misfit.is_met:
         others = "another one" if misfit.standing == 1 else f"{misfit.standing} others"
         wanted = "--parts 1 prints each in one piece, all layer by layer"

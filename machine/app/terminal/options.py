@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from machine.app.requests import Cuts, Given, ModelRequest, PortRequest, ProbeRequest, check_copies
+from machine.app.requests import MOST_COPIES, Cuts, Given, ModelRequest, PortRequest, ProbeRequest
+from profiles.errors import PlanError
 
 if TYPE_CHECKING:
     from profiles.profile import Profile
@@ -167,12 +168,14 @@ def named_models(models: list[str]) -> list[str]:
     """The models of a plate as often as they are to stand there: MODEL:N is a model N times. Raises PlanError."""
     named: list[str] = []
     for text in models:
-        counted = re.fullmatch(r"(.+[^:]):(\d{1,9})", text)
-        if counted is None or exists(text):
+        counted = re.fullmatch(r"(.*[^:]):([-+\d.]*)", text)
+        if counted is None or exists(text) or text == "demo:":
             named.append(text)
             continue
-        check_copies(int(counted[2]), f"the number of {counted[1]}")
-        named += int(counted[2]) * [counted[1]]
+        name, count = counted.groups()
+        if not re.fullmatch(r"[0-9]{1,9}", count) or not 1 <= int(count) <= MOST_COPIES:
+            raise PlanError(f"{text}: the number of copies behind {name}: must be a whole number from 1 to {MOST_COPIES}")
+        named += int(count) * [name]
     return named
 
 

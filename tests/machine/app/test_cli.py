@@ -78,7 +78,15 @@ WRONG = [
     (["export", "demo:tree", "-o", "x.gcode", "--part", "walls=4"], "--part walls=4: PART:KEY=VALUE,... is expected"),
     (["export", "demo:tree", "-o", "x.gcode", "--part", "2:walls=-4"], "part 2: process.walls is -4: it must be a whole number"),
     (["export", "demo:tree", "-o", "x.gcode", "--copies", "0"], "--copies is 0: 1 to 1000 is allowed"),
-    (["export", "demo:tree:0", "-o", "x.gcode"], "the number of demo:tree is 0: 1 to 1000 is allowed"),
+    *(
+        (["export", f"demo:tree:{count}", "-o", "x.gcode"], "demo:tree: must be a whole number from 1 to 1000")
+        for count in ("0", "-1", "2.5", "1001", "")
+    ),
+    (
+        ["export", "demo:tree:1000", "-o", "x.gcode", "--copies", "1000"],
+        "1000000 models are to stand on the plate with --copies 1000: 1000 at most are allowed",
+    ),
+    (["export", "demo:tree:999", "demo:bracket:2", "-o", "x.gcode"], "1001 models are to stand on the plate: 1000 at most"),
     (["export", "demo:tree", "nowhere.stl:2", "-o", "x.gcode"], "nowhere.stl: there is no such file"),
     (
         ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--plan", "box.toml"],

@@ -21,7 +21,7 @@ from mdp.mesh import Mesh, together
 from mdp.topology.components import vertex_components
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Grown, Marked, MeshVolume, Modifier, Zone
-from profiles.errors import PlanError
+from profiles.errors import MoveError, PlanError
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, load, with_part_settings
 from slicer.geometry.polygons import of_contours
@@ -141,7 +141,7 @@ def test_slender_copies_have_the_brim_that_one_alone_would_have() -> None:
 def test_copies_that_have_no_room_are_refused() -> None:
     with pytest.raises(PlanError) as refused:
         in_copies(decomposed(whole(box())), 100, plate())
-    room = "--copies 100: box measures 20.0 x 20.0 mm, the plate of generic A/C table has room for 37 with 5 mm between them"
+    room = "100 copies: box measures 20.0 x 20.0 mm, the plate of generic A/C table has room for 37 with 5 mm between them"
     assert str(refused.value) == room
 
 
@@ -234,6 +234,12 @@ def test_a_model_without_room_is_named_with_the_room_that_it_needs() -> None:
         on_one_plate(models, plate())
     sentence = "second measures 90.0 x 90.0 mm, the plate of generic A/C table has no room for it 5 mm from another model"
     assert str(refused.value).startswith(sentence)
+
+
+def test_a_model_that_is_too_high_among_others_is_named() -> None:
+    models = [decomposed(whole(box(20, 20, height)), name=f"{height} high") for height in (10, 300)]
+    with pytest.raises(MoveError, match=r"^300 high: part 1 reaches Z 300\.0 mm"):
+        on_one_plate(models, plate())
 
 
 def test_parts_that_are_printed_tilted_follow_beside_the_other_model_and_no_finding_tells_of_it() -> None:

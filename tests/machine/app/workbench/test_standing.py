@@ -52,7 +52,7 @@ def test_copies_stand_beside_the_model_and_what_has_no_room_or_is_in_parts_is_to
     assert (len(stood.copies_mm), stood.copies_mm[0], stood.copies_problem) == (3, (0.0, 0.0), "")
     crowd = stand(lambda report: None, replace(bench, copies=500))
     assert crowd.copies_mm == ((0.0, 0.0),)
-    assert crowd.copies_problem.startswith("--copies 500: ")
+    assert crowd.copies_problem.startswith("500 copies: ")
     cut = replace(bench, cuts=(PlannedPart((0.0, 0.0, 1.0), 20.0),))
     assert stand(lambda report: None, cut).copies_problem.endswith("copies are printed in one piece each: --parts 1")
 
