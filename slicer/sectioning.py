@@ -79,8 +79,8 @@ class Sections:
     Layers: `outlines` are all of each; `own` without the pedestal, `ungrooved` those before the grooves for later parts.
     Model around: later parts have `beside` of each layer and `above` of those over the last one, as many as shells reach; the
     model has `beneath` of those under the base plane, the nearest first, () where earlier parts are not known; earlier parts
-    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is its
-    outline, of use to part 1. `joints`, (k, 6) segments, are where the part meets others on the surface.
+    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is the
+    plate's outline, of use to parts that stand on it. `joints`, (k, 6) segments, are where the part meets others on the surface.
     Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
     Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, and what overhangs in its
     `enforced` does, () for nowhere. In `places` other settings hold, those of a later one over those of an earlier one.
@@ -236,7 +236,7 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
 
 
 def lay_on_plate(outlines: Sequence[Polygons], lowest: int, base: Polygons, width_mm: float) -> list[Polygons]:
-    """The sections of part 1, its lowest ones with all that stands on the platform.
+    """The sections of a part on the platform, the lowest ones with all that stands there.
 
     base: the section at PLATFORM_TOLERANCE_MM, below which surfaces stand by the search's definition (mdp.overhang.standing), as
     `lowest` layers do. Without it the rest of a base that is not quite level would lie in the second layer, in the air. What
@@ -346,7 +346,7 @@ def _without_pedestal(
 
 
 def plate_outline(table: Table) -> Polygons:
-    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
+    """The plate's outline in the frame of a part that is printed with the table level."""
     if table.size_mm is not None:
         return Polygons.square(table.size_mm, True)
     return Polygons.circle(table.radius_mm, 180)

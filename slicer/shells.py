@@ -73,7 +73,7 @@ IRONED = 100  # after all else of an island
 class Shell:
     """One layer of the part itself.
 
-    process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of part 1's first layer;
+    process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of the plate's first layer;
     ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; ironed: smoothed tops;
     infill: of the region's sparse places, None where it is not drawn yet.
     """
@@ -246,8 +246,8 @@ def cut_walls(
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
     Those that run round; inner walls along the surface that end on a cut face's, or where a modifier has fewer, all of one width,
-    and what fills between them; what the walls would enclose if the model were not cut and had so many fewer walls. above: the
-    model in the next layer, where what it leaves bare has one wall.
+    and what fills between them; what the walls would enclose if the model were not cut and had `more` walls fewer. above: the
+    model in the next layer, if the tops that it leaves bare have one wall.
     """
     whole, least, most = section if model is None else model, min(counts.all), max(counts.all)
     if model is None and least == most:

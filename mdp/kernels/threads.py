@@ -51,7 +51,7 @@ def ahead(work: Callable[..., Result], *arguments: Any) -> Future[Result]:
 def harmless(thread: threading.Thread) -> threading.Thread:
     """Note that a copy of this process may be made while a thread runs: it imports nothing and holds no lock that a copy needs.
     Most such threads wait for what comes through a pipe and hand it over."""
-    setattr(thread, HARMLESS, True)  # of the thread itself: a set could grow while it is walked
+    setattr(thread, HARMLESS, True)  # on the thread itself: a set could grow during iteration
     return thread
 
 

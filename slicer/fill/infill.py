@@ -76,7 +76,7 @@ def plan_fillings(
 ) -> list[Filling]:
     """The infills of a part, each with the density of its pattern.
 
-    sparse: what takes infill of each layer; sections: the part's own.
+    sparse: the area of each layer that takes infill; sections: the part's own.
     """
     fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
     areas: list[list[Polygons]] = [[] for _ in fillings]
@@ -102,8 +102,8 @@ def _apart_mm(process: Process) -> float:
 
 
 def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: Process, apart_mm: float = 0.0) -> list[Polygons]:
-    """What of a layer's sparse area each infill takes: a later one first, with the strips beside it that are too narrow for lines
-    of an earlier one."""
+    """A layer's sparse area divided among the infills: a later one takes its place first, with the strips beside it that are too
+    narrow for lines of an earlier one."""
     left, parts, width_mm = sparse, list[Polygons](), process.line_width_mm
     for filling in reversed(fillings):
         if filling.place is None or left.is_empty():
@@ -170,8 +170,8 @@ def filling_beads(sparse: Polygons, fillings: Sequence[Filling], process: Proces
 
 
 def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int, lightning: bool = True) -> Polygons:
-    """What of a layer's sparse area has lines too far apart to carry skin without bridges; lightning: that of this pattern, too,
-    whose branches come to the ends of skins."""
+    """The part of a layer's sparse area whose lines are too far apart to carry skin without bridges; lightning: also where
+    this is the pattern, whose branches come to the ends of skins."""
     areas = zip(fillings, divided(sparse, fillings, layer, process), strict=True)
     able = [(filling, area) for filling, area in areas if lightning or not filling.lightning]
     wide = [area for filling, area in able if filling.process(process).infill_density < DENSE]

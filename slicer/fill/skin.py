@@ -27,7 +27,7 @@ JOIN = 12.0  # spacings along the border: line ends nearer than this are joined
 EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
 RANK = 2  # behind gaps (slicer.walls.walls), before infill
 TOUCHING = 0.01  # of the spacing: neighbouring lines overlap by this at least, however little flow a skin asks for
-MOST_FLOW = 1.15  # what asks for more are specks whose lines hardly fit
+MOST_FLOW = 1.15  # only specks whose lines hardly fit ask for more
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
 

@@ -137,7 +137,8 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
 
 
 def rising_fan(material: Material, layer: int) -> float:
-    """Factor on the fan of part 1's layer (counted from 0): none up to fan_off_layers, then rising, 1 from fan_full_layer on."""
+    """Factor on the fan of a layer of a part on the plate, counted from 0: 0 up to fan_off_layers, then rising, 1 from
+    fan_full_layer on."""
     if layer < material.fan_off_layers:
         return 0.0
     return min((layer + 1 - material.fan_off_layers) / max(material.fan_full_layer - material.fan_off_layers, 1), 1.0)

@@ -1,4 +1,4 @@
-"""Widths of the beads by kind and in part 1's first layer."""
+"""Widths of the beads by kind and in the first layer on the plate."""
 
 import manifold3d as m3
 import numpy as np

@@ -49,7 +49,7 @@ def mm3(layer: Layer, within: Zone, *kinds: Kind) -> float:
 
 
 def density(layer: Layer, within: Zone) -> float:
-    """Of the sparse infill in a box."""
+    """The density of the sparse infill in a box."""
     x, y = np.subtract(within.max_mm, within.min_mm)[:2]
     return mm3(layer, within, Kind.INFILL) / (layer.height_mm * x * y)
 
@@ -65,7 +65,7 @@ def walls_across(layer: Layer, x: float) -> int:
 
 
 def speeds(layer: Layer, kind: Kind, right: bool) -> set[float]:
-    """Of the strokes of a kind on one side of x = 0."""
+    """The speeds of the strokes of a kind on one side of x = 0."""
     return {path.speed_mm_s for path in layer.paths if path.kind is kind and (path.points[:, 0].mean() > 0.0) == right}
 
 

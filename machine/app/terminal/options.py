@@ -118,7 +118,7 @@ class ProgramOptions(SearchOptions):
         list[str] | None,
         typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
     ] = None
-    copies: Annotated[int, typer.Option("--copies", metavar="N", help="so many of each model on the plate")] = 1
+    copies: Annotated[int, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate")] = 1
 
 
 @dataclass(frozen=True)
