@@ -264,9 +264,11 @@ def order_layer(
     strokes = split_overhangs(strokes, outline, below, own)
     if index == 0 and not on_platform and process.interlock == "grooves":
         strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
-    of_places = [place.over(process) for place in sections.speed_places]
-    areas = [place.areas[index] for place in sections.speed_places]
-    strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
+    places = sections.speed_places if index else []  # first layers have speeds of their own
+    of_places = [place.over(process) for place in places]
+    if places:
+        areas = [place.areas[index] for place in places]
+        strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
     strokes = in_pieces(strokes, height_mm)
     flow = profile.material.flow
     if index == 0:

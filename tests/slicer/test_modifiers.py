@@ -181,6 +181,11 @@ def test_speeds_hold_inside_and_the_strokes_stay_whole() -> None:
     assert other.volume_mm3 == pytest.approx(plain.volume_mm3, rel=1e-9)
 
 
+def test_speeds_inside_leave_the_strokes_of_the_first_layer_whole() -> None:
+    plain, other = (sliced(part).layers[0] for part in (BLOCK, modified(BLOCK, (RIGHT, {"outer_wall_speed_mm_s": 11.0}))))
+    assert [path.points.tobytes() for path in other.paths] == [path.points.tobytes() for path in plain.paths]
+
+
 def test_tops_and_bottoms_are_as_thick_as_the_settings_inside_say() -> None:
     part = modified(BLOCK, (RIGHT, {"top_layers": 10, "bottom_layers": 1, "top_thickness_mm": 0, "bottom_thickness_mm": 0}))
     solid = [
