@@ -157,7 +157,7 @@ def wall_counts(section: Polygons, layer: int, walls: int, more: int, places: Se
     for place in places:
         count, area_mm2 = place.settings["walls"] + more, (section ^ place.areas[layer]).area()
         if section.area() - area_mm2 < LEAST_MM2:
-            usual, others = count, []
-        elif area_mm2 >= LEAST_MM2 and (others or count != usual):
+            return WallCounts(count)
+        if area_mm2 >= LEAST_MM2 and count != usual:
             others.append((place.areas[layer], count))
     return WallCounts(usual, others)

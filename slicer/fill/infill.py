@@ -32,14 +32,13 @@ from slicer.fill.lines import (
 )
 from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, closing, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, closing, offset, opening, strips_beside, union
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
-TOUCHING_MM = 0.01  # places so near to each other are one
 RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}  # of straight families
@@ -116,13 +115,6 @@ def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: 
         parts.append(own)
         left = left if own.is_empty() else left - offset(own, apart_mm)
     return parts[::-1]
-
-
-def strips_beside(area: Polygons, whole: Polygons, least_mm: float) -> list[Polygons]:
-    """The strips that an area leaves of what is around it, narrower than least_mm."""
-    left, touched = whole - area, offset(area, TOUCHING_MM)
-    narrow = (left - opening(left, 0.5 * least_mm)) ^ offset(area, least_mm)
-    return [piece for piece in islands(narrow) if not (piece ^ touched).is_empty()]
 
 
 def infill_cell_mm(process: Process) -> float:

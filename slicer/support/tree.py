@@ -31,7 +31,8 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, offset, union
-from slicer.support.reachable import EVEN_MM, FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
+from slicer.heights import SAME_MM
+from slicer.support.reachable import FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
 JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
@@ -201,7 +202,7 @@ def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: i
     z_mm, lean = float(areas.heights.tip_mm[layer - 1]), float(areas.lean_mm[layer])
     rise, (least_mm, per_mm) = float(areas.heights.tip_mm[layer]) - z_mm, growth(areas.process, areas.radius_mm)
     thick = [trunk_radius_mm(branch.top_mm - z_mm, least_mm, per_mm) for branch in branches]
-    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + EVEN_MM]
+    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + SAME_MM]
     goals = _goals(np.array([[branches[k].x, branches[k].y] for k in trunks]), z_mm * lean / rise)
     goal_of = dict(zip(trunks, goals, strict=True))
     targets = []

@@ -36,7 +36,7 @@ def fuzzy_walls(beads: Sequence[Bead], process: Process, joints: Sequence[Polygo
 
 
 def _is_fuzzy(bead: Bead, wanted: str) -> bool:
-    if bead.line or wanted == "none":
+    if bead.line:
         return False
     if bead.kind is Kind.INNER_WALL:
         return wanted == "allwalls"
