@@ -22,7 +22,7 @@ _pools: dict[tuple[str, int], ThreadPoolExecutor] = {}
 
 
 def use_threads(count: int) -> None:
-    """Use so many threads from now on, for a process that is one of many on its machine."""
+    """Use that number of threads from now on, for a process that is one of many on its machine."""
     global THREADS  # one number for the process, as the cores are
     THREADS = count
 

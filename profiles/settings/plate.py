@@ -22,7 +22,7 @@ class Plate(Frozen):
         1,
         ge=0,
         le=20,
-        description="loops around the first layer on the plate, not touching it; with complete_objects around the first model only",
+        description="loops around the first layer on the plate, not touching it; with complete_objects of the first model",
     )
     skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from the first layer on the plate, mm")
     brim_mm: float = Field(
