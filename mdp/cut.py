@@ -58,12 +58,12 @@ def divide(upper: Solid, points_mm: Floats) -> tuple[Solid, Solid]:
 
 
 def above(solid: Solid, plane: Plane) -> Solid:
-    """What of a solid lies above a plane."""
+    """The part of a solid above a plane."""
     return solid ^ _half_space(solid, plane)
 
 
 def below(solid: Solid, plane: Plane) -> Solid:
-    """What of a solid lies below a plane."""
+    """The part of a solid below a plane."""
     return solid - _half_space(solid, plane)
 
 

@@ -86,7 +86,8 @@ class FrontRow:
 
 @dataclass(frozen=True, eq=False)
 class Decomposition:
-    """A model, or several on one plate, and their parts in print order (index 1, 2, ...); part 1 stands on the platform.
+    """A model, or several on one plate, and their parts in print order (index 1, 2, ...); the first part of each model stands on
+    the platform.
 
     risky_area_mm2 is what printing the whole model straight up leaves to support, residual_area_mm2 what the parts do.
     folded_mm3 is how far the mesh's volume may be from what the parts add up to, because its surface passes through itself.

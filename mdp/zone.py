@@ -187,9 +187,12 @@ class Modifier:
 
 @dataclass(frozen=True)
 class Zones:
-    """What a person says of places of a model. keep: no plane passes through; no_seam: rims there weigh many times, and layers do
-    not begin there; no_support: what overhangs there is not held up, and weighs many times; support: whatever overhangs there is
-    held up. modifiers: where other settings hold, those of a later one in place of an earlier one's."""
+    """The places of a model that a person marks.
+
+    keep: no plane passes through; no_seam: rims there weigh many times, and layers do not begin there; no_support: what overhangs
+    there is not held up, and weighs many times; support: whatever overhangs there is held up. modifiers: where other settings
+    hold, those of a later one in place of an earlier one's.
+    """
 
     keep: tuple[AnyZone, ...] = ()
     no_seam: tuple[AnyZone, ...] = ()
@@ -206,7 +209,7 @@ class Zones:
 
 @dataclass(frozen=True, eq=False)
 class Marked:
-    """What a person marks: in boxes of the workpiece frame, and on (m,) faces of a mesh; None: none is named."""
+    """The marks of one kind: boxes of the workpiece frame, and (m,) faces of a mesh; None: none is named."""
 
     boxes: tuple[Zone, ...] = ()
     faces: Mask | None = None
@@ -240,7 +243,7 @@ class Marked:
 
     @classmethod
     def together(cls, marks: Sequence[tuple["Marked", int]]) -> "Marked":
-        """What is marked of several meshes that become one; with each how many faces its mesh has."""
+        """The marks of several meshes that become one; with each the number of its mesh's faces."""
         boxes = tuple(box for mark, _ in marks for box in mark.boxes)
         if all(mark.faces is None for mark, _ in marks):
             return cls(boxes)

@@ -35,12 +35,12 @@ class Material(Frozen):
     fan_infill_bridge: float | None = Field(
         None, ge=0, le=1, description="part fan on the first solid layer over sparse infill; absent: fan_bridge"
     )
-    fan_off_layers: int = Field(1, ge=0, le=1000, description="layers of part 1 without any fan: they must stick to the plate")
+    fan_off_layers: int = Field(1, ge=0, le=1000, description="lowest layers on the plate without any fan: they must stick to it")
     fan_full_layer: int = Field(
         0,
         ge=0,
         le=1000,
-        description="layer of part 1 from which the fan may blow fully; it rises evenly from fan_off_layers to there",
+        description="layer above the plate from which the fan may blow fully; it rises evenly from fan_off_layers to there",
     )
     interlayer_strength_mpa: float = Field(
         20.0,

@@ -147,7 +147,7 @@ def _problems(process: Process, part: int, own: dict[str, Any], nozzle_mm: float
 
 
 def problems_of_place(process: Process, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
-    """What is wrong with values that are to hold in some place of a layer, a sentence for each."""
+    """The problems of values that are to hold in some place of a layer, a sentence for each."""
     for key in own:
         if key in Process.model_fields and key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
             yield (

@@ -120,7 +120,7 @@ def with_line_width(process: Process, width_mm: float | None) -> Process:
 
 
 def first_layer_process(process: Process) -> Process:
-    """The process of part 1's first layer: one wall where that is wanted, and one width of all beads where
+    """The process of the first layer on the plate: one wall where that is wanted, and one width of all beads where
     first_layer_line_width_mm gives one."""
     if process.only_one_wall_first_layer:
         process = process.model_copy(update={"walls": min(process.walls, 1)})

@@ -151,12 +151,13 @@ class WallCounts:
 
 
 def wall_counts(section: Polygons, layer: int, walls: int, more: int, places: Sequence[Place]) -> WallCounts:
-    """The walls of a section of a layer: the process's, or those of places, combined by that key; more: all have so many more."""
+    """The number of walls in each area of a layer's section: the process's, or that of places, combined by that key; more: walls
+    that are added to every number."""
     usual, others = walls + more, list[tuple[Polygons, int]]()
     for place in places:
         count, area_mm2 = place.settings["walls"] + more, (section ^ place.areas[layer]).area()
         if section.area() - area_mm2 < LEAST_MM2:
-            usual, others = count, []
-        elif area_mm2 >= LEAST_MM2 and (others or count != usual):
+            return WallCounts(count)
+        if area_mm2 >= LEAST_MM2 and count != usual:
             others.append((place.areas[layer], count))
     return WallCounts(usual, others)

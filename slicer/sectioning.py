@@ -30,6 +30,7 @@ from slicer.bead import (
 )
 from slicer.geometry.polygons import (
     CLOSING_MM,
+    TOUCHING_MM,
     Polygons,
     area_mm2,
     clean,
@@ -63,7 +64,6 @@ from slicer.modifiers import Place, combined, modified_places, most_shell_layers
 from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
-TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
 BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base plane
 
 
@@ -79,8 +79,8 @@ class Sections:
     Layers: `outlines` are all of each; `own` without the pedestal, `ungrooved` those before the grooves for later parts.
     Model around: later parts have `beside` of each layer and `above` of those over the last one, as many as shells reach; the
     model has `beneath` of those under the base plane, the nearest first, () where earlier parts are not known; earlier parts
-    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is its
-    outline, of use to part 1. `joints`, (k, 6) segments, are where the part meets others on the surface.
+    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is the
+    plate's outline, of use to parts that stand on it. `joints`, (k, 6) segments, are where the part meets others on the surface.
     Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
     Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, and what overhangs in its
     `enforced` does, () for nowhere. In `places` other settings hold, those of a later one over those of an earlier one.
@@ -166,10 +166,7 @@ def section_part(
     heights = part_heights(part, later, profile)
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
-    whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
-    nozzle_mm = profile.machine.head.nozzle_mm
-    outlines = [without_hairs(section, process, process.layer_height_mm, nozzle_mm) for section in whole]
-    too_thin = frozenset(i for i, outline in enumerate(outlines) if outline.is_empty() and not whole[i].is_empty())
+    outlines, too_thin = _printable(mesh, cuts_mm, profile)
     if on_platform and not pedestal:
         base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
         lowest = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM))
@@ -186,8 +183,6 @@ def section_part(
         ungrooved = _without_pedestal(ungrooved, mesh, cuts_mm, pedestal_mm, pedestal)
         own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
     below = plastic_below(part, earlier, outlines[0])
-    is_limb = part.base.limbs_mm is not None and bool(earlier)
-    near_limb = near_parts(part, earlier, AROUND_MM + process.support_distance_mm) if is_limb else []  # as far as its support
     return Sections(
         part=part,
         earlier=earlier,
@@ -203,7 +198,7 @@ def section_part(
         plate=plate_outline(profile.machine.table),
         above=above,
         beneath=beneath,
-        standing=sections_of(near_limb, part, cuts_mm) if is_limb and process.support != "none" else (),
+        standing=_standing_beside(part, earlier, cuts_mm, process),
         joints=joints(part, later, outlines[0], below),
         pins=pins.get(part.index, np.zeros((0, 3))),
         grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),
@@ -214,6 +209,14 @@ def section_part(
         pedestal_layers=pedestal,
         too_thin=too_thin,
     )
+
+
+def _printable(mesh: Mesh, cuts_mm: Floats, profile: Profile) -> tuple[list[Polygons], frozenset[int]]:
+    """The sections of a mesh without hairs, and the layers that hold something, but nothing that gets a line."""
+    process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
+    whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
+    outlines = [without_hairs(section, process, process.layer_height_mm, nozzle_mm) for section in whole]
+    return outlines, frozenset(i for i, outline in enumerate(outlines) if outline.is_empty() and not whole[i].is_empty())
 
 
 def vase_profile(profile: Profile) -> Profile:
@@ -236,7 +239,7 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
 
 
 def lay_on_plate(outlines: Sequence[Polygons], lowest: int, base: Polygons, width_mm: float) -> list[Polygons]:
-    """The sections of part 1, its lowest ones with all that stands on the platform.
+    """The sections of a part on the platform, the lowest ones with all that stands there.
 
     base: the section at PLATFORM_TOLERANCE_MM, below which surfaces stand by the search's definition (mdp.overhang.standing), as
     `lowest` layers do. Without it the rest of a base that is not quite level would lie in the second layer, in the air. What
@@ -265,6 +268,13 @@ def _model_around(
     under = sections_of([*before, *after], part, deep)[::-1] if known else []
     beneath = [closing(model, CLOSING_MM) for model in under]
     return others[:count], others[count:], beneath
+
+
+def _standing_beside(part: Part, earlier: Sequence[Part], cuts_mm: Floats, process: Process) -> Sequence[Polygons]:
+    """The sections of earlier parts in the layers of a limb, as far as its support reaches; () without support."""
+    if part.base.limbs_mm is None or not earlier or process.support == "none":
+        return ()
+    return sections_of(near_parts(part, earlier, AROUND_MM + process.support_distance_mm), part, cuts_mm)
 
 
 def reach_mm(process: Process) -> float:
@@ -346,7 +356,7 @@ def _without_pedestal(
 
 
 def plate_outline(table: Table) -> Polygons:
-    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
+    """The plate's outline in the frame of a part that is printed with the table level."""
     if table.size_mm is not None:
         return Polygons.square(table.size_mm, True)
     return Polygons.circle(table.radius_mm, 180)

@@ -27,7 +27,7 @@ from slicer.bead import (
     varying,
     wall_rank,
 )
-from slicer.fill.infill import Filling, filling_beads, has_lightning, open_area, plan_fillings, strips_beside, widest_cell_mm
+from slicer.fill.infill import Filling, filling_beads, has_lightning, open_area, plan_fillings, widest_cell_mm
 from slicer.fill.over_infill import ANCHORED, anchored, infill_bridges
 from slicer.fill.region import Cover, Region, ironed_areas, regions
 from slicer.fill.skin import SolidLines, skin_lines
@@ -42,12 +42,13 @@ from slicer.geometry.polygons import (
     of_contours,
     offset,
     opening,
+    strips_beside,
     union,
 )
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.interface.interface import limb_planes, plane_in_frame_of
-from slicer.modifiers import WallCounts, combined, wall_counts
+from slicer.modifiers import LEAST_MM2, WallCounts, combined, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import Sections
@@ -63,7 +64,6 @@ FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several pr
 Contours: TypeAlias = tuple[tuple[tuple[Floats, ...], ...], tuple[Wall, ...], tuple[Bead, ...], list[list[Floats]]]
 REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cut overlaps it by this
 TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
-LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
 THREADS_APART_MM = 0.05  # between the threads of a thick bridge, as in PrusaSlicer (BRIDGE_EXTRA_SPACING)
 IRONED = 100  # after all else of an island
@@ -73,7 +73,7 @@ IRONED = 100  # after all else of an island
 class Shell:
     """One layer of the part itself.
 
-    process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of part 1's first layer;
+    process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of the plate's first layer;
     ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; ironed: smoothed tops;
     infill: of the region's sparse places, None where it is not drawn yet.
     """
@@ -107,42 +107,16 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     layers: those that are asked for, all where None; of the others there is what these need, or nothing.
     """
     sections = supports.sections
-    process, nozzle_mm = sections.process, sections.profile.machine.head.nozzle_mm
+    process = sections.process
     processes = layer_processes(process, sections.on_platform, len(sections.outlines))
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
     model = model_sections(sections)
-    heights_mm, count = sections.heights.height_mm.tolist(), len(processes)
-    walled_places = combined(sections.places, ["walls"])
-    counts = [
-        wall_counts(section, layer, process.walls, own.walls - process.walls, walled_places if own.walls >= process.walls else ())
-        for layer, (section, own) in enumerate(zip(sections.own, processes, strict=True))
-    ]
-    over = [mine if whole is None else whole for mine, whole in zip(sections.own, model, strict=True)][1:]
-    over += sections.above[:1] or [Polygons()]
+    counts, count = _wall_counts(sections, processes), len(processes)
     # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
     whole = layers is None or has_lightning(process, sections.places)  # what holds a layer is planned from the top
     runs = [range(count)] if whole else [range(max(k - 1, 0), k + 1) for k in layers or ()]
     needed = sorted({layer for run in runs for layer in run})
-
-    def contours_of(place: int) -> Contours:
-        layer = needed[place]
-        own = processes[layer]
-        walls, ending, inside = cut_walls(
-            sections.own[layer],
-            model[layer],
-            own,
-            counts[layer],
-            height_mm=heights_mm[layer],
-            nozzle_mm=nozzle_mm,
-            more=max(own.walls - process.walls, 0),
-            above=over[layer] if own.only_one_wall_top else None,
-        )
-        areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
-        return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
-
-    walled = [_walls_from((), (), (), [[], []])] * count
-    for layer, found in zip(needed, parallel_map(contours_of, len(needed), FEWEST_LAYERS), strict=True):
-        walled[layer] = _walls_from(*found)
+    walled = _walled(sections, model, processes, counts, needed)
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
     filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs, sections.places)
     ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, sections.places)
@@ -164,6 +138,52 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
         ],
         fillings,
     )
+
+
+def _wall_counts(sections: Sections, processes: Sequence[Process]) -> list[WallCounts]:
+    """The number of walls of every layer, by its own settings."""
+    usual, places = sections.process.walls, combined(sections.places, ["walls"])
+    return [
+        wall_counts(section, layer, usual, own.walls - usual, places if own.walls >= usual else ())
+        for layer, (section, own) in enumerate(zip(sections.own, processes, strict=True))
+    ]
+
+
+def _walled(
+    sections: Sections,
+    model: Sequence[Polygons | None],
+    processes: Sequence[Process],
+    counts: Sequence[WallCounts],
+    needed: Sequence[int],
+) -> list[tuple[Walls, tuple[Bead, ...], Polygons]]:
+    """The walls of every layer as cut_walls has them; none in layers that are not needed."""
+    process, nozzle_mm, heights_mm = (
+        sections.process,
+        sections.profile.machine.head.nozzle_mm,
+        sections.heights.height_mm.tolist(),
+    )
+    whole = [mine if around is None else around for mine, around in zip(sections.own, model, strict=True)]
+    above = [*whole[1:], *(sections.above[:1] or [Polygons()])] if process.only_one_wall_top else [None] * len(whole)
+
+    def contours_of(place: int) -> Contours:
+        layer = needed[place]
+        walls, ending, inside = cut_walls(
+            sections.own[layer],
+            model[layer],
+            processes[layer],
+            counts[layer],
+            height_mm=heights_mm[layer],
+            nozzle_mm=nozzle_mm,
+            more=max(processes[layer].walls - process.walls, 0),
+            above=above[layer],
+        )
+        areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
+        return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
+
+    walled = [_walls_from((), (), (), [[], []])] * len(whole)
+    for layer, found in zip(needed, parallel_map(contours_of, len(needed), FEWEST_LAYERS), strict=True):
+        walled[layer] = _walls_from(*found)
+    return walled
 
 
 def lines_angle_deg(process: Process, layer: int) -> float:
@@ -246,8 +266,8 @@ def cut_walls(
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
     Those that run round; inner walls along the surface that end on a cut face's, or where a modifier has fewer, all of one width,
-    and what fills between them; what the walls would enclose if the model were not cut and had so many fewer walls. above: the
-    model in the next layer, where what it leaves bare has one wall.
+    and what fills between them; what the walls would enclose if the model were not cut and had `more` walls fewer. above: the
+    model in the next layer, if the tops that it leaves bare have one wall.
     """
     whole, least, most = section if model is None else model, min(counts.all), max(counts.all)
     if model is None and least == most:

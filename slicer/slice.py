@@ -48,8 +48,8 @@ FEWEST_IN_ALL = 250  # fewer are sliced sooner than processes are forked and the
 LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it
 SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
 PIN_RANK = OUTSIDE - 1  # pins come before all else of a layer
-PIN_CHORDS = 12  # of the circle that the tip goes round a pin
-PIN_MOST_AREA = 3.0  # of its stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
+PIN_CHORDS = 12  # chords of the circle that the tip goes round a pin
+PIN_MOST_AREA = 3.0  # section of its stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
 OnLayer = Callable[[int, int], None]
 
 
@@ -206,7 +206,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
 
 
 def _joints_near(sections: Sections, layer: int) -> list[Polygons]:
-    """What other parts take of a layer and of those next to it."""
+    """The areas of other parts in a layer and in those next to it."""
     near = [*sections.beside, *sections.above[:1]][max(layer - 1, 0) : layer + 2]
     return [area for area in (*near, *sections.standing[layer : layer + 1]) if not area.is_empty()]
 
@@ -264,9 +264,11 @@ def order_layer(
     strokes = split_overhangs(strokes, outline, below, own)
     if index == 0 and not on_platform and process.interlock == "grooves":
         strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
-    of_places = [place.over(process) for place in sections.speed_places]
-    areas = [place.areas[index] for place in sections.speed_places]
-    strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
+    places = sections.speed_places if index else []  # first layers have speeds of their own
+    of_places = [place.over(process) for place in places]
+    if places:
+        areas = [place.areas[index] for place in places]
+        strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
     strokes = in_pieces(strokes, height_mm)
     flow = profile.material.flow
     if index == 0:

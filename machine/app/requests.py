@@ -67,8 +67,8 @@ class ModelRequest:
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down the way that costs least; None: where nothing says how it lies. compare: with the same model in one part. force:
     go on although the dry run found errors. profile_names: of machine, material and process as the user has given them, names or
-    files. stops: where the print waits for a person. copies: how many of each model on the plate; beside: what else
-    stands there."""
+    files. stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other
+    models there."""
 
     model: str
     profile: "Profile"

@@ -111,7 +111,7 @@ def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Pro
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], begin: list[int], profile: Profile) -> Floats:
     """(k,) cross-section that the stated width and height of each remark need, with the factors of the profile and of its parts;
-    rows: of beads, the lowest layer of which lies on the plate, as does the first one of parts that begin there.
+    rows: of beads, the lowest layer of which lies on the plate; begin: further parts whose first layer does, too.
     """
     remarks = program.remarks
     width, height = remarks.width_mm, remarks.height_mm

@@ -19,7 +19,7 @@ from slicer.support.beads import support_cell_mm
 
 SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
 LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose
-ON_PLATE = 1.5  # heights of a bead: so low its top is where it lies on the plate
+ON_PLATE = 1.5  # heights of a bead: its top is no higher where it lies on the plate
 CROSSING_MM = 0.2  # on the way to a turn of the table, or from it to the next bead, the tip keeps so far above the print
 ACROSS_MM, WAY_MM = 0.5, 3.0  # a shorter way next to a bead is a wipe
 FEWEST_LEVELS = 3  # of beads, for a file's layers to be known by them
@@ -124,7 +124,7 @@ def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) 
 
 
 def parts_on_plate(program: ParsedProgram, deposited: Beads) -> list[int]:
-    """The parts after part 1 whose first layer lies on the plate: they begin further models, printed one after the other."""
+    """The parts after part 1 with a first layer on the plate: each begins another model, printed after the one before."""
     part, layer = program.remarks[:2]
     used = np.unique(program.remark[deposited.rows])
     lowest = np.full(int(part.max(initial=0)) + 1, np.iinfo(np.int64).max)

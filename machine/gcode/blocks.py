@@ -55,7 +55,7 @@ def check_blocks(profile: Profile) -> None:
 
 
 def _moving(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
-    """What of the block before layers cannot be run over a print."""
+    """A problem for each line of the block before layers that cannot be run over a print."""
     for line in lines:
         if not stands_still(line, dialect):
             yield (

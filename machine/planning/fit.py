@@ -61,8 +61,8 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
     if over_mm > ROUNDING:
         x, y = np.ptp(standing, axis=0)
         raise MoveError(
-            f"part 1 stands on {x:.1f} x {y:.1f} mm, {over_mm:.1f} mm over the edge of the plate of {machine.name}, {edge}: "
-            f"{_advice(profile)}"
+            f"the first layer on the plate is {x:.1f} x {y:.1f} mm, {over_mm:.1f} mm over the edge of the plate of "
+            f"{machine.name}, {edge}: {_advice(profile)}"
         )
 
 

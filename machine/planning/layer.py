@@ -62,10 +62,9 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
     machine, material = profile.machine, profile.material
     filament_mm2 = pi * material.diameter_mm**2 / 4.0
     area_mm2 = bead_area_mm2(layer.width_mm, layer.height_mm) * layer.flow
+    most_mm3_s = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s / RICHER * filament_mm2)
     with np.errstate(divide="ignore"):
-        fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s / RICHER * filament_mm2) / np.maximum(
-            area_mm2, 0.0
-        )
+        fastest = most_mm3_s / np.maximum(area_mm2, 0.0)
     accelerations = stroke_accelerations(profile, on_plate)
     by_kind = np.array([inf if accelerations is None else accelerations[kind] for kind in KINDS])
     speeds = path_speeds(points, layer.starts, np.minimum(layer.speed_mm_s, fastest), tip.speeds.axes_mm_s)

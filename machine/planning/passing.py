@@ -19,7 +19,7 @@ from slicer.interface.interface import AROUND_MM
 
 ROUNDING_DIGITS = 6
 CELLS_MM = (2.0, 0.6)  # finer ones would bring models nearer to each other by 2 mm at most, and take many times as long
-SIDES = 8  # of a brim's corner
+SIDES = 8  # sides of the polygon that stands for the round corner of a brim
 _ROUND = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)])
 Turn = tuple[int, int]  # a model of the plate and one of its parts, both by their places in the lists, from 0
 
@@ -88,7 +88,7 @@ class Passing:
         return self._known[key]
 
     def _passes(self, part: Part, pose: Pose, standing: Part, away_mm: Place) -> bool:
-        """Whether the head passes a part of another model, so far away from the part's own."""
+        """Whether the head passes a part of another model that stands away_mm from the part's own."""
         key = part, pose, standing, away_mm
         if key not in self._known:
             beside = self._hull(standing) + np.array([*away_mm, 0.0])

@@ -22,7 +22,7 @@ _pools: dict[tuple[str, int], ThreadPoolExecutor] = {}
 
 
 def use_threads(count: int) -> None:
-    """Use so many threads from now on, for a process that is one of many on its machine."""
+    """Use that number of threads from now on, for a process that is one of many on its machine."""
     global THREADS  # one number for the process, as the cores are
     THREADS = count
 
@@ -51,7 +51,7 @@ def ahead(work: Callable[..., Result], *arguments: Any) -> Future[Result]:
 def harmless(thread: threading.Thread) -> threading.Thread:
     """Note that a copy of this process may be made while a thread runs: it imports nothing and holds no lock that a copy needs.
     Most such threads wait for what comes through a pipe and hand it over."""
-    setattr(thread, HARMLESS, True)  # of the thread itself: a set could grow while it is walked
+    setattr(thread, HARMLESS, True)  # on the thread itself: a set could grow during iteration
     return thread
 
 

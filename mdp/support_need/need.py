@@ -45,9 +45,11 @@ def needs_support(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class SupportNeed:
-    """Of a whole model, for all directions a search asks for. weight: how many times an area over air counts, which support can
-    only be given by leaning or from support of other parts; enforced: (m,) faces that a person wants supported where they
-    overhang, also where they carry themselves."""
+    """The faces of a whole model that need support, for all directions a search asks for.
+
+    weight: how many times an area over air counts, which support can only be given by leaning or from support of other parts;
+    enforced: (m,) faces that a person wants supported where they overhang, also where they carry themselves.
+    """
 
     surface: LinkedFaces
     process: Process

@@ -17,7 +17,7 @@ class Layers(Frozen):
         45.0, ge=0, le=85, description="steepest overhang, from the printing direction, that prints without support, deg"
     )
     layer_height_mm: float = Field(0.2, ge=0.02, le=2, description="height of a layer, mm")
-    first_layer_height_mm: float = Field(0.2, ge=0.02, le=2, description="height of part 1's first layer, mm")
+    first_layer_height_mm: float = Field(0.2, ge=0.02, le=2, description="height of the first layer on the plate, mm")
     adaptive_cusp_mm: float = Field(
         0.0,
         ge=0,
@@ -36,9 +36,12 @@ class Layers(Frozen):
     )
     line_width_mm: float = Field(0.45, ge=0.1, le=4, description="width of a bead, mm")
     first_layer_line_width_mm: float | None = Field(
-        None, ge=0.1, le=4, description="width of all beads of part 1's first layer: wide ones stick; absent: as elsewhere, mm"
+        None,
+        ge=0.1,
+        le=4,
+        description="width of all beads of the first layer on the plate: wide ones stick; absent: as elsewhere, mm",
     )
-    first_layer_flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on extruded volume of part 1's first layer")
+    first_layer_flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on extruded volume of the first layer on the plate")
     outer_wall_line_width_mm: float | None = Field(
         None, ge=0.1, le=4, description="width of outer walls: narrow ones show finer detail; absent: line_width_mm, mm"
     )

@@ -40,12 +40,13 @@ class Motion(Frozen):
     support_interface_speed_mm_s: float = Field(
         40.0, gt=0, le=1000, description="speed of the dense layers of support, mm/s: their lines span the sparse ones"
     )
-    first_layer_speed_mm_s: float = Field(20.0, gt=0, le=1000, description="speed of part 1's first layer, mm/s")
+    first_layer_speed_mm_s: float = Field(20.0, gt=0, le=1000, description="speed of the first layer on the plate, mm/s")
     first_layer_infill_speed_mm_s: float | None = Field(
         None,
         gt=0,
         le=1000,
-        description="speed of skin and infill in part 1's first layer, mm/s, once its walls hold; absent: first_layer_speed_mm_s",
+        description="speed of skin and infill in the first layer on the plate, mm/s, once its walls hold; absent: "
+        "first_layer_speed_mm_s",
     )
     gap_speed_mm_s: float = Field(
         30.0, gt=0, le=1000, description="speed of the lines in gaps between walls, mm/s: their width changes all the time"
@@ -88,7 +89,7 @@ class Motion(Frozen):
         None, gt=0, le=100000, description="acceleration of bridges and overhanging walls; absent: acceleration_mm_s2, mm/s2"
     )
     first_layer_acceleration_mm_s2: float | None = Field(
-        None, gt=0, le=100000, description="acceleration of part 1's first layer; absent: acceleration_mm_s2, mm/s2"
+        None, gt=0, le=100000, description="acceleration of the first layer on the plate; absent: acceleration_mm_s2, mm/s2"
     )
     travel_acceleration_mm_s2: float | None = Field(
         None, gt=0, le=100000, description="acceleration of travels; absent: acceleration_mm_s2, mm/s2"

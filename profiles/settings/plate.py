@@ -1,4 +1,4 @@
-"""The plate: what helps part 1 to stick to it and to come off."""
+"""The plate: what helps a print to stick to it and to come off."""
 
 from pydantic import Field
 
@@ -18,20 +18,33 @@ class Plate(Frozen):
     complete_objects: bool = Field(
         False, description="several models on one plate are printed one after the other, each whole, not layer by layer together"
     )
-    skirt_loops: int = Field(1, ge=0, le=20, description="loops around part 1's first layer, not touching it")
-    skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from part 1, mm")
+    skirt_loops: int = Field(
+        1,
+        ge=0,
+        le=20,
+        description="loops around the first layer on the plate, not touching it; with complete_objects of the first model",
+    )
+    skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from the first layer on the plate, mm")
     brim_mm: float = Field(
-        0.0, ge=0, le=50, description="width of the brim around part 1's first layer, mm; 0: only where its base is too small"
+        0.0,
+        ge=0,
+        le=50,
+        description="width of the brim around the first layer on the plate, mm; 0: only where a base is too small",
     )
     small_base_brim_mm: float = Field(
         5.0,
         ge=0,
         le=50,
-        description="width of part 1's brim where a push of 1 N at the print's top would tip it off the plate, mm; 0: none",
+        description="width of the brim where a push of 1 N at the print's top would tip it off the plate, mm; 0: none",
     )
-    brim_gap_mm: float = Field(0.0, ge=0, le=5, description="gap between part 1 and its brim, mm; 0.1 comes off more easily")
+    brim_gap_mm: float = Field(
+        0.0, ge=0, le=5, description="gap between the first layer and its brim, mm; 0.1 comes off more easily"
+    )
     elephant_foot_mm: float = Field(
-        0.0, ge=0, le=1, description="part 1's first layer is this much smaller all round, as a warm plate squeezes it out, mm"
+        0.0,
+        ge=0,
+        le=1,
+        description="the first layer on the plate is this much smaller all round, as a warm plate squeezes it out, mm",
     )
     pedestal_gap_mm: float = Field(
         0.1, ge=0, le=1, description="gap between a pedestal and the model on it, so that it breaks away, mm"

@@ -21,7 +21,7 @@ class Shell(Frozen):
         description="one wall round surfaces that face the printing direction, whose skin takes the place of the others; not in "
         "layers that another part touches",
     )
-    only_one_wall_first_layer: bool = Field(False, description="one wall in part 1's first layer")
+    only_one_wall_first_layer: bool = Field(False, description="one wall in the first layer on the plate")
     wall_order: Literal["inner-first", "outer-first"] = Field(
         "inner-first",
         description="inner-first: the outer wall leans on finished plastic, best over overhangs; outer-first: nothing pushes it "

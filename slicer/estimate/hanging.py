@@ -41,7 +41,7 @@ def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
     middles = (begins + ends - 1) // 2
     # Hanging places lie anywhere in a thick layer, and support ends below it: the gaps are lost in that.
     coarse = {
-        "support": "auto",  # of the places that are wanted
+        "support": "auto",  # the wanted places are chosen already
         "layer_height_mm": STEP * process.layer_height_mm,
         "support_interface_layers": -(-process.support_interface_layers // STEP),
         "support_bottom_interface_layers": -(-process.support_bottom_interface_layers // STEP),

@@ -32,14 +32,13 @@ from slicer.fill.lines import (
 )
 from slicer.geometry.clip import merge_pieces
 from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, closing, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, closing, offset, opening, strips_beside, union
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
-TOUCHING_MM = 0.01  # places so near to each other are one
 RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}  # of straight families
@@ -76,7 +75,7 @@ def plan_fillings(
 ) -> list[Filling]:
     """The infills of a part, each with the density of its pattern.
 
-    sparse: what takes infill of each layer; sections: the part's own.
+    sparse: the area of each layer that takes infill; sections: the part's own.
     """
     fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
     areas: list[list[Polygons]] = [[] for _ in fillings]
@@ -102,8 +101,8 @@ def _apart_mm(process: Process) -> float:
 
 
 def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: Process, apart_mm: float = 0.0) -> list[Polygons]:
-    """What of a layer's sparse area each infill takes: a later one first, with the strips beside it that are too narrow for lines
-    of an earlier one."""
+    """A layer's sparse area divided among the infills: a later one takes its place first, with the strips beside it that are too
+    narrow for lines of an earlier one."""
     left, parts, width_mm = sparse, list[Polygons](), process.line_width_mm
     for filling in reversed(fillings):
         if filling.place is None or left.is_empty():
@@ -116,13 +115,6 @@ def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: 
         parts.append(own)
         left = left if own.is_empty() else left - offset(own, apart_mm)
     return parts[::-1]
-
-
-def strips_beside(area: Polygons, whole: Polygons, least_mm: float) -> list[Polygons]:
-    """The strips that an area leaves of what is around it, narrower than least_mm."""
-    left, touched = whole - area, offset(area, TOUCHING_MM)
-    narrow = (left - opening(left, 0.5 * least_mm)) ^ offset(area, least_mm)
-    return [piece for piece in islands(narrow) if not (piece ^ touched).is_empty()]
 
 
 def infill_cell_mm(process: Process) -> float:
@@ -170,8 +162,8 @@ def filling_beads(sparse: Polygons, fillings: Sequence[Filling], process: Proces
 
 
 def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int, lightning: bool = True) -> Polygons:
-    """What of a layer's sparse area has lines too far apart to carry skin without bridges; lightning: that of this pattern, too,
-    whose branches come to the ends of skins."""
+    """The part of a layer's sparse area whose lines are too far apart to carry skin without bridges; lightning: also where
+    this is the pattern, whose branches come to the ends of skins."""
     areas = zip(fillings, divided(sparse, fillings, layer, process), strict=True)
     able = [(filling, area) for filling, area in areas if lightning or not filling.lightning]
     wide = [area for filling, area in able if filling.process(process).infill_density < DENSE]

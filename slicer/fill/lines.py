@@ -169,7 +169,7 @@ def _next_ends(along_border: Floats, ends: Indices, border: EdgeIndex, way: Floa
 
 @helper
 def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> tuple[Indices, Indices]:
-    """Of each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
+    """For each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
     partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
     for here in range(len(after)):
         ties[here] = np.rint(gap[here] / TIE_MM)
@@ -199,7 +199,7 @@ def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> t
 
 @helper
 def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm: float) -> Floats:
-    """Of each end the length of its hook, negative for a way back along the border."""
+    """The length of each end's hook, negative for a way back along the border."""
     hooks: Floats = floats(len(after), 0.0)
     free, before = floats(len(after), 0.0), longs(len(after), 0)
     for here in range(len(after)):
@@ -218,7 +218,7 @@ def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, hook_m
 
 @helper
 def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Floats:
-    """Of each end the length of its run along the border, to its partner or as a hook; negative: backward."""
+    """The length of each end's run along the border, to its partner or as a hook; negative: backward."""
     runs: Floats = floats(len(partner), 0.0)
     for here in range(len(partner)):
         runs[here] = hooks[here]

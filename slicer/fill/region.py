@@ -32,7 +32,7 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """What of the uncut model lies around a part's layers.
+    """The uncut model around a part's layers.
 
     sections, insides: of each layer, and what walls would enclose of it; below, above: of as many layers under the first and
     over the last one as shells look, the nearest first. later: what of each layer, and of those over the last one, parts
@@ -82,7 +82,7 @@ def regions(
 
 
 def _hollow(run: range, cover: Cover, process: Process) -> list[Polygons]:
-    """What would be sparse of a run of layers if the model were in one piece."""
+    """The area of each layer of a run that would be sparse if the model were in one piece."""
     top, bottom = shell_layers(process)
     inner = cover.insides[run.start : run.stop]
     stacked = [cover.section(layer) for layer in range(run.start - bottom, run.stop + top)]
@@ -93,14 +93,14 @@ def _hollow(run: range, cover: Cover, process: Process) -> list[Polygons]:
 
 
 def _solid_rule(process: Process) -> tuple[object, ...]:
-    """What of the settings decides what becomes solid."""
+    """The settings that decide which places become solid."""
     density = process.infill_density
     return shell_layers(process), density >= 1.0, density > 0.0, process.solid_below_mm2
 
 
 def _hollow_with(hollow: Sequence[Polygons], run: range, cover: Cover, place: Place, process: Process) -> list[Polygons]:
-    """What would be sparse of a run of layers, within the place by its settings; strips along its border that are too narrow for
-    infill become solid."""
+    """The sparse areas of a run of layers with those by a place's settings within it; strips along its border that are too narrow
+    for infill become solid."""
     own, width_mm, areas = place.over(process), process.line_width_mm, place.areas
     there = [layer for layer in run if not areas[layer].is_empty()]
     if not there:

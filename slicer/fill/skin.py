@@ -7,7 +7,7 @@ over tops that stay visible, in dense lines that hardly push any plastic.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -27,7 +27,7 @@ JOIN = 12.0  # spacings along the border: line ends nearer than this are joined
 EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
 RANK = 2  # behind gaps (slicer.walls.walls), before infill
 TOUCHING = 0.01  # of the spacing: neighbouring lines overlap by this at least, however little flow a skin asks for
-MOST_FLOW = 1.15  # what asks for more are specks whose lines hardly fit
+MOST_FLOW = 1.15  # only specks whose lines hardly fit ask for more
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
 
@@ -64,22 +64,25 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
     The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
     it. Where lines would no longer touch each other for that, in narrow places that are all line ends, they reach half as far.
     """
-    spacing, width_mm, in_order = solid.spacing_mm, solid.width_mm, solid.pattern == "monotonic"
+    in_order = solid.pattern == "monotonic"
     beads, rests = list[Bead](), list[Polygons]()
-    least_flow = 1.0 + TOUCHING - solid.height_mm * ROUND_SIDES / spacing
+    least_flow = 1.0 + TOUCHING - solid.height_mm * ROUND_SIDES / solid.spacing_mm
     for island in islands(area):
-        for overlap in (solid.overlap, 0.5 * solid.overlap):
-            lines = _lines(offset(island, -(0.5 * spacing - overlap * width_mm)), solid)
-            rest = uncovered_area(island, lines, width_mm)
-            total = sum(length_mm(line) for line in lines)
-            flow = (island.area() - rest.area()) / (total * spacing) if total > 0 else 0.0
-            if flow >= least_flow or total <= 0:
-                break
+        lines, rest, flow = _filled(island, solid)
+        if lines and flow < least_flow and solid.overlap > 0.0:
+            lines, rest, flow = _filled(island, replace(solid, overlap=0.5 * solid.overlap))
         rests.append(rest)
-        if total > 0:
-            flow = min(max(flow, least_flow), MOST_FLOW)
-            beads += [Bead(kind, line, width_mm, RANK, flow, follows=in_order and k > 0) for k, line in enumerate(lines)]
+        flow = min(max(flow, least_flow), MOST_FLOW)
+        beads += [Bead(kind, line, solid.width_mm, RANK, flow, follows=in_order and k > 0) for k, line in enumerate(lines)]
     return beads, rests
+
+
+def _filled(island: Polygons, solid: SolidLines) -> tuple[list[Floats], Polygons, float]:
+    """The lines of a connected piece, the places that they leave, and the flow that fills the rest; 0 without lines."""
+    lines = _lines(offset(island, -(0.5 * solid.spacing_mm - solid.overlap * solid.width_mm)), solid)
+    rest = uncovered_area(island, lines, solid.width_mm)
+    total = sum(length_mm(line) for line in lines)
+    return lines, rest, (island.area() - rest.area()) / (total * solid.spacing_mm) if lines else 0.0
 
 
 def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:

@@ -18,6 +18,7 @@ Polygons: TypeAlias = CrossSection
 
 RESOLUTION_MM = 0.004  # finer detail no printer shows; keeps outer walls within 0.005 mm and the area of a layer within 0.05 mm2
 CLOSING_MM = 0.018  # so far plastic may reach over a section, 4 % of a usual line, where a slit of twice that is closed
+TOUCHING_MM = 0.01  # places so near to each other are one
 MITRE = 3.0  # times the distance: corners sharper than 39 degrees are cut off
 ARC_SEGMENTS = 32  # of a full turn: a corner of half a line, 0.2 mm, is round to a micrometre
 ROUNDING_MM2 = 1e-9  # an offset inward that leaves less leaves nothing
@@ -36,7 +37,7 @@ def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
 
 
 def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polygons:
-    """Every boundary moved outward (negative: inward) by the distance, corners mitred up to so many distances.
+    """Every boundary moved outward (negative: inward) by the distance, corners mitred up to `mitre` distances.
 
     >>> offset(Polygons.square((2.0, 1.0)), 0.5).area()
     6.0
@@ -45,7 +46,7 @@ def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Poly
 
 
 def offset_round(polygons: Polygons, distance_mm: float, segments: int = ARC_SEGMENTS) -> Polygons:
-    """Every boundary moved outward (negative: inward) by the distance, corners round, a full turn in so many segments."""
+    """Every boundary moved outward (negative: inward) by the distance, corners round, a full turn in that number of segments."""
     return _moved(polygons, distance_mm, JoinType.Round, MITRE, segments)
 
 
@@ -126,6 +127,13 @@ def larger(polygons: Polygons, least_mm2: float) -> Polygons:
     return polygons if len(large) == len(pieces) else Polygons.compose(large) if large else Polygons()
 
 
+def strips_beside(area: Polygons, whole: Polygons, least_mm: float) -> list[Polygons]:
+    """The strips that an area leaves of what is around it, narrower than least_mm."""
+    left, touched = whole - area, offset(area, TOUCHING_MM)
+    narrow = (left - opening(left, 0.5 * least_mm)) ^ offset(area, least_mm)
+    return [piece for piece in islands(narrow) if not (piece ^ touched).is_empty()]
+
+
 def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
     """The upright rectangle round polygons, farther out by the reach."""
     x0, y0, x1, y1 = polygons.bounds()
@@ -133,7 +141,7 @@ def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
 
 
 def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
-    """What of polygons lies where a x + b y + c > 0; all of them where it is nowhere less than 0."""
+    """The part of polygons where a x + b y + c > 0; all of them where it is nowhere less than 0."""
     if polygons.is_empty():
         return polygons
     x0, y0, x1, y1 = polygons.bounds()

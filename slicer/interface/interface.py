@@ -235,7 +235,7 @@ def skin_beside(edges: Floats, section: Polygons, z_mm: float, process: Process)
 
 
 def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
-    """What of the plane at a height lies about as near as that to segments (n, 6) in space."""
+    """The part of the plane at a height that lies about as near as that to segments (n, 6) in space."""
     near = near_height(edges, z_mm, reach_mm)
     if not len(near):
         return Polygons()

@@ -34,14 +34,14 @@ def speeds_mm_s(
     of_places: Sequence[Process] = (),
 ) -> Floats:
     """(k,) speeds of a layer's strokes; fixed_mm_s replaces the process's speeds by kind, flow multiplies every stroke's flow.
-    of_places: the processes of the places in which other settings hold.
+    of_places: the processes of the places in which other settings hold; none where fixed_mm_s holds.
 
     Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
     below least_speed_mm_s.
     """
     process = profile.process
     asked = _of_strokes(strokes, process) if fixed_mm_s is None else _by_kind(fixed_mm_s)[strokes.kind]
-    for number, own in enumerate(of_places if fixed_mm_s is None else (), start=1):
+    for number, own in enumerate(of_places, start=1):
         asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
     areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
     speeds = steady(np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas), strokes.lengths_mm)
@@ -137,7 +137,8 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
 
 
 def rising_fan(material: Material, layer: int) -> float:
-    """Factor on the fan of part 1's layer (counted from 0): none up to fan_off_layers, then rising, 1 from fan_full_layer on."""
+    """Factor on the fan of a layer of a part on the plate, counted from 0: 0 up to fan_off_layers, then rising, 1 from
+    fan_full_layer on."""
     if layer < material.fan_off_layers:
         return 0.0
     return min((layer + 1 - material.fan_off_layers) / max(material.fan_full_layer - material.fan_off_layers, 1), 1.0)

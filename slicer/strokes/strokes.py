@@ -41,8 +41,8 @@ class Strokes:
     approach: (m, 2) points that the travels to strokes pass; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS;
     width_mm: mean; flow, over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or
     nothing of it lies on plastic; small: a closed wall no longer than process.small_wall_mm, also the pieces of one whose width
-    varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back; place: of those in which
-    other settings hold, counted from 1, 0: none.
+    varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back; place: the number of the
+    place in which other settings hold, from 1; 0: none.
     """
 
     points: Floats

@@ -22,8 +22,8 @@ from slicer.paths import Kind, Layer, Path, bead_area_mm2
 from slicer.sectioning import Sections
 from slicer.strokes.speed import fan_share, rising_fan
 
-SHRINKS = 0.999  # of the area of the layer below
-MOST_IN_AIR, MOST_IN_AIR_MM = 0.5, 30.0  # of a turn, and of the longest turns: the dry run refuses more
+SHRINKS = 0.999  # share of the area below: a layer with less is part of a tip
+MOST_IN_AIR, MOST_IN_AIR_MM = 0.5, 30.0  # share of a turn, and length of it: the dry run refuses more
 PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
 

@@ -35,12 +35,12 @@ from slicer.geometry.polygons import (
 )
 from slicer.geometry.polyline import Segment
 from slicer.paths import Kind
+from slicer.support.reachable import SMOOTH_MM
 from slicer.support.support import Supports
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
 ROOF_LAYERS = 3  # of a pedestal: the first of them sags between the sparse lines, the last one is even
 PEDESTAL_DENSITY = 0.25  # of its inside: lines near enough for the roof to span, as a raft's base
-ROUGH_MM = 0.05  # by which outlines of support are simplified: they are seen by nobody
 SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it
 BRIM_RANK = -2000  # before all walls; the loops count down from it
 LEAST_COVERED_MM2 = 1e-3  # areas smaller than this are rounding
@@ -74,7 +74,7 @@ def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: 
     beads = [
         Bead(Kind.SUPPORT, close_loop(loop), width, OUTSIDE)
         for level in range(process.support_walls)
-        for loop in contours(offset(area, -0.5 * width - level * spacing).simplify(ROUGH_MM))
+        for loop in contours(offset(area, -0.5 * width - level * spacing).simplify(SMOOTH_MM))
     ]
     edge = process.support_walls * spacing
     inner = offset(area, SEAM * width - edge) if edge else area

@@ -21,7 +21,7 @@ from mdp.pose import UP
 from profiles.machine import Machine
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, half_plane, offset, offset_round, union, unite_layers
-from slicer.heights import Heights
+from slicer.heights import SAME_MM, Heights
 from slicer.interface.interface import LEVEL, BasePlane, in_frame_of, plane_in_frame_of, room_of
 from slicer.sectioning import Sections
 
@@ -31,7 +31,6 @@ FINE_MM = 0.005  # reachable places are simplified by this
 SPARE = 0.15  # share of the lean that reachable places keep in reserve, so that more than a point of the layer below is near
 SMOOTH_MM = 0.05  # support is simplified by this: its edges come from single faces, and nobody needs them
 SLIVER_MM = 0.02  # what is narrower than twice this and has no place has neighbours that do
-EVEN_MM = 1e-6  # heights nearer than this are equal
 SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
 LEAST_MM2 = 1e-5  # places smaller than this are rounding
 BEYOND = 0.75  # of the radius: how far from plastic the middle of a disc may stand; its inner beads then lie on the edge
@@ -82,18 +81,18 @@ class ReachableAreas:
         process, drop_mm = self.process, float(self.heights.bottom_mm[layer]) - self.process.support_gap_mm
         steepest = 0.0 if self.sections.enforced else tan(radians(process.self_supporting_angle_deg))
         slack_mm = process.support_distance_mm / max(steepest, STEEPEST)
-        highest = int(np.searchsorted(self.heights.tip_mm, drop_mm + EVEN_MM, side="right")) - 1
-        lowest = int(np.searchsorted(self.heights.tip_mm, drop_mm - slack_mm - EVEN_MM))
+        highest = int(np.searchsorted(self.heights.tip_mm, drop_mm + SAME_MM, side="right")) - 1
+        lowest = int(np.searchsorted(self.heights.tip_mm, drop_mm - slack_mm - SAME_MM))
         return range(highest, min(lowest, highest) - 1, -1) if highest >= 0 else range(0)
 
     def next_above(self, layer: int) -> int:
         """The first layer over one that support in it keeps no gap to."""
-        return int(np.searchsorted(self.heights.bottom_mm, self.heights.tip_mm[layer] + self.process.support_gap_mm - EVEN_MM))
+        return int(np.searchsorted(self.heights.bottom_mm, self.heights.tip_mm[layer] + self.process.support_gap_mm - SAME_MM))
 
     def next_below(self, layer: int) -> int:
         """How many layers lie so far under one that support in it may stand on them."""
         drop_mm = self.heights.bottom_mm[layer] - self.process.support_bottom_gap_mm
-        return min(int(np.searchsorted(self.heights.tip_mm, drop_mm + EVEN_MM, side="right")), layer)
+        return min(int(np.searchsorted(self.heights.tip_mm, drop_mm + SAME_MM, side="right")), layer)
 
 
 def dilate(area: Polygons, distance_mm: float) -> Polygons:
@@ -120,7 +119,7 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
     plain = [s if s.is_empty() else s.simplify(COARSE_MM) for s in sections.outlines[:highest]]
     wide = [s if s.is_empty() else offset(s, radius + MARGIN_MM) for s in plain]
     tall = [s if s.is_empty() else offset(s, radius + process.support_distance_mm + MARGIN_MM) for s in plain[:count]]
-    root = int(np.searchsorted(np.maximum(areas.heights.bottom_mm, 0.0), process.support_bottom_gap_mm - EVEN_MM))
+    root = int(np.searchsorted(np.maximum(areas.heights.bottom_mm, 0.0), process.support_bottom_gap_mm - SAME_MM))
     placeable: list[Polygons] = []
     reachable: list[Polygons] = []
     for m in range(count):
@@ -168,7 +167,7 @@ def blocked_areas(sections: Sections, count: int, gap_mm: float, far_mm: float) 
 def unwanted_areas(sections: Sections) -> list[Polygons]:
     """For each layer where a person wants no support: in the boxes, and over the faces as far as what would stand on them."""
     heights, gap_mm = sections.heights, sections.process.support_bottom_gap_mm
-    near = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + EVEN_MM, side="right")
+    near = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + SAME_MM, side="right")
     return [union(sections.no_support[max(lowest - 1, 0) : k + 1]) for k, lowest in enumerate(near.tolist())]
 
 
@@ -198,8 +197,8 @@ def beside_standing(sections: Sections, layers: slice, far_mm: float) -> list[Po
     heights, stands = sections.heights[layers], sections.standing[layers]
     outside = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True) - room_of(part)
     reaches = out_of_reach(part, sections.earlier, heights.tip_mm.tolist(), machine)
-    low = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + EVEN_MM)
-    high = np.searchsorted(heights.bottom_mm, heights.tip_mm + gap_mm - EVEN_MM)
+    low = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + SAME_MM)
+    high = np.searchsorted(heights.bottom_mm, heights.tip_mm + gap_mm - SAME_MM)
     near = [union(stands[a:b]) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
     beside = [offset(area, process.support_distance_mm) if not area.is_empty() else area for area in near]
     return [union([outside, *areas]) for areas in zip(beside, reaches, strict=True)]

@@ -9,13 +9,13 @@ import numpy as np
 from mdp.clearance import least_tip_height_mm
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, larger, offset, opening, union
+from slicer.heights import SAME_MM
 from slicer.overhangs import LEAST_MM2, Overhang
 from slicer.paths import Unsupported
 from slicer.sectioning import RIM_MM, Sections
 from slicer.support.reachable import (
     BEYOND,
     COARSE_MM,
-    EVEN_MM,
     SLIVER_MM,
     SMOOTH_MM,
     SPECK_MM2,
@@ -100,8 +100,8 @@ def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Pol
             hanging = hanging ^ sections.enforced[k] if sections.enforced else Polygons()
         if not hanging.is_empty():
             drop = float(heights.bottom_mm[k]) - process.support_gap_mm
-            near = list(outlines[int(np.searchsorted(heights.tip_mm, drop - EVEN_MM)) : max(k - 1, 0)])
-            if k and drop <= EVEN_MM:
+            near = list(outlines[int(np.searchsorted(heights.tip_mm, drop - SAME_MM)) : max(k - 1, 0)])
+            if k and drop <= SAME_MM:
                 below = sections.plastic_below
                 hanging = Polygons() if below is None else hanging - union([*near, below])
             elif near:
@@ -351,9 +351,9 @@ def _without_near(k: int, bare: Polygons, areas: ReachableAreas) -> Polygons:
     """An unsupported place less what has plastic or the platform so near below that no layer of support fits between."""
     process = areas.process
     lowest = float(areas.heights.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
-    if lowest <= EVEN_MM and areas.sections.on_platform:
+    if lowest <= SAME_MM and areas.sections.on_platform:
         return Polygons()
-    near = list(areas.sections.outlines[int(np.searchsorted(areas.heights.tip_mm, lowest - EVEN_MM)) : k - 1])
+    near = list(areas.sections.outlines[int(np.searchsorted(areas.heights.tip_mm, lowest - SAME_MM)) : k - 1])
     rest = bare - union(near) if near else bare
     return rest if rest.area() >= LEAST_MM2 else Polygons()
 
@@ -384,7 +384,7 @@ def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
     """Why none of the ways to hold a place of a layer was open."""
     process, heights, least_mm2 = sections.support_process, sections.heights, MOST * hanging.area()
     drop = float(heights.bottom_mm[layer]) - process.support_gap_mm
-    top = max(int(np.searchsorted(heights.tip_mm, drop + EVEN_MM, side="right")) - 1, 0)
+    top = max(int(np.searchsorted(heights.tip_mm, drop + SAME_MM, side="right")) - 1, 0)
     if sections.on_platform and (hanging - offset(sections.plate, -process.line_width_mm)).area() >= least_mm2:
         return "the plate ends before"
     under, far_mm = heights[top : top + 1], support_reach_mm(sections)
@@ -396,7 +396,7 @@ def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
     if sections.standing and (hanging ^ beside_standing(sections, slice(top, top + 1), far_mm)[0]).area() >= least_mm2:
         return "support would stand where the head meets what is printed before"
     room_mm = process.support_gap_mm + process.support_bottom_gap_mm + process.layer_height_mm
-    lowest = int(np.searchsorted(heights.tip_mm, drop - room_mm + EVEN_MM))
+    lowest = int(np.searchsorted(heights.tip_mm, drop - room_mm + SAME_MM))
     if (hanging ^ union(list(sections.outlines[lowest : max(layer - 1, 0)]))).area() >= least_mm2:
         return "there is no room for support between it and the plastic below"
     aside_mm = process.support_distance_mm + process.line_width_mm

@@ -31,7 +31,8 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, offset, union
-from slicer.support.reachable import EVEN_MM, FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
+from slicer.heights import SAME_MM
+from slicer.support.reachable import FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
 JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
@@ -42,8 +43,8 @@ FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin re
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
 TIDY_EVERY = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
 INSET = 0.7  # of the lean: then right corners move by the lean
-LEAST_SECTION = 0.8  # of the section of a branch: support with less is a needle, which the nozzle knocks over
-STOUT = (0.3, 0.5, 0.8, 1.2)  # of a branch's diameter: how far from a needle's middle places are added to it
+LEAST_SECTION = 0.8  # share of a branch's section: support with less is a needle, which the nozzle knocks over
+STOUT = (0.3, 0.5, 0.8, 1.2)  # branch diameters from a needle's middle within which places are added to it
 
 
 STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
@@ -169,7 +170,7 @@ def least_section_mm2(process: Process) -> float:
 
 
 def places_about_needles(places: Polygons, reachable: Polygons, areas: ReachableAreas) -> Polygons:
-    """Of the places of a layer's support those of needles, with the reached ones about them that make each thick enough."""
+    """The places of needles in a layer's support, with the reached places about them that make each thick enough."""
     radius, least_mm2, added = areas.radius_mm, least_section_mm2(areas.process), []
     for piece in islands(places):
         # No piece of that area has a smaller section than a round one (Brunn and Minkowski).
@@ -201,7 +202,7 @@ def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: i
     z_mm, lean = float(areas.heights.tip_mm[layer - 1]), float(areas.lean_mm[layer])
     rise, (least_mm, per_mm) = float(areas.heights.tip_mm[layer]) - z_mm, growth(areas.process, areas.radius_mm)
     thick = [trunk_radius_mm(branch.top_mm - z_mm, least_mm, per_mm) for branch in branches]
-    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + EVEN_MM]
+    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + SAME_MM]
     goals = _goals(np.array([[branches[k].x, branches[k].y] for k in trunks]), z_mm * lean / rise)
     goal_of = dict(zip(trunks, goals, strict=True))
     targets = []

@@ -17,7 +17,7 @@ from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
 from slicer.geometry.polygons import Polygons, area_mm2, offset, union
 from slicer.paths import Kind
 
-SPREAD = 0.25  # of the distance of points, by which it varies
+SPREAD = 0.25  # share by which the distance of points varies
 FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays even, or nothing would be left of it
 
 
@@ -36,7 +36,7 @@ def fuzzy_walls(beads: Sequence[Bead], process: Process, joints: Sequence[Polygo
 
 
 def _is_fuzzy(bead: Bead, wanted: str) -> bool:
-    if bead.line or wanted == "none":
+    if bead.line:
         return False
     if bead.kind is Kind.INNER_WALL:
         return wanted == "allwalls"

@@ -139,7 +139,7 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
 
 
 def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, behind_mm: float, least_mm: float) -> Polygons:
-    """What of the centreline of an area's outermost bead has the core behind it: all, where no rest is at least so wide.
+    """The part of the centreline of an area's outermost bead that has the core behind it: all, where no rest is at least so wide.
 
     half: reach of the bead outward from its centreline; behind: distance from the centreline to the core.
     """

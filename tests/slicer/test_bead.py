@@ -1,4 +1,4 @@
-"""Widths of the beads by kind and in part 1's first layer."""
+"""Widths of the beads by kind and in the first layer on the plate."""
 
 import manifold3d as m3
 import numpy as np
@@ -74,6 +74,8 @@ def test_no_point_of_a_path_lies_farther_than_the_resolution_from_its_simplified
             assert shapely.distance(shapely.points(before.points), line).max() <= resolution_mm + 1e-9
             assert (before.points[[0, -1]] == after.points[[0, -1]]).all(), "closed paths stay closed"
             assert before.speed_mm_s == after.speed_mm_s
+    counts = [sum(len(path.points) for layer in each.layers for path in layer.paths) for each in (exact, simple)]
+    assert counts[1] < counts[0]
 
 
 def test_walls_of_a_fine_mesh_have_no_specks() -> None:

@@ -49,7 +49,7 @@ def mm3(layer: Layer, within: Zone, *kinds: Kind) -> float:
 
 
 def density(layer: Layer, within: Zone) -> float:
-    """Of the sparse infill in a box."""
+    """The density of the sparse infill in a box."""
     x, y = np.subtract(within.max_mm, within.min_mm)[:2]
     return mm3(layer, within, Kind.INFILL) / (layer.height_mm * x * y)
 
@@ -65,7 +65,7 @@ def walls_across(layer: Layer, x: float) -> int:
 
 
 def speeds(layer: Layer, kind: Kind, right: bool) -> set[float]:
-    """Of the strokes of a kind on one side of x = 0."""
+    """The speeds of the strokes of a kind on one side of x = 0."""
     return {path.speed_mm_s for path in layer.paths if path.kind is kind and (path.points[:, 0].mean() > 0.0) == right}
 
 
@@ -179,6 +179,11 @@ def test_speeds_hold_inside_and_the_strokes_stay_whole() -> None:
     assert (speeds(layer, Kind.OUTER_WALL, True), speeds(layer, Kind.OUTER_WALL, False)) == ({11.0}, {40.0})
     assert speeds(layer, Kind.INNER_WALL, True) == {60.0}
     assert other.volume_mm3 == pytest.approx(plain.volume_mm3, rel=1e-9)
+
+
+def test_speeds_inside_leave_the_strokes_of_the_first_layer_whole() -> None:
+    plain, other = (sliced(part).layers[0] for part in (BLOCK, modified(BLOCK, (RIGHT, {"outer_wall_speed_mm_s": 11.0}))))
+    assert [path.points.tobytes() for path in other.paths] == [path.points.tobytes() for path in plain.paths]
 
 
 def test_tops_and_bottoms_are_as_thick_as_the_settings_inside_say() -> None:

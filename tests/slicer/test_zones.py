@@ -64,7 +64,7 @@ def test_boxes_that_share_a_leaning_part_share_its_walls(axes: tuple[Vector, Vec
     cuts_mm = np.arange(0.1, 9.0, 0.2)
 
     def wall_mm(zone: Marked) -> Floats:
-        """Of every layer; all of it in the zone's box, if it has one."""
+        """Length of no_seam segments in every layer, all of it in the zone's box, if it has one."""
         segments = no_seam_segments(replace(leaning, no_seam=zone), leaning.in_part_frame(), cuts_mm)
         layers = [chords.reshape(-1, 2, 3) for chords in segments]
         for within in zone.boxes:

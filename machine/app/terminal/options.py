@@ -119,7 +119,7 @@ class ProgramOptions(SearchOptions):
         list[str] | None,
         typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
     ] = None
-    copies: Annotated[int, typer.Option("--copies", metavar="N", help="so many of each model on the plate")] = 1
+    copies: Annotated[int, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate")] = 1
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def model_request(model: str, search: SearchOptions, given: ProfileOptions, **fu
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
-    """What is asked for of the program of models on a plate, or of a G-code file. Raises PlanError, SliceError, ProfileError."""
+    """The request for the program of models on a plate, or of a G-code file. Raises PlanError, SliceError, ProfileError."""
     from machine.planning.stops import parse_stops
 
     stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(program.plan, program.parts)

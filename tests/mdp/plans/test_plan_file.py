@@ -54,7 +54,7 @@ PLANS = st.builds(
     parts=st.lists(OPEN, max_size=5).map(tuple),
     zones=st.builds(
         Zones,
-        *[st.lists(ZONES | COLOURS | GROWN, max_size=2).map(tuple)] * 3,
+        *[st.lists(ZONES | COLOURS | GROWN, max_size=2).map(tuple)] * 4,
         modifiers=st.lists(MODIFIERS, max_size=2).map(tuple),
     ),
     settings=st.sampled_from([(), (PartSettings(part=1, process={"infill_pattern": "gyroid", "infill_density": 0.4}),)]),

@@ -96,7 +96,7 @@ def skin_below_the_pit(*settings: str) -> Floats:
 
 
 def test_the_skin_below_a_pit_grows_to_the_next_lines_and_not_to_the_walls() -> None:
-    half_mm, cell_mm = 3.0 / 2.0**0.5, 0.41 / 0.15  # of the pit's diagonal, and between lines
+    half_mm, cell_mm = 3.0 / 2.0**0.5, 0.41 / 0.15  # half of the pit's diagonal, and the distance of lines
     assert (skin_below_the_pit("process.infill_density=0.15") < half_mm + cell_mm + 2.0).all()
 
 

@@ -60,7 +60,7 @@ def test_the_lines_of_a_concentric_skin_are_squares_in_a_square_a_spacing_apart(
     ],
 )
 def test_patterns_and_angle_of_skins_hold_where_they_are_asked_for(key: str, layer: int) -> None:
-    """Of a block all lines that are straight along x or y, as in no skin at 45 degrees."""
+    """All lines of a block's skin are straight along x or y there; in a skin at 45 degrees none is."""
     sliced = slice_part(whole(box(12, 12, 2)), profile(*SOLID, f"process.{key}"))
 
     def upright(number: int) -> float:

@@ -1,4 +1,4 @@
-"""Fuzzy skin: rough where it is asked for, by so much, and even where parts meet."""
+"""Fuzzy skin: rough where and as much as the settings ask for, and even where parts meet."""
 
 import manifold3d as m3
 import numpy as np
@@ -12,7 +12,7 @@ from tests.slicer.hand import SOLID, content, cut, profile, whole
 
 FUZZY = (*SOLID, "process.fuzzy_skin=external", "process.fuzzy_skin_thickness_mm=0.3")
 DISTANT = "process.fuzzy_skin_point_distance_mm=5"
-SIDE = 10.0 - 0.225  # of the middle of the outer wall of a block of 20 mm, from its axis
+SIDE = 10.0 - 0.225  # distance of the outer wall's middle from the axis of a block of 20 mm
 
 
 def off_mm(sliced: SlicedPart, layer: int, kind: Kind = Kind.OUTER_WALL) -> Floats:
@@ -49,7 +49,7 @@ def test_points_of_a_rough_wall_are_as_far_apart_as_is_asked_for() -> None:
     ("walls", "holes", "inner"), [("external", False, False), ("all", True, False), ("allwalls", True, True)]
 )
 def test_the_setting_says_which_walls_are_rough(walls: str, holes: bool, inner: bool) -> None:
-    """Of a frame, which has an outside, a hole and two inner walls along each."""
+    """The frame has an outside, a hole and two inner walls along each."""
     frame = standing(m3.Manifold.cube((20, 20, 2), True) - m3.Manifold.cube((10, 10, 9), True))
     even, rough = (slice_part(whole(frame), profile(*SOLID, f"process.fuzzy_skin={name}")).layers[4] for name in ("none", walls))
     changed = {kind: len(points_of(rough, kind) - points_of(even, kind)) for kind in (Kind.OUTER_WALL, Kind.INNER_WALL)}

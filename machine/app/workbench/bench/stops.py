@@ -33,7 +33,7 @@ def remove_stop(bench: Bench, asked: Asked) -> Bench:
 
 
 def set_copies(bench: Bench, asked: Asked) -> Bench:
-    """So many copies (`count`) on the plate. Raises PlanError."""
+    """Another number of copies (`count`) on the plate. Raises PlanError."""
     count = whole({"--copies": asked.get("count")}, "--copies", 1, MOST_COPIES)  # as the option is refused
     return bench if count == bench.copies else replace(bench, copies=count)
 

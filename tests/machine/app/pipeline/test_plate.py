@@ -157,13 +157,13 @@ def large_and_small(*settings: str) -> tuple[Decomposition, Profile]:
 
 
 def boxes_of(print_: Decomposition) -> list[shapely.Geometry]:
-    """What each model of a plate covers, by its connected vertices."""
+    """The rectangle that each model of a plate covers, by its connected vertices."""
     label = vertex_components(len(print_.mesh.vertices), print_.mesh.faces)
     return [shapely.MultiPoint(print_.mesh.vertices[label == k, :2]).envelope for k in np.unique(label)]
 
 
 def beads_of(program: Program) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of every bead but the purge line's: its part, its layer, and whether it belongs to the small box, which stands in front."""
+    """Part and layer of every bead but the purge line's, and whether it belongs to the small box, which stands in front."""
     run = program.run
     which = np.flatnonzero(run.program.part[run.segment_row] > 0)
     rows, y = run.segment_row[which], run.deposited.segments(which)[:, :, 1].mean(axis=1)
