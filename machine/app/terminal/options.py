@@ -32,7 +32,6 @@ def _profile_option(kind: str, otherwise: str = "") -> Any:
 
 
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
-ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model file, demo:NAME, or a G-code file")]
 Models = Annotated[
     list[str],
     typer.Argument(
