@@ -2,8 +2,8 @@
 
 A body point at b from the tip is n . b + z above the table, n the table's normal in the machine frame and z the tip's height
 above the table; with the table unbounded, z >= max over the bodies of -n . b keeps all of them clear. For one body reaching y
-across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. What of the cradle stands higher than the
-table is not under that plane: it is tried against the head wherever the tip goes.
+across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. The part of the cradle that stands higher
+than the table is not under that plane: it is tried against the head wherever the tip goes.
 
 A part cut off by a whole plane has nothing printed above its base plane. A limb has: other pieces stand beside it. The head is
 modelled as everything above its underside: the silhouette turned about the nozzle, and boxes that are extended to the nozzle. A

@@ -20,7 +20,7 @@ from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_mo
 from profiles.profile import Profile
 
 BESIDE_MM = 0.02  # of a base plane sections are taken: on it they would be those of a face
-# Of the square of a model's diameter: the convex hull of a cut through a neck or the root of a limb is smaller.
+# A share of the square of a model's diameter: the convex hull of a cut through a neck or the root of a limb is smaller.
 BULK = 0.15
 FIRST = 0.15  # of the volume: a first part that is less is a sliver, and no foot for all that leans on it
 TOUCHING_MM2 = 0.01  # sections that share less only meet in an edge

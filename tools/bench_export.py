@@ -1,9 +1,9 @@
 """Measures the whole command: `python tools/bench_export.py MODEL ... [--height MM] [--support] [--set KEY=VALUE]`.
 
 `tiltprint export MODEL --parts 1` from a fresh process to the written file, its own dry run included, beside PrusaSlicer's whole
-command on the same mesh with the same settings (those of tools/bench_travel.py). Kernels are compiled before. Of three runs each,
-taken in turn, the least core seconds and the least wall seconds count. MODEL `box` is a cuboid of 20 x 20 x 10 mm: what is left
-is the start.
+command on the same mesh with the same settings (those of tools/bench_travel.py). Kernels are compiled before. The commands run
+three times in turn; the least core seconds and the least wall seconds count. MODEL `box` is a cuboid of 20 x 20 x 10 mm: what
+is left is the start.
 """
 
 import argparse

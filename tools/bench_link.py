@@ -171,7 +171,7 @@ class Echo:
 
 
 def memory(millions: int) -> tuple[float, float]:
-    """Greatest resident memory, MB, and lines a second of a process that streams a file of so many lines."""
+    """Greatest resident memory, MB, and lines a second of a process that streams a file of a number of lines."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "long.gcode"
         with path.open("w") as file:

@@ -1,8 +1,8 @@
 """Measures how cost grows with a model: `python tools/bench_scale.py DRAGON KITTEN [--faces 5000,20000,...] [--runs 2]`.
 
 Prints the tables of docs/scale.md, from which tools/draw_scale.py draws its picture: `decompose --as-is` of the first model with
-its faces divided by Loop's scheme and simplified to so many; `export --as-is` of demo:tree in 1 to 6 parts by plans, and of the
-second model in one part in layers of several heights. Every command is a process of its own, warm; the least core seconds of
+its faces divided by Loop's scheme and simplified; `export --as-is` of demo:tree in 1 to 6 parts by plans, and of
+the second model in one part in layers of several heights. Every command is a process of its own, warm; the least core seconds of
 some runs, those of processes that it forks included, and the most memory of its own.
 """
 
@@ -56,7 +56,7 @@ def faces_table(model: Path, counts: Iterable[int], folder: Path, runs: int) -> 
 
 
 def with_faces(mesh: Mesh, count: int) -> Mesh:
-    """The shape with about so many faces: divided until there are more, then made coarser by as little as is needed."""
+    """The shape with about `count` faces: divided until there are more, then made coarser by as little as is needed."""
     while ENOUGH * len(mesh.faces) < count:
         mesh = Mesh.from_trimesh(mesh.to_trimesh().subdivide_loop(1))
     tolerance_mm = 1e-3

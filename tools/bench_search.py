@@ -124,7 +124,7 @@ def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], 
 
 
 def on_cores(cores: int, work: Callable[[], object]) -> tuple[float, float]:
-    """Processor time and wall time on so many threads, each the least of several runs."""
+    """Processor time and wall time on a number of threads, each the least of several runs."""
     usual, mdp.kernels.threads.THREADS = mdp.kernels.threads.THREADS, cores
     try:
         return _least(work, time.process_time), _least(work, time.perf_counter)
@@ -142,7 +142,7 @@ def _least(work: Callable[[], object], clock: Callable[[], float]) -> float:
 
 
 def decimated(mesh: Mesh, faces: int) -> Mesh:
-    """About so many faces; manifold3d drops edges shorter than a tolerance, which grows until few enough are left."""
+    """A mesh of about `faces` faces; manifold3d drops edges shorter than a tolerance, which grows until few enough are left."""
     shape, tolerance = mesh, 0.05
     while len(shape.faces) > faces:
         shape = mesh_of(solid_of(mesh).simplify(tolerance))

@@ -3,7 +3,7 @@
 Starts `tiltprint edit` on models of its own, a figure with a wavy skin in 10,000 and 100,000 faces, and is a page of it: drags a
 plane as a hand does, the next move when the figures of the one before are there. In Chromium, where it is installed, also
 turns the model and drags the handle of the plane. --model FILE: a model of yours instead. --benches N ...: how many processes and
-how much memory so many benches take, each with the figure, planes tried on it, and a second figure after that.
+how much memory a number of benches take, each with the figure, planes tried on it, and a second figure after that.
 """
 
 import argparse
@@ -37,7 +37,7 @@ SCREEN = "document.documentElement.dataset"
 
 
 def figure(faces: int) -> m3.Manifold:
-    """The demo figure with about so many faces of one size and a skin that waves a little, so that no two are alike."""
+    """The demo figure with about `faces` faces of one size and a skin that waves a little, so that no two are alike."""
     solid, low, high = solid_of(read_mesh(locate("demo:figure"))[0]), 0.05, 20.0
     for _ in range(25):
         middle = (low * high) ** 0.5
@@ -155,7 +155,7 @@ def _moved(browser: Browser, x: float, y: float) -> float:
 
 
 def on_benches(count: int, models: Sequence[Path]) -> str:
-    """A row: processes and memory of so many benches on each of which the models were opened one after the other and a plane
+    """A row: processes and memory of a number of benches on each of which the models were opened one after the other and a plane
     tried, and of the first alone when the others are closed."""
     with workbench() as running:
         above, origin = f"/{running.place.split('/')[1]}/benches", f"http://127.0.0.1:{running.port}"

@@ -5,9 +5,9 @@
 A machine's centres are up to 2 mm, its zero and the directions of its axes up to 1 degree from the profile's, its signs any, and
 the ball stands up to 2 mm from where it is told. Per machine: how many of the runs end with a mean residual of at most
 0.05 mm, the residual and the error of what is predicted over the measured reach that 99 of 100 runs keep, and how near the tip
-comes to table and ball outside of probing. --printers: so many runs of each machine that is streamed go through its simulated
-firmware. --touches: so many runs of the fit alone, from touches with 0.02 mm noise at thirty poses.
---pieces: so many machines whose centres are up to 0.4 mm and whose zero is up to 0.4 degrees off print `demo:calibration` up to
+comes to table and ball outside of probing. --printers: how many runs of each streamed machine go through its simulated
+firmware. --touches: how many runs of the fit alone, from touches with 0.02 mm noise at thirty poses.
+--pieces: how many machines whose centres are up to 0.4 mm and whose zero is up to 0.4 degrees off print `demo:calibration` up to
 three times: how far its pads lie aside before, and after each piece.
 """
 
@@ -48,7 +48,7 @@ LEANS_DEG = dict.fromkeys(("gen5x", "open5x_jubilee", "open5x_prusa_i3", "open5x
 
 @dataclass(frozen=True)
 class Run:
-    """Of one calibration, mm: mean and worst residual, mean and worst error of prediction, nearest approach; contacts, and poses
+    """One calibration, mm: mean and worst residual, mean and worst error of prediction, nearest approach; contacts, and poses
     at which the head keeps less than its clearance."""
 
     residual_mm: float

@@ -7,7 +7,7 @@ Meshes (.npz too) are scaled to 60 mm, models and hard ones taken as they are, f
 is printed a second time with settings that their name decides. A run is `tiltprint export` in a process of its own: its exit
 code, sentence, findings, core seconds, memory, and what tools/print_look.py sees in its layers stand in one line of
 OUT/runs.jsonl, at once; what stands there is not run again. Runs are ordered by a hash of their names, so the first --sample of
-them, or those before --time-limit, are a fair sample. --planted plants faults into so many of those printed (OUT/planted.jsonl).
+them, or those before --time-limit, are a fair sample. --planted: prints into which faults are planted (OUT/planted.jsonl).
 OUT/table.md has it all; --table makes that alone. --scheduler: workers that see the same folders.
 """
 

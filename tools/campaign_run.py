@@ -23,7 +23,7 @@ BEGIN = (
     "import resource as r, sys; r.setrlimit(r.RLIMIT_CPU, ({0}, {0} + 5)); r.setrlimit(r.RLIMIT_DATA, ({1}, {1})); "
     "from machine.app.start import main; sys.exit(main())"
 )
-BUSY = 3.0  # other work may let a run take so many times its core seconds
+BUSY = 3.0  # other work may let a run take this many times its core seconds
 POLL_S = 0.05
 DRY_RUN_SAYS = "the dry run found"
 NO_MEMORY = ("MemoryError", "allocate", "bad_alloc", "Cannot allocate memory")

@@ -50,7 +50,7 @@ class Run:
 
 
 def all_runs(folders: dict[str, Path], forms: int, varied_share: float) -> list[Run]:
-    """Every model of folders (by group) and so many forms, each by default settings, and a share of them varied, in order."""
+    """Every model of folders (by group) and a number of forms, each by default settings, and a share of them varied, in order."""
     models = [Run(group, file.stem, str(file.resolve())) for group, folder in folders.items() for file in _models(folder)]
     models += [Run("forms", name, name) for name in form_names(forms)]
     return sorted([*models, *_varied(models, varied_share)], key=lambda run: run.order_key)
@@ -82,7 +82,7 @@ def model_file(run: Run, folder: Path) -> Path:
 
 
 def longest_side_mm(file: Path) -> float:
-    """Of a model; of one that cannot be read, which the run will tell, as of any mesh."""
+    """The longest side of a model; that of any mesh where the model cannot be read, which the run will tell."""
     try:
         return float(np.ptp(read_mesh(file)[0].vertices, axis=0).max())
     except UserError:

@@ -2,7 +2,7 @@
 
     python tools/check_estimates.py MODEL [MODEL ...] [--parts N] [--process NAME] [--set KEY=VALUE ...]
 
-One row a model, in one piece as it stands and, with --parts, as the search cuts it into up to so many: minutes and metres of
+One row a model, in one piece as it stands and, with --parts, as the search cuts it into up to N parts: minutes and metres of
 filament of the dry run and the estimate over each; cubic millimetres of support that the slicer prints and the estimate over
 them; seconds of one core that the estimate takes, once its kernels are compiled.
 """

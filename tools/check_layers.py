@@ -3,7 +3,7 @@
     python tools/check_layers.py FOLDER [--every N] [--set KEY=VALUE ...] [--only NAME ...]
 
 Models stand as one part, upright, at 100 % infill, without skirt, support and elephant's foot. Every N-th layer (7 unless told)
-is looked at: its beads are buffered lines in shapely, its section is cut from the mesh anew and not cleaned; slits narrower
+is measured: its beads are buffered lines in shapely, its section is cut from the mesh anew and not cleaned; slits narrower
 than 0.06 of a line are no spots. One row a model: layers looked at; plastic over the volume (all layers); the largest empty
 spot in line widths squared and its layer; how many are larger than one; how far the farthest bead reaches over the section,
 mm, and its layer; core seconds of slicing.

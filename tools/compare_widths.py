@@ -87,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--paper-terms", action="store_true")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--every", type=int, default=1, help="every N-th model by name")
-    parser.add_argument("--limit", type=int, default=None, help="only models of at most so many faces")
+    parser.add_argument("--limit", type=int, default=None, help="the most faces of a model")
     parser.add_argument("--only", default="", help="only models whose name has this in it")
     options = parser.parse_args(arguments)
     if not options.summary:

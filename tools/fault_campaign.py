@@ -84,7 +84,7 @@ class Trial:
 
 
 def program(lines: int) -> list[str]:
-    """Heating and so many strokes, no two alike."""
+    """Heating and a number of strokes, no two alike."""
     strokes = [
         f"G1 X{20 + k % 60}.{k % 1000:03d} Y{30 + k % 41}.5 E0.{10000 + k:05d} F6000"
         for k in range(lines - len(HEAT) - len(COLD))

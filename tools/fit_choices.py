@@ -247,7 +247,7 @@ def ordered_by_others(pairs: Pairs) -> Mask:
 
 
 def taken(entry: dict[str, Any], weights: Floats, least_saving: float) -> str:
-    """The letter of the alternative of a sheet that costs least by some weights, every cut charged a share of the least cost of
+    """The letter of the cheapest alternative of a sheet by some weights, every cut charged a share of the least cost of
     one piece."""
     costs = {letter: float(_row(entry, one) @ weights) for letter, one in entry["alternatives"].items()}
     costs = {letter: cost for letter, cost in costs.items() if np.isfinite(cost)}

@@ -64,8 +64,8 @@ STROKE = re.compile(r"G1 (X|E\d)")  # pushes filament
 
 @dataclass(frozen=True)
 class Result:
-    """What became of one moment. executed: moves before the second run; first: the program's move with which it began. Of a power
-    cut off_mm: how much too high, or low, the print went on.
+    """What became of one moment. executed: moves before the second run; first: the program's move with which it began. After a
+    power cut, off_mm: how much too high, or low, the print went on.
     """
 
     how: str
@@ -343,7 +343,7 @@ class _TimedJournal(Journal):
         super().__init__(path, JournalHeading("p.gcode", "", "campaign", {}))
 
     def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
-        """Note the time, too. Of what is not in a hurry the disk gets what is in the file once in SYNC_S."""
+        """Note the time, too. What is not in a hurry reaches the disk once in SYNC_S."""
         super().write(checkpoint, hurry)
         now_s = self._now_s()
         if hurry or now_s - self.on_disk[-1][0] >= SYNC_S:

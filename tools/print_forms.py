@@ -208,7 +208,7 @@ FAMILIES: dict[str, Callable[[random.Random], Solid]] = {
 
 
 def form_names(count: int) -> list[str]:
-    """Names of so many forms, the families in turn."""
+    """Names of a number of forms, the families in turn."""
     families = list(FAMILIES)
     return [f"{families[k % len(families)]}-{k // len(families):03}" for k in range(count)]
 

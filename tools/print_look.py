@@ -2,7 +2,7 @@
 
     python tools/print_look.py FILE.gcode ...
 
-A part's pose stands still while it is printed, so its layers lie level in machine axes. Every part is looked at there by itself,
+A part's pose stands still while it is printed, so its layers lie level in machine axes. Every part is examined there by itself,
 and what it stands on is not known: the first layer of later parts is taken as it is. One row a file: strokes that have no plastic
 anywhere across their width within the layer below, the longest stretch of them that is neither bridge nor overhang and lies more
 than a line beside plastic (sparse infill below is told apart), missing layers, plastic against the room of its beads, and places

@@ -76,7 +76,7 @@ def _compile() -> None:
 
 
 def _fine_model() -> None:
-    """Of more than 20,000 faces."""
+    """A mesh of more than 20,000 faces."""
     import manifold3d as m3
 
     from mdp.cost.hidden import hidden_shares

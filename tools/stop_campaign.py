@@ -3,8 +3,8 @@
     python tools/stop_campaign.py [--stops 50] [--faces 2000000] [--seed 1]
 
 One bench prints a box at several simulated printers, each a process of its own behind a relay that notes when M112 passes; a
-second one is opened for a ball of so many faces, and meanwhile a page stops one print after the other. Another page asks all the
-time for what is refused at once: moments that 50 stops do not meet are among its thousands.
+second one is opened for a ball of a number of faces, and meanwhile a page stops one print after the other. Another page asks all
+the time for what is refused at once: moments that 50 stops do not meet are among its thousands.
 
 A busy computer lets everything wait. On each core a process that only sleeps tells when it was woken too late; what of the time
 of an answer one of them has overslept is left out of the second figure. Exits with 1 where a stop has not arrived or is not

@@ -57,7 +57,7 @@ def _only(whole: Mapping[str, Any], path: Sequence[str]) -> Tables:
 
 
 def _differing(shared: Mapping[str, Any], whole: Mapping[str, Any]) -> Tables:
-    """What of tables is not in others; an empty text for what is left out."""
+    """The entries of tables that differ from those of others; an empty text for what is left out."""
     out: Tables = {}
     for key, value in whole.items():
         base = shared.get(key)

@@ -51,7 +51,7 @@ class Outputs:
 class Cuts:
     """What a person says of the cuts; None: nothing.
 
-    plan: file whose planes are cut instead of a search; parts: into so many parts at most; planes: file of planes by hand that
+    plan: file whose planes are cut instead of a search; parts: the most parts; planes: file of planes by hand that
     the search starts from.
     """
 
@@ -65,7 +65,7 @@ class ModelRequest:
     """A model or a G-code file and what is to be made of it.
 
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
-    model down the way that costs least; None: where nothing says how it lies. compare: with the same model in one part. force:
+    model down in the cheapest orientation; None: where nothing says how it lies. compare: with the same model in one part. force:
     go on although the dry run found errors. profile_names: of machine, material and process as the user has given them, names or
     files. stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other
     models there."""

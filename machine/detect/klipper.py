@@ -90,7 +90,8 @@ def read(config: ConfigText) -> Found:
 
 
 def _told_sections(config: ConfigText) -> tuple[Sections, str]:
-    """Of a query's answer, and the version. `config` has the file's words, `settings` the values in use, titles in lower case."""
+    """The sections in a query's answer (`config`: the file's words, `settings`: the values in use; titles in lower case), and the
+    version."""
     try:
         document = json.loads(config.text)
     except (ValueError, RecursionError):
@@ -117,7 +118,7 @@ def _texts(sections: Any) -> dict[str, dict[str, str]]:
 
 
 def _sections(config: ConfigText) -> Sections:
-    """Of a file; what SAVE_CONFIG has written counts where the file says nothing."""
+    """The sections of a file; what SAVE_CONFIG has written counts where the file says nothing."""
     own, _, saved = config.text.partition(f"\n{SAVED}[")
     sections = read_sections(replace(config, text=own), INCLUDE)
     lines = f"[{saved}".splitlines() if saved else []

@@ -89,7 +89,7 @@ def _axes(config: ConfigText, words: dict[str, dict[str, float]]) -> dict[str, A
 
 
 def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
-    """Of M211: `Min:  X0.00 Y0.00 Z0.00   Max:  X200.00 ...`."""
+    """The answer to M211: `Min:  X0.00 Y0.00 Z0.00   Max:  X200.00 ...`."""
     line = SOFT_LIMITS.search(text)
     if line is None:
         return {}
@@ -98,7 +98,7 @@ def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
 
 
 def _area(text: str, letters: dict[str, AxisReadings]) -> dict[str, tuple[float, float, str]]:
-    """Of M115, whose axes are in the order of M203."""
+    """The answer to M115, whose axes are in the order of M203."""
     area = AREA.search(text)
     if area is None:
         return {}

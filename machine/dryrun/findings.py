@@ -47,7 +47,7 @@ def known_findings(lines: Sequence[str], profile: Profile, findings: Iterable[Fi
 
 
 def _digest(lines: Sequence[str]) -> str:
-    """Of lines and how many they are: one that held a line's end would be two when the text is read again."""
+    """A digest of lines and of their number: a line that held a line's end would be two when the text is read again."""
     return sha256("\n".join((str(len(lines)), *lines)).encode("utf-8", "surrogatepass")).hexdigest()
 
 

@@ -63,7 +63,7 @@ class Planned(NamedTuple):
 
 
 def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: int) -> DryRun:
-    """The dry run with a finding for every part that a line of so many bits a second starves."""
+    """The dry run with a finding for every part that a serial line at a baud rate starves."""
     slow, free = (feeding(run.program, lines, machine, rate) for rate in (baud, FREE_BAUD))
     rows = (slow.slowed & ~free.slowed) | (slow.stopped & ~free.stopped)
     problems = _findings(run.program, rows, slow.stopped, run.times_s, baud)

@@ -40,7 +40,7 @@ class Timeline:
 
 
 class UnknownTimeline(Timeline):
-    """Of a program that is not here: nothing is known of it."""
+    """The timeline of a program that is not here: nothing is known of it."""
 
     beginning = "a file that is not known here"
 

@@ -27,7 +27,7 @@ COMMANDS = {
     "M113": Command("interval of `busy:`"),
     "M120": Command("end stops on"),
     "M121": Command("end stops off"),
-    "M154": Command("report the position every so many seconds"),
+    "M154": Command("report the position at an interval in seconds"),
     "M192": Command("wait for the probe's temperature", waits="heat", answer_s=HEATING_S),
     "M193": Command("wait for the cooler", waits="heat", answer_s=HEATING_S),
     "M218": Command("offset of a tool", changes=True),
@@ -70,7 +70,7 @@ DIALECT = Dialect(
 BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # planned moves, and commands read ahead of them
 PLANNED_BLOCKS = BLOCK_BUFFER_SIZE - 1  # one place of its ring stays empty
 MIN_SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME: a shorter move is stretched while few wait
-FIRST_MOVE_DELAY_S, FIRST_MOVE_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE: an idle machine waits so long for so many
+FIRST_MOVE_DELAY_S, FIRST_MOVE_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE: an idle machine waits this long for this many
 
 # gcode/control/M17_M18_M84.cpp: the idle time after which manage_inactivity (MarlinCore.cpp) lets the motors go; 0: never.
 MOTORS_STAY_ON = "M84 S0"

@@ -34,7 +34,7 @@ SettingsReport = Callable[[str, SimulatedSettings], list[str]]
 
 
 def no_settings_report(command: str, settings: SimulatedSettings) -> list[str]:
-    """Of a firmware that tells nothing by commands."""
+    """The simulation of a firmware that tells nothing by commands."""
     return []
 
 

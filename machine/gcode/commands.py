@@ -95,7 +95,7 @@ COMMANDS: dict[str, Command] = {
     "M303": Command("tune a heater, which heats it", heats="any", answer_s=HEATING_S),
     "M105": Command("report temperatures", repeatable=True),
     "M108": Command("end a wait for heat", refused=SENDERS),
-    "M155": Command("report temperatures every so many seconds", repeatable=True),
+    "M155": Command("report temperatures at an interval in seconds", repeatable=True),
     "M301": Command("PID of the nozzle"),
     "M302": Command("allow cold extrusion"),
     "M304": Command("PID of the bed"),

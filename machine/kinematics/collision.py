@@ -41,7 +41,7 @@ def _plate_reach(table: Table, normal: Floats, centre: Floats, tried: Floats) ->
 
 
 def _reach_of_cradle(machine: Machine, box: CradleBox, pose: Pose) -> "Reach":
-    """Of a body of the cradle, which tilts with the table and does not turn with it."""
+    """The reach of a body of the cradle, which tilts with the table and does not turn with it."""
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
     return partial(_corner_reach, machine_points(machine, tilted, corners(box.min_mm, box.max_mm)))
 

@@ -37,7 +37,7 @@ from profiles.files import lock
 
 FORMAT = 3  # in 2 a full disk ended the journal without a trace, in 1 the newest record might lack a change of height
 PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
-EVERY_LINES = 4  # the sender never gets so many lines ahead of the newest record,
+EVERY_LINES = 4  # the sender stays fewer lines than this ahead of the newest record,
 EVERY_S = 0.1  # which is not older than this when something has happened since
 SYNC_S = 1.0  # between syncs; the disk is older by this and the time of an fsync when the computer restarts
 BLOCK_BYTES = 4096  # a disk writes a block whole or leaves it damaged, but its neighbour as it was
@@ -147,7 +147,7 @@ class Journal:
             self.write(checkpoint)
 
     def record_due(self, line: int, lines: int = EVERY_LINES) -> bool:
-        """Whether a record is due before this line is sent, so that the newest one is less than so many lines behind."""
+        """Whether a record is due before this line is sent, so that the newest one is less than EVERY_LINES lines behind."""
         return line - self.last.sent >= lines
 
     def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:

@@ -47,7 +47,7 @@ FAULTY = (
     "the printer does not say where it stands, but reports: {}. Nothing was changed: when that is put right (Klipper's "
     "FIRMWARE_RESTART, another firmware's reset), resume can be tried again"
 )
-SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
+SEVERAL = 3  # coordinates that are not 0: that many do not agree by chance
 UNSURE_MM = 0.005
 SAME = 0.02  # mm or deg: M114 reports hundredths
 HOME_KEYS = ("x.home_mm", "y.home_mm", "z.home_mm", "tilt.home_deg", "turn.home_deg")

@@ -27,7 +27,7 @@ class Bounds:
 
 NOZZLE = Bounds("nozzle", 20.0, 60.0)
 BED = Bounds("bed", 15.0, 180.0, 1.0)
-SILENCE_S = 120.0  # a report is asked for every few seconds: so many questions do not stay unanswered by chance
+SILENCE_S = 120.0  # a report is asked for every few seconds: that many questions do not stay unanswered by chance
 OVER_LIMIT_C = 15.0
 OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
 WARNINGS = 20  # remembered of the printer's own words that show a program it does not understand

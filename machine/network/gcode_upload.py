@@ -38,12 +38,12 @@ class GcodeUpload:
 
     @property
     def sha256(self) -> str:
-        """Of the content, hexadecimal."""
+        """The digest of the content, hexadecimal."""
         return hashlib.sha256(self.content).hexdigest()
 
     @property
     def crc32(self) -> str:
-        """Of the content, eight hexadecimal digits: DuetSoftwareFramework compares them as text."""
+        """The checksum of the content, eight hexadecimal digits: DuetSoftwareFramework compares them as text."""
         return f"{zlib.crc32(self.content):08x}"
 
     def read_by(self, sent: Sent) -> BinaryIO:

@@ -103,7 +103,7 @@ class HttpSession:
         return self._request("POST", path, json=value, timeout=timeout, note=note)
 
     def upload_form(self, path: str, fields: Mapping[str, str], name: str, file: BinaryIO, *, answer_s: float) -> Reply:
-        """POST a file as `file` in a multipart form after the fields; the answer may take so many seconds after its last byte."""
+        """POST a file as `file` in a multipart form after the fields; the answer may take answer_s after its last byte."""
         files = {"file": (name, file, FILE_TYPE)}
         return self._request("POST", path, data=fields, files=files, timeout=self._of_upload(answer_s), note=f"{path} ({name})")
 

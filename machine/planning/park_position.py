@@ -17,7 +17,7 @@ from profiles.machine import Machine
 
 ASIDE_MM = 1.0  # free at the ends of the axes
 BESIDE_MM = 20.0  # from the outline of a finished print: what drips falls beside it, and a hand can reach it
-PARTS = 4  # a way is tried in so many pieces when it is not clear as a whole
+PARTS = 4  # number of pieces in which a way is tried when it is not clear as a whole
 
 
 @dataclass(frozen=True)

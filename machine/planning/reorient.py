@@ -80,7 +80,7 @@ class Sweep:
         """Least Z from which on upward the tip may stand at X, Y through the whole turn; infinite when there is none.
 
         Along a direction d that leans upward the gap grows with Z, so each direction gives a least Z of its own.
-        every: only so many of the short turns are looked at, which gives a lower bound.
+        every: take only every nth of the short turns, which gives a lower bound.
         """
         need_mm = max(self.machine.lift_mm, self.machine.clearance_mm)
         least_mm = self._least_mm + self.tried[:, :2] @ np.array([x, y])

@@ -147,7 +147,7 @@ class Reader:
 
 
 def reader_of(machine: Machine, room: int) -> Reader:
-    """A reader that has read nothing, with room for so many rows: the machine stands at home."""
+    """A reader that has read nothing, with room for `room` rows: the machine stands at home."""
     modes = Modes(axes_of(machine), feed=DEFAULT_FEED, strict=True)
     linear = [min(max(0.0, axis.limits_mm[0]), axis.limits_mm[1]) for axis in (machine.x, machine.y, machine.z)]
     home = [*linear, machine.tilt.zero_deg, machine.turn.zero_deg, 0.0]

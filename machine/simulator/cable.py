@@ -11,7 +11,7 @@ from machine.simulator.firmware import SimulatedFirmware
 
 ERROR = "Error:Heating failed, system stopped! Heater_ID: 0"
 GARBAGE_BYTES = 20
-LATE_S = 1e-9  # the firmware is looked at that much late, for a clock in another unit is rounded
+LATE_S = 1e-9  # the firmware is asked this much late, because a clock in another unit is rounded
 
 
 class _FaultQueue:

@@ -32,7 +32,7 @@ MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_
 class SimulatedFirmware:
     """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile.
 
-    kept_moves: so many stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
+    kept_moves: how many stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
     table: what its probe meets, None: it has none.
     """
 

@@ -175,7 +175,7 @@ def _rename(board: Board, words: WordValues, text: str) -> Work:
 
 
 def _rest(board: Board, words: WordValues, text: str) -> Iterator[float]:
-    """M18, M84: motors off; with S only after so many idle seconds, 0: never."""
+    """M18, M84: motors off; with S only after S idle seconds, 0: never."""
     idle = board.rules.idle
     if "S" in words and (idle is None or not idle.shuts_down):
         if idle is not None:

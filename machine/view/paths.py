@@ -1,5 +1,5 @@
-"""Paths: the rows of a dry run as the page's columns, one row a straight move; of a very long program so many that a browser
-stays quick."""
+"""Paths: the rows of a dry run as the page's columns, one row a straight move; of a very long program as many as a browser
+draws quickly."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -249,7 +249,7 @@ def _assumptions(profile: Profile, known: bool) -> list[Row]:
 
 
 def _format_fixed(value: float, digits: int) -> str:
-    """The value with so many digits, without a sign where they are all 0."""
+    """The value with `digits` digits, without a sign where they are all 0."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 

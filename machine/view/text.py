@@ -149,7 +149,7 @@ def _numbers(letters: NDArray[np.uint8], start: Wholes, end: Wholes) -> _Numbers
 
 
 def _form(number: _Numbers, value: Wholes, digits: int) -> Wholes:
-    """In which of the three forms whole values with so many digits behind the point are the numbers, from 1; 0: in none."""
+    """In which of the three forms whole values with `digits` digits behind the point are the numbers, from 1; 0: in none."""
     scale = 10 ** np.maximum(digits - number.behind, 0)
     same = number.sound & (number.behind <= digits) & (number.digits * scale == value)
     full, short = same & number.plain & (number.behind == digits), same & number.trimmed

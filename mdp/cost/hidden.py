@@ -19,14 +19,14 @@ from mdp.mesh import Floats, Ints, Mesh
 from mdp.sweep.rays import TriangleTree, blocked_shares, first_hit, frames_about, triangle_tree
 from mdp.topology.linked_faces import opposites
 
-NEIGHBOURHOOD = 0.03  # radius over which the surface is looked at, as a share of the model's diagonal
+NEIGHBOURHOOD = 0.03  # radius of a face's neighbourhood, as a share of the model's diagonal
 FULL_BEND = 0.6  # radians by which a place bends inward over such a radius where it counts as hidden altogether
 RAYS = 12
 REACH = 0.3  # of a ray that sees nothing, as a share of the model's diagonal
 OPEN = 0.1  # share of the rays that may be blocked where a place still counts as open
-MOST_NEIGHBOURS = 512  # faces of a neighbourhood; a finer mesh is looked at within a smaller radius
+MOST_NEIGHBOURS = 512  # faces of a neighbourhood; a finer mesh gets a smaller radius
 LIFT = 1e-6  # of a ray's start above its face, as a share of the model's diagonal
-FINE = 20_000  # faces; a finer mesh is looked at on a coarser copy
+FINE = 20_000  # faces; a finer mesh is judged on a coarser copy
 COARSER = 1e-3  # how far from its surface that copy may lie, as a share of the model's diagonal
 WORTH = 0.7  # share of the faces above which a copy saves too little
 ALIKE = 0.5  # least cosine between the normals of a face and of what stands for it on the copy

@@ -21,7 +21,7 @@ MADE_BY_A_CUT = -1
 @dataclass(frozen=True, eq=False)
 class Piece:
     """What was cut from a model: its mesh, and (m,) the face of the model that each of its faces is a piece of, MADE_BY_A_CUT
-    where a cut laid it open. Of the faces of a flat place one stands for all: their normals are the same."""
+    where a cut laid it open. One face of a flat place stands for all of them: their normals are the same."""
 
     mesh: Mesh
     sources: Ints

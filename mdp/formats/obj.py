@@ -6,7 +6,7 @@ from mdp.formats.polygons import polygon_surface
 from mdp.formats.surface import Surface, parse_floats
 from profiles.errors import MeshError
 
-MOST_INDEX = 2**62  # no file has so many vertices, and more would not fit into an array
+MOST_INDEX = 2**62  # no file has that many vertices, and more would not fit into an array
 
 
 def read(path: Path) -> list[Surface]:

@@ -15,7 +15,7 @@ from mdp.learning.lists import TrainingList
 from mdp.learning.sources import terms_of
 from mdp.mesh import Floats, Ints
 
-BEST = 5  # so many candidates of a list are rated
+BEST = 5  # candidates of a list that are rated
 TIE = 1e-9  # outcomes (shares) that differ less are the same
 SMALLEST_RANGE = 1e-8  # added to the range, which is 0 where all of a list have the same
 LEAST_OUTCOME = 0.05  # lists that can end with less count as if they ended with it, else the best of models would weigh most

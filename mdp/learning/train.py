@@ -118,7 +118,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.onnx")
     parser.add_argument("--loss", choices=LOSSES, default="urank", help="of the paper (urank), of pairs, or the regret to expect")
     parser.add_argument("--ensemble", type=int, default=1, metavar="N", help="average N networks, with --loss regret")
-    parser.add_argument("--epochs", type=int, metavar="N", help="at most so many; default 1000, 100 with --loss regret")
+    parser.add_argument("--epochs", type=int, metavar="N", help="the most epochs; default 1000, 100 with --loss regret")
     parser.add_argument("--patience", type=int, metavar="N", help="epochs without a gain after which it ends; default 50, 25")
     parser.add_argument("--batch", type=int, metavar="N", help="lists a step; default 8, 64; the paper takes 1")
     parser.add_argument("--rate", type=float, metavar="R", help="learning rate of Adam; default 1e-4, 2e-3")

@@ -127,7 +127,7 @@ class PlanFile:
     settings: tuple[PartSettings, ...] = ()
 
     def row(self, most_parts: int) -> tuple[PlannedPart, ...]:
-        """The parts, from the second on, of the row with the most parts that are at most so many. Raises PlanError."""
+        """The parts, from the second on, of the row with the most parts up to a number. Raises PlanError."""
         rows = {len(row.parts) + 1: row.parts for row in self.front} | {len(self.parts) + 1: self.parts}
         allowed = [count for count in rows if count <= most_parts]
         if not allowed:

@@ -162,7 +162,7 @@ class _TradeOffRanking:
         self._planes: list[Plane] = []
 
     def row_at(self, position: int) -> int | None:
-        """The row at a position of the ranking; None when there are not so many."""
+        """The row at a position of the ranking; None when the ranking is shorter."""
         while len(self._feasible) <= position:
             self._skip_infeasible()
             if self._next < len(self._order):

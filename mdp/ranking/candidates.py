@@ -213,8 +213,8 @@ def residual_mm2(swept: Gains | LimbSums, terms: CostTerms) -> Floats:
 
 
 def lost_mm2(swept: Gains | LimbSums, residual_mm2: Floats) -> Floats:
-    """What of that each cut has made worse. Every surface has stairs whichever way it is printed, so large parts would be
-    shunned for those that they had before."""
+    """The part of the residual by which each cut has made things worse. Every surface has stairs whichever way it is printed, so
+    large parts would be shunned for those that they had before."""
     return residual_mm2 - np.minimum(swept.stairs_mm2, swept.stairs_up_mm2)
 
 

@@ -3,8 +3,8 @@ shortlist of several trade-offs that a learned ranker chooses from.
 
 Order of the paper: candidates that leave (almost) nothing risky above their plane come first, then the residual threshold (the
 paper's delta) is raised from 1e-4 by factors of 5; within a round the larger accumulated reduction comes first, and from the
-second round on only candidates that reduce at least as much as the best so far are taken. Of near-equal planes of one parent
-only the first counts.
+second round on only candidates that reduce at least as much as the best so far are taken. Only the first of several near-equal
+planes of one parent counts.
 """
 
 from collections.abc import Iterator, Sequence

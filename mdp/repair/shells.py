@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 NEGLIGIBLE = 1e-7  # of the volume of all shells: 0.1 mm across beside a 20 mm cube
 FLAT_SHEETS = "its faces lie in one plane or on each other; give it a thickness (Blender: Solidify)"
 FLAT = 1e-9  # of the cube of a shell's diagonal
-MOST_BODIES = 2000  # of which each takes its time in every step, 20 s of export for so many cubes of 1 mm
+MOST_BODIES = 2000  # each takes its time in every step: 20 s of export for this number of cubes of 1 mm
 SAMPLES = 24  # vertices of a shell that must all lie inside another for it to count as contained
 
 

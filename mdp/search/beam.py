@@ -33,7 +33,7 @@ from mdp.search.node import Node
 from mdp.search.problem import Problem
 from mdp.sweep.limbs import find_limbs
 
-# Area left for ever counts as so many times the area made safe; None: the ranker's own. Many models, one greedy search
+# How many times the area made safe an area that is left for ever counts; None: the ranker's own. Many models, one greedy search
 # each: 4 is best on average, no value is best on most models.
 TRADE_OFFS = (None, 4.0, 1.0, 8.0, 2.0, 0.5, 16.0, 0.0)
 RECORDED = 50  # candidates of a stage that are put on record, the B of the 2020 paper

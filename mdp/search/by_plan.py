@@ -29,7 +29,7 @@ def cut_by_plan(
     parts: int | None = None,
     price: Pricing | None = None,
 ) -> Decomposition:
-    """The parts of a closed mesh by the planes of a plan; parts: of its row with at most so many.
+    """The parts of a closed mesh by the planes of a plan; parts: the most parts of the row that is taken.
 
     The rows of the front are those of the plan, its own parts in place of the row of their number, the one that is cut measured
     anew; price: as for a search. Raises PlanError for a plan of another model and for a plane that cannot be cut.

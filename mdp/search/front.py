@@ -32,7 +32,7 @@ Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be 
 
 class Front:
     """The best node met for every number of cuts: of those whose cost is alike to the least the one with the shortest seams;
-    where seams cost nothing the one that costs least."""
+    where seams cost nothing the cheapest one."""
 
     def __init__(self, start: Node) -> None:
         self._start = len(start.cuts)
@@ -59,7 +59,7 @@ class Front:
         return [self._best(count) for count in sorted(self._alike)]
 
     def up_to(self, parts: int) -> Node:
-        """The node of the most parts up to so many, or of the fewest where all have more."""
+        """The node of the most parts up to a number, or of the fewest where all have more."""
         return self._best(max((count for count in self._alike if count < parts), default=self._start))
 
     def _best(self, count: int) -> Node:

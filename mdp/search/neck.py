@@ -1,6 +1,6 @@
 """Neck: near a plane, the one that a model is thinnest at: whose rim is shorter than that of every plane close to it.
 
-Towards the end of a model rims get shorter, too, down to nothing: that is no neck. Of a neck the rim grows on both sides of the
+Towards the end of a model rims get shorter, too, down to nothing: that is no neck. At a neck the rim grows on both sides of the
 plane, and however the plane is tilted.
 """
 
@@ -78,7 +78,7 @@ def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float, reach_deg
 
 
 def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float, reach_deg: float) -> _Surface:
-    """What of a mesh a plane of the search can meet: all of it but what lies far above and below."""
+    """The part of a mesh that a plane of the search can meet: all of it but what lies far above and below."""
     wide_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     far_mm = 2.0 * reach_mm + wide_mm * sin(radians(min(reach_deg, 90.0)))
     around = heights[mesh.faces]

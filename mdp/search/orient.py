@@ -49,7 +49,7 @@ SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs suppo
 # Fitted to whole searches of 429 orientations of 66 models with seams of 0.8 mm (tools/RESULTS.md).
 LEFT, STAIRS_LEFT = 0.6, 0.75  # share of what needs support in one piece that cuts leave, and of the stairs
 LEAST_LEFT, LEAST_STAIRS_LEFT = 0.3, 0.45  # where they do well (34 more models)
-# Of what the model costs as it stands: a forecast below the first leaves no doubt, one above the second no hope.
+# Shares of what the model costs as it stands: a forecast below the first leaves no doubt, one above the second no hope.
 NO_DOUBT, HOPELESS = 0.9, 1.3
 PROMISING = 1.03  # of the same: narrow searches end higher
 # Orientations that a narrow search cuts, and the factor by which it tries fewer directions.
@@ -73,7 +73,7 @@ class Oriented:
 
 
 def orient_and_decompose(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[[Mesh], Decomposition]) -> Oriented:
-    """The orientation whose decomposition costs least, with its time, its cuts' charge (search.least_saving) and its footing.
+    """The orientation with the cheapest decomposition, with its time, its cuts' charge (search.least_saving) and its footing.
 
     search: the whole search of a mesh; pricing: what parts take to print by a profile.
     """
@@ -165,7 +165,7 @@ def _scar_mm2(worth: Worth) -> float:
 def _most_promising(
     forecasts: Sequence[OrientationForecast], profile: Profile, standing_mm2: float
 ) -> OrientationForecast | None:
-    """The one that costs least after a narrow search; None where none comes near the cost of the model as it stands."""
+    """The cheapest one after a narrow search; None where none comes near the cost of the model as it stands."""
     quick, chosen = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
     more_mm2, least_mm2 = _scar_mm2(Worth.of(profile)) - 1.0, inf
     able = [forecast for forecast in forecasts if forecast.bare_mm2 < PROMISING * standing_mm2]
@@ -180,7 +180,7 @@ def _most_promising(
 def _whole(
     forecasts: Sequence[OrientationForecast], profile: Profile, pricing: PricingBy, standing_mm2: float
 ) -> OrientationForecast | None:
-    """The one that costs least in one piece, where that is less than the model as it stands."""
+    """The cheapest one in one piece, where that costs less than the model as it stands."""
     forecast = min(forecasts, key=lambda forecast: forecast.whole_mm2, default=None)
     if forecast is None or forecast.whole_mm2 > HOPELESS * standing_mm2:
         return None

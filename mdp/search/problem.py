@@ -124,7 +124,7 @@ class Problem:
 
     @property
     def least_z(self) -> float:
-        """Of the printing direction of a part, the table tilting no further."""
+        """The least z of a part's printing direction: the table tilts no further."""
         return sin(radians(self.settings.least_elevation_deg))
 
     def begin(self) -> None:

@@ -72,7 +72,7 @@ def decompose(
     """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible.
 
     on_phase is told in words what is done while no stage is; on_record is given what the search looked at and what became of it,
-    as the content of an .npz file. by_hand: planes that are cut first and stay, and zones; parts: so many at most, instead of as
+    as the content of an .npz file. by_hand: planes that are cut first and stay, and zones; parts: the most parts, instead of as
     many as pay; price: what parts take to print, for the rows of the front and the choice between them: without it nothing is
     searched for one part. Raises PlanError for a plane by hand that cannot be cut.
     """
@@ -138,7 +138,7 @@ def _copy_to_search(mesh: Mesh, profile: Profile, planned: PlanFile, tell: Calla
 
 
 def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None, profile: Profile) -> Taken:
-    """The decomposition of a front to take: of at most the wanted number of parts, else the one that costs least, with its time
+    """The decomposition of a front to take: of at most the wanted number of parts, else the cheapest one, with its time
     where seconds cost anything; best: the one to take where seams cost nothing. Rows that are not sound get no time, so they are
     taken only where a person asks for them."""
     nodes, parts_of = front.nodes, cache(partial(make_parts, problem))

@@ -2,7 +2,7 @@
 
 The figures of all parts are summed over the model's surface without a cut. Whether a plane may cut what those cut before it
 have left is asked of what they have left, so all but the last are cut for that: at leisure, one after the other, and those that a
-trial has in common with the one before not again. Of a plane that is dragged what was cut before it is the same.
+trial has in common with the one before not again. While a plane is dragged, the cuts before it stay the same.
 """
 
 from bisect import bisect_left
@@ -61,7 +61,7 @@ class Trials:
         self._cut: list[tuple[Key, Node]] = []  # of the last trial, in the order of its cuts
 
     def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
-        """Try the base planes of the parts from the second on, in print order. most_cuts: so many cuts are made at most; where
+        """Try the base planes of the parts from the second on, in print order. most_cuts: the most cuts that are made; where
         more are needed, parts are left unchecked."""
         order = planes[::-1]
         self._keep_alike(order)
@@ -159,7 +159,7 @@ class Trials:
         return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=unchecked)
 
     def _refused(self, order: Sequence[Plane], done: int, why: Refusal) -> Trial:
-        """What is known where the plane after so many cannot be cut."""
+        """What is known where the plane after the first `done` cannot be cut."""
         parts, _ = self._forecast.parts(self._named(order[:done]))
         obstacle = find_refused(self._problem, self._node, order[done], why)
         return Trial((*[None] * (len(order) - done), *parts[::-1]), len(order) + 1 - done, why.text, obstacle=obstacle)

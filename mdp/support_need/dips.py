@@ -1,7 +1,7 @@
 """Dips: whether a hanging place begins in mid-air (numba kernels).
 
-It does where it holds a bottom of the surface that lies deeper than DIP_MM below all ways out of it. What of a surface lies below
-some height and hangs together with a bottom does not depend on how it is cut into triangles.
+It does where it holds a bottom of the surface that lies deeper than DIP_MM below all ways out of it. The region of a surface that
+lies below some height and is connected with a bottom does not depend on how it is cut into triangles.
 """
 
 from typing import NamedTuple

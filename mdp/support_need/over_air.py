@@ -26,8 +26,8 @@ TINY = 1e-9  # twice the area of a face seen edge-on, in cells
 
 
 class Counts(NamedTuple):
-    """Of every flat place, at its number (m,): how low and how high it reaches, how many places of the raster lie on it, and how
-    many of these over air. Where these are too few: its area, and what of it is over air by points of its faces."""
+    """For every flat place, at its number (m,): how low and how high it reaches, how many places of the raster lie on it, and how
+    many of these over air. Where these are too few: its area, and the area over air by points of its faces."""
 
     least: Floats
     most: Floats
@@ -71,7 +71,7 @@ def find_over_air(
 
 @helper
 def _no_counts(count: int) -> Counts:
-    """Of so many flat places."""
+    """The counts of a number of flat places, all empty."""
     zeros = table(4, count)
     return Counts(floats(count, np.inf), floats(count, -np.inf), zeros[0], zeros[1], zeros[2], zeros[3])
 

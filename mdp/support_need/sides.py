@@ -97,7 +97,7 @@ def _add(ends: Floats, count: int, line: Floats, begin: float, end: float) -> in
 
 @helper
 def _length(view: View, f: int, corner: int) -> float:
-    """Of an edge, mm."""
+    """The length of an edge, mm."""
     a, b, squared = view.surface.faces[f, corner], view.surface.faces[f, (corner + 1) % 3], 0.0
     for axis in range(3):
         squared += (view.surface.vertices[axis, b] - view.surface.vertices[axis, a]) ** 2

@@ -55,7 +55,7 @@ class Areas(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What of the risky faces needs support along a direction: of which face of the model each is a piece (m,), below 0: of
+    """The risky faces that need support along a direction: of which face of the model each is a piece (m,), below 0: of
     none, it needs it; the classes (n,) of the model's faces, and how many times the
     unsupportable count."""
 

@@ -30,12 +30,12 @@ AREAS = 5  # the first five sums are areas: a face that crosses the plane adds t
 
 
 class Pieces(NamedTuple):
-    """The pieces above a plane. Of each vertex: heights (n,) along the direction in steps; over (n,) the last column that it lies
-    above; cosines (n,) of its normal with the direction; parent (n,) see union_find, NONE while it lies below the plane.
+    """The pieces above a plane. For each vertex: heights (n,) along the direction in steps; over (n,) the last column that it
+    lies above; cosines (n,) of its normal with the direction; parent (n,) see union_find, NONE while it lies below the plane.
 
-    Of each face: face_over (m,) the last column that it reaches above; weights (m, 7) what it adds to the SUMS.
-    Of the vertex that stands for a piece: whole (n, 7) the SUMS of its faces wholly above; crossing (n, 7) those of the shares of
-    faces that cross the plane; top (n,) its highest vertex; low (n, 2) its least z, among vertices and on the plane.
+    For each face: face_over (m,) the last column that it reaches above; weights (m, 7) what it adds to the SUMS.
+    For the vertex that stands for a piece: whole (n, 7) the SUMS of its faces wholly above; crossing (n, 7) those of the shares
+    of faces that cross the plane; top (n,) its highest vertex; low (n, 2) its least z, among vertices and on the plane.
     live: vertices that stand for a piece, or did once; active: the faces that cross the plane; counts (2,): of live and active.
     """
 

@@ -7,7 +7,7 @@ from mdp.mesh import Ints
 
 @helper
 def singletons(size: int) -> Ints:
-    """The parents of so many members of which none have been joined."""
+    """The parents of `count` members, none of which have been joined."""
     parent = ints(size, 0)
     for member in range(size):
         parent[member] = member

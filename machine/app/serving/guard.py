@@ -37,7 +37,7 @@ def values_of(headers: Headers, wanted: bytes) -> list[str]:
 
 
 def method_of(scope: "Scope") -> str:
-    """Of a request; WEBSOCKET of a websocket."""
+    """The kind of a request; WEBSOCKET for a websocket."""
     return "WEBSOCKET" if scope["type"] == "websocket" else scope["method"]
 
 

@@ -55,12 +55,12 @@ def _with_scars(row: FrontRow) -> str:
 
 
 def in_parts(count: int) -> str:
-    """So many parts in words."""
+    """A number of parts in words."""
     return "in one piece" if count == 1 else f"in {count} parts"
 
 
 def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
-    """The row that was chosen, where a person chose it the one that costs least; None where there is no front."""
+    """The row that was chosen, or the cheapest one where a person chose; None where there is no front."""
     chosen, front = decomposition.chosen, decomposition.front
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen

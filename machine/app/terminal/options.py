@@ -88,7 +88,7 @@ class SearchOptions:
     ] = "classic"
     orient: Annotated[
         bool | None,
-        typer.Option("--orient/--as-is", help="lay the model down the way that costs least, or print it as its file has it"),
+        typer.Option("--orient/--as-is", help="lay the model down in the cheapest orientation, or print it as its file has it"),
     ] = None
     parts: Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")] = None
     part: Annotated[
@@ -132,7 +132,7 @@ class ProfileOptions:
 
     @property
     def names(self) -> tuple[str | None, str | None, str | None]:
-        """Of machine, material and process as they were given."""
+        """The names of machine, material and process as they were given."""
         return self.machine, self.material, self.process
 
     @property

@@ -76,7 +76,7 @@ def upper(shape: Shape) -> m3.CrossSection:
 
 
 def least_height_mm(shape: Shape, lean_rad: float) -> float:
-    """Of the joint over the plate, so that all of the foot, or of a tensile bar's end, lies between."""
+    """The least height of the joint over the plate with room for all of the foot, or of a tensile bar's end, below it."""
     if shape.lever_mm > 0.0:
         return FOOT_HEIGHT_MM + 3.0
     return 0.5 * LENGTH_MM * cos(lean_rad) + 0.5 * END_MM * sin(lean_rad)

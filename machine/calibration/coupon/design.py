@@ -83,7 +83,7 @@ def _check_heat(profile: Profile, hottest: Process) -> None:
 
 
 def signs(count: int) -> list[tuple[int, ...]]:
-    """(JOINTS) rows of levels, -1: the process's own, 1: the other one, of so many factors; the first four rows and the last four
+    """(JOINTS) rows of levels, -1: the process's own, 1: the other one, of `count` factors; the first four rows and the last four
     have each factor at both levels equally often, so that where a bar stands counts for nothing.
 
     >>> [sum(column) for column in zip(*signs(5))]

@@ -100,7 +100,7 @@ def _effect(factor: Factor, half: float, sigma: float, freedom: int) -> Effect:
 
 
 def student_beyond(t: float, freedom: int) -> float:
-    """How often |Student's t| of so many degrees of freedom is greater: Abramowitz and Stegun, 26.7.3 and 26.7.4.
+    """How often |Student's t| with `freedom` degrees of freedom is greater: Abramowitz and Stegun, 26.7.3 and 26.7.4.
 
     >>> round(student_beyond(2.776, 4), 4), round(student_beyond(3.169, 10), 4), round(student_beyond(12.706, 1), 4)
     (0.05, 0.01, 0.05)

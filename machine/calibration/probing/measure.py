@@ -22,7 +22,7 @@ from profiles.machine import Machine
 FAR_MM = 6.0  # a contact so far from where it is expected is of something else
 LIFT_MM = 2.0  # over the last contact, from where the next one is sought
 AT_ONCE_MM = 0.05  # a contact so near to where it was sought from is none
-AGREE_MM, MOST_TIMES = 0.03, 4  # two contacts at one place must agree so well, after so many at the most
+AGREE_MM, MOST_TIMES = 0.03, 4  # how well two contacts at one place must agree, and the most contacts
 NEAR, WIDE = 0.2, 0.5  # of the ball's radius: how far around its middle it is sought, and measured
 DROP = 1.0 - (1.0 - WIDE**2) ** 0.5  # by which the ball is lower there than at its top
 CENTRED = 0.1  # of the radius: a centre so near to where it was expected is measured well

@@ -50,7 +50,7 @@ class Interface:
 
     @property
     def area_mm2(self) -> float:
-        """Of the section."""
+        """The area of the section."""
         return float(self.section.sum()) * self.lattice.column_mm2
 
     @property
@@ -205,7 +205,7 @@ def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
 
 
 def wall_edges(face: Interface) -> tuple[Mask, Floats]:
-    """Of places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to them near their
+    """At places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to them near their
     middle, and (n,) how far inside their outer edge it ends, mm; inf where it is farther than FAR_MM.
     """
     walls, side = face.walls, face.walls.end[:, :2] - face.walls.begin[:, :2]
@@ -230,7 +230,7 @@ def wall_edges(face: Interface) -> tuple[Mask, Floats]:
 
 
 def _at(mask: Mask, points: Floats, lattice: Lattice) -> Mask:
-    """Of (..., 2) points whether their column is marked."""
+    """Whether the columns of (..., 2) points are marked."""
     i, j = np.moveaxis(((points - lattice.origin) / lattice.cell).astype(np.int64), -1, 0)
     found: Mask = mask[i.clip(0, lattice.shape[0] - 1), j.clip(0, lattice.shape[1] - 1)]
     return found

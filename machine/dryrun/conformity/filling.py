@@ -48,7 +48,7 @@ def filled_share(run: DryRun, mesh: Mesh, profile: Profile, points: int = POINTS
 
 
 def lattice(mesh: Mesh, points: int) -> Floats:
-    """About so many (n, 3) points inside a closed mesh, evenly spread."""
+    """(n, 3) points inside a closed mesh, evenly spread, about `count` of them."""
     low, high = mesh.bounds_mm
     step = float(np.cbrt(max(mesh.volume_mm3, 1e-9) / points))
     axes = [np.arange(a + 0.5 * step, b, step) for a, b in zip(low, high, strict=True)]

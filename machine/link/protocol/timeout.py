@@ -58,7 +58,7 @@ class Timeouts:
         return now_s + self._timing.complaint_s
 
     def acknowledge(self, line: LineInFlight, now_s: float) -> None:
-        """A line was answered. Of quick ones the least time of the last ones counts, for the others waited in a queue."""
+        """A line was answered. Among quick lines the least of the last times counts, because the others waited in a queue."""
         self.progress_s, self._resend_due_s = now_s, inf
         if line.slow_timeout_s:
             return
@@ -67,7 +67,7 @@ class Timeouts:
         self._measured = True
 
     def signal(self, state: State, window: Window, rules: LineRules, questions: int, now_s: float) -> Signal | None:
-        """What the time that has passed amounts to in a state, after so many questions without answer."""
+        """What the time that has passed amounts to in a state, after a number of questions without an answer."""
         timing = self._timing
         if state is State.DRAIN:  # old words have run dry, or chatter has been listened to for long enough
             return Signal.HUSH if self._silent_for(timing.drain_s, timing.sync_s, now_s) else None
@@ -98,5 +98,5 @@ class Timeouts:
             return slow_s if questions >= QUESTIONS_MOST else min(slow_s, timing.stall_mute_s * 4.0 ** (questions - 1))
         if rules.silence_s is not None:
             return rules.silence_s
-        # Of the first questions one may be lost itself; the last ones wait out the longest move.
+        # One of the first questions may be lost itself; the last ones wait out the longest move.
         return timing.stall_s if self._busy_known else 0.25 * timing.stall_mute_s * 2.0 ** (questions - 1)

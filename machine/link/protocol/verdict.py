@@ -11,7 +11,7 @@ LOST = "position and temperatures are lost, the print cannot go on"
 
 
 def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: str = "") -> PrinterError | None:
-    """Why there is no sense in another greeting after so many; None when there is. heard: what came instead of an answer."""
+    """Why another greeting after `tries` makes no sense; None when it does. heard: what came instead of an answer."""
     at = "this baud rate" if baud is None else f"{baud} baud"
     if tries >= RUBBISH_TRIES and decoder.rubbish:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)

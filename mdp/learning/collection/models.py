@@ -24,7 +24,7 @@ SIDES_APART_DEG = 20.0  # directions of two sides that count as different
 
 
 def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
-    """The models of a folder by name: npz files and mesh files whose name has `only` in it, of these every so many-th.
+    """The models of a folder by name: npz files and mesh files whose name has `only` in it, of these every nth (`every`).
 
     Raises LearningError for a folder without any, and for two models of one name.
     """
@@ -63,7 +63,7 @@ def read_model(path: Path) -> Mesh:
 
 
 def coarser(mesh: Mesh, most_faces: int) -> Mesh:
-    """The mesh with at most so many faces, or as many as remain when its surface moves by MOST_MOVED of its diagonal."""
+    """The mesh with at most `most_faces` faces, or as many as remain when its surface moves by MOST_MOVED of its diagonal."""
     if len(mesh.faces) <= most_faces:
         return mesh
     diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))

@@ -12,7 +12,7 @@ from mdp.learning.ndcg import Measure, Scores, at, best_within, full_lists, inte
 from mdp.mesh import Floats
 
 CUTS = (1, 2, 3, 4, 5)  # of the NDCG, as the paper's table has them
-FIRST = (1, 2, 5)  # so many candidates are followed
+FIRST = (1, 2, 5)  # numbers of candidates that are followed
 SEVERAL = 20  # candidates from which a list is no short one
 SIZES = ((2, 5), (6, 10), (11, 20), (21, 35), (36, 49), (50, 10_000))  # of lists, the last ones full (mdp.learning.ndcg.FULL)
 

@@ -131,8 +131,8 @@ class KeyedTouches:
 
 @contextmanager
 def keys_of_a_person(session: CommandSession) -> Iterator[Iterator[str]]:
-    """Keys as they are pressed; while none is, the printer is listened to. Of those that were pressed during a move the last one
-    counts: a key that is held must not run on.
+    """Keys as they are pressed; while none is, the printer is listened to. When several are pressed during a move, the last
+    one counts: a key that is held must not run on.
     """
     typed = SimpleQueue[str]()
 

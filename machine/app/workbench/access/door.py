@@ -28,7 +28,7 @@ class Door(Observable):
 
     @property
     def wait_s(self) -> float:
-        """How long no code is looked at."""
+        """How long codes are still refused."""
         return max(0.0, self.pairing.waits_until_s - self._clock())
 
     def announce(self) -> None:

@@ -27,7 +27,7 @@ class Lan:
 
     @property
     def scheme(self) -> str:
-        """Of its addresses: http or https."""
+        """The scheme of its addresses: http or https."""
         return "http" if self.certificate is None else "https"
 
     def hosts(self, port: int) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Pairing: a code that is typed on a device, judged: from one state to the next, with the time given from outside.
 
-Wrong codes are counted over all devices: an address can be forged, and shared. Of 31 ** 8 codes at most 20 are ever tried.
+Wrong codes are counted over all devices: an address can be forged, and shared. At most 20 of 31 ** 8 codes are ever tried.
 """
 
 import secrets
@@ -14,7 +14,7 @@ FIRST_WAIT_S = 30.0  # after the first code that was used up by wrong ones; doub
 
 
 class Verdict(StrEnum):
-    """What becomes of a code that was typed. spent: wrong, and the code is another one now; waits, closed: not looked at."""
+    """What becomes of a code that was typed. spent: wrong, and the code is another one now; waits, closed: not compared."""
 
     PAIRED = "paired"
     WRONG = "wrong"
@@ -26,7 +26,7 @@ class Verdict(StrEnum):
 @dataclass(frozen=True)
 class Pairing:
     """code: the one that pairs next; wrong, wrong_in_all: how many others were typed since it is the code, and since pairing is
-    open; waits: how often codes were used up; waits_until_s: until then none is looked at."""
+    open; waits: how often codes were used up; waits_until_s: codes are refused until then."""
 
     code: str = field(repr=False)
     wrong: int = 0

@@ -71,17 +71,17 @@ class Bench:
 
     @property
     def sought(self) -> tuple[object, ...]:
-        """What of it decides what a search finds, beside the locked planes."""
+        """Everything that decides what a search finds, except the locked planes."""
         return self.model, self.rotation, self.profile, self.zones
 
     @property
     def shaped(self) -> tuple[object, ...]:
-        """What of it decides the parts."""
+        """Everything that decides the parts."""
         return self.model, self.rotation, self.cuts, self.profile, self.zones
 
     @property
     def printed(self) -> tuple[object, ...]:
-        """What of it decides what is printed."""
+        """Everything that decides what is printed."""
         return *self.shaped, self.stops, self.copies
 
 
@@ -170,7 +170,7 @@ def with_model_anew(bench: Bench, model: Model | None) -> Bench:
 
 
 def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
-    """The same model so many times as large, its planes and zones in proportion; its front was for the size before."""
+    """The same model scaled by a factor, its planes and zones in proportion; its front was for the size before."""
     bare = replace(with_model_anew(bench, model), profile=bench.profile, rotation=bench.rotation)
     return _with_places_of(bare, bench, factor)
 
@@ -195,8 +195,8 @@ def _uncut(bench: Bench) -> Bench:
 
 
 def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floats | None = None) -> Bench:
-    """The planes and zones of a bench before on the same places of its model, which is so many times as large now, and turned so
-    as it is read. Raises PlanError where a box would leave what a plan may have."""
+    """The planes and zones of a bench before at the same places of its model, which is now scaled by `factor` and turned by
+    `turn` as it is read. Raises PlanError where a box would leave what a plan may have."""
     if before.model is None or bench.model is None:
         return bench
     if not before.cuts and before.zones == NO_ZONES:
@@ -299,7 +299,7 @@ def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: P
 
 
 def with_parts(bench: Bench, count: int) -> Bench:
-    """The row of the front with so many parts taken. Raises KeyError where there is none."""
+    """The bench with the row of the front taken that has `count` parts. Raises KeyError where there is none."""
     rows = {row.parts: row for row in bench.rows}
     return with_cuts(bench, parts_of(rows[count]))
 

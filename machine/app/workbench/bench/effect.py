@@ -45,7 +45,7 @@ SEARCHED = frozenset(
     }
 )
 PLACE = "process.place_mm"  # a search reads it, but the same planes are the best wherever they are reached
-# Of a machine's keys those that only make it quicker or slower, or take more filament.
+# Keys of a machine that only make it quicker or slower, or take more filament.
 PACES = ("purge_mm", "heating_c_s", "speed_mm_s", "acceleration_mm_s2", "speed_deg_s", "acceleration_deg_s2")
 
 

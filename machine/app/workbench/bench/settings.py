@@ -173,7 +173,7 @@ def _schema(model: type[Frozen]) -> dict[str, Any]:
 
 
 def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
-    """How a page has a value typed or chosen. kind: `number`, `integer`, `boolean`, `choice`; `numbers`: so many with commas
+    """How a page has a value typed or chosen. kind: `number`, `integer`, `boolean`, `choice`; `numbers`: several with commas
     between; `text`: a line of it; `block`: lines of G-code; `rows`: a list or a table as TOML."""
     way = next(way for way in schema.get("anyOf", [schema]) if way.get("type") != "null")
     kind = "choice" if "enum" in way else str(way.get("type"))

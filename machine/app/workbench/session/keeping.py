@@ -19,7 +19,7 @@ OPEN_ELSEWHERE = "this work is not kept any more, or another page has opened it"
 
 
 class Keeping:
-    """Of one session, from its event loop. Only one write goes on at a time, in a thread, and it always runs to its end."""
+    """Saves one session, from its event loop. Only one write goes on at a time, in a thread, and it always runs to its end."""
 
     def __init__(self, session: SessionBase) -> None:
         self._session = session

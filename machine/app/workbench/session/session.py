@@ -311,5 +311,5 @@ class Session(SessionBase):
 
 
 def _reads(profile: Profile) -> tuple[object, ...]:
-    """What of a profile decides how a model is read."""
+    """The settings of a profile that decide how a model is read."""
     return profile.process.scale, profile.process.rotate_deg

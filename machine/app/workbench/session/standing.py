@@ -19,7 +19,7 @@ class StandingModel:
 
     @property
     def now(self) -> Standing | None:
-        """Of what lies on the bench; None: there is no model, or it is not known yet."""
+        """How the model on the bench stands; None: there is no model, or it is not known yet."""
         return self._known if self._wanted and self._wanted == _asked(self._session.bench) else None
 
     @property

@@ -16,7 +16,7 @@ from mdp.search.obstacle import Obstacle
 from mdp.search.trial import Trial
 from profiles.errors import PlanError
 
-REST_S = 0.1  # of a hand, until what it holds is looked at more closely
+REST_S = 0.1  # how long a hand must rest before what it holds is tried more closely
 
 
 @dataclass(frozen=True)

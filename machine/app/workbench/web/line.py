@@ -91,7 +91,7 @@ async def _hear(session: Session, socket: WebSocket) -> None:
 
 
 def parsed(text: str, most: int) -> dict[str, Any]:
-    """A command of a page, of so many characters at most. Raises PlanError for what is none."""
+    """A command from a page, at most `most` characters long. Raises PlanError for anything else."""
     try:
         asked = json.loads(text) if len(text) <= most else None
     except (ValueError, RecursionError):

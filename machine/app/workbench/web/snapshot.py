@@ -20,7 +20,7 @@ from mdp.save import plane_values
 from mdp.zone import Zone
 
 MOST_FACES = 2_000_000  # that a page draws
-# Of the state: what holds sentences.
+# The keys of the state that hold sentences.
 SENTENCES = (
     *("problem", "problems", "answers", "busy", "stopped", "lacking", "notes", "standing", "resting", "copies_told"),
     *("search", "trial", "refused", "slicing", "sliced", "comparing", "compared"),

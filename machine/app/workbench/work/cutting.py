@@ -44,8 +44,8 @@ class Searched:
 
 @dataclass(frozen=True)
 class SearchWay:
-    """How parts are sought, beside what the profile says. orient: laid down the way that costs least, chosen with them, unless
-    a person has turned the model or locked or marked something on it as it lies; ranker: a name for `ranker_named`."""
+    """How parts are sought, beside what the profile says. orient: lay the model down in the cheapest orientation, chosen with
+    them, unless a person has turned the model or locked or marked something on it; ranker: a name for `ranker_named`."""
 
     orient: bool = True
     ranker: str = CLASSIC

@@ -8,7 +8,7 @@ from slicer.paths import Kind, Layer, SlicedPart
 
 SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN, Kind.BRIDGE, Kind.GAP, Kind.SUPPORT)
 BEHIND = (*SEEN, Kind.INNER_WALL)  # on shallow slopes inner walls are free, too; drawn where all are few enough
-MOST_PIECES = 60_000  # of a part: with more, only every second layer is drawn, or every third, as high as so many
+MOST_PIECES = 60_000  # per part: with more, only every second layer is drawn, or every third, that many times as high
 
 
 def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
@@ -29,7 +29,7 @@ def _count(sliced: SlicedPart, kinds: tuple[Kind, ...]) -> int:
 
 
 def _pieces(layer: Layer, kinds: tuple[Kind, ...], step: int) -> Floats:
-    """(n, 7) in the part frame: two ends and the height, which is that of so many layers."""
+    """(n, 7) in the part frame: two ends and the height, which is that of `step` layers."""
     high = layer.height_mm * step
     points = layer.points_mm - (0.0, 0.0, high / 2.0)
     begins = np.repeat(layer.is_of(*kinds), np.diff(layer.starts))

@@ -19,7 +19,7 @@ DO, LOAD = "machine.app.workbench.work.tasks:do", "machine.app.workbench.work.ta
 
 
 class WorkerPool:
-    """At most so many processes. All from the event loop."""
+    """At most `most` processes. Every method is called from the event loop."""
 
     def __init__(self, most: int) -> None:
         self.most = most
