@@ -44,15 +44,16 @@ def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Dec
     for model in dict.fromkeys(moved):
         with naming(model.name):
             check_parts(model.parts[:1], profile)
-    parts = [_first_of_all([moved[k].parts[n] for k, n in passing.together])] if passing.together else []
+    confined = [[_within(_room(model.mesh), part) for part in model.parts] for model in moved]
+    parts = [_first_of_all([confined[k][n] for k, n in passing.together])] if passing.together else []
     for (k, n), pose in zip(passing.alone, passing.poses(dict(enumerate(places))), strict=True):
-        parts.append(_beside(moved[k].parts[n], len(parts) + 1, pose, profile.machine))
+        parts.append(_beside(confined[k][n], len(parts) + 1, pose, profile.machine))
     numbers = [*([1] if passing.together else []), *(n + 1 for _, n in passing.alone)]
     settings = [
         given.model_copy(update={"part": number})
-        for number, own in enumerate(numbers, start=1)
+        for number, in_model in enumerate(numbers, start=1)
         for given in profile.parts
-        if given.part == own
+        if given.part == in_model
     ]
     process = profile.process
     if passing.together:
@@ -142,11 +143,10 @@ def _size_mm(mesh: Mesh) -> Place:
 
 def _first_of_all(parts: Sequence[Part]) -> Part:
     """The first parts of several models as one."""
-    mesh, rooms = together([part.mesh for part in parts]), [_room(part) for part in parts]
+    mesh, counts = together([part.mesh for part in parts]), [len(part.mesh.faces) for part in parts]
 
     def joined(marks: Iterable[Marked]) -> Marked:
-        pairs = zip(marks, rooms, parts, strict=True)
-        return Marked.together([(mark.within(room), len(part.mesh.faces)) for mark, room, part in pairs])
+        return Marked.together([*zip(marks, counts, strict=True)])
 
     return replace(
         parts[0],
@@ -158,14 +158,25 @@ def _first_of_all(parts: Sequence[Part]) -> Part:
         no_seam=joined(part.no_seam for part in parts),
         no_support=joined(part.no_support for part in parts),
         support=joined(part.support for part in parts),
-        modifiers=tuple(replace(own, room=room) for part, room in zip(parts, rooms, strict=True) for own in part.modifiers),
+        modifiers=tuple(modifier for part in parts for modifier in part.modifiers),
     )
 
 
-def _room(part: Part) -> Zone:
-    """The box around a model's first part that reaches half of the gap to other models."""
-    low, high = part.mesh.bounds_mm + 0.5 * GAP_MM * np.array([[-1.0], [1.0]])
+def _room(mesh: Mesh) -> Zone:
+    """The box around a model that reaches half of the gap to other models."""
+    low, high = mesh.bounds_mm + 0.5 * GAP_MM * np.array([[-1.0], [1.0]])
     return Zone((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+
+def _within(room: Zone, part: Part) -> Part:
+    """A model's part with the boxes of its marks and the modifiers confined to the model's room."""
+    return replace(
+        part,
+        no_seam=part.no_seam.within(room),
+        no_support=part.no_support.within(room),
+        support=part.support.within(room),
+        modifiers=tuple(replace(modifier, room=room) for modifier in part.modifiers),
+    )
 
 
 def _joined(masks: Sequence[Mask | None]) -> Mask | None:

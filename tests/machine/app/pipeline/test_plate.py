@@ -132,6 +132,18 @@ def test_a_box_that_reaches_beyond_its_model_marks_no_copy_beside_it(axes: Any) 
         assert (section ^ area).area() == pytest.approx(0.5 * section.area())
 
 
+def test_a_box_of_a_model_that_is_printed_alone_does_not_reach_into_those_that_stand_beside_it() -> None:
+    everywhere = Marked((Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)),))
+    part = replace(whole(box(10, 10, 9)), no_seam=everywhere, no_support=everywhere, support=everywhere)
+    one, other = in_copies(decomposed(part), 2, plate("process.complete_objects=true"))[0].parts
+    cuts_mm = np.array([4.5])
+    sections = [of_contours(cross_sections(copy.mesh, cuts_mm)[0]) for copy in (one, other)]
+    for mark in (other.no_seam, other.no_support, other.support):
+        level = replace(other, rotation=np.eye(3))
+        (area,) = marked_areas(mark, level, other.mesh, cuts_mm)
+        assert [(section ^ area).area() for section in sections] == pytest.approx([0.0, 100.0])
+
+
 def test_slender_copies_have_the_brim_that_one_alone_would_have() -> None:
     tower = standing(m3.Manifold.cube((3, 3, 60)))
     assert in_copies(decomposed(whole(tower)), 4, plate())[1].process.brim_mm == 5.0
