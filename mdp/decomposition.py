@@ -1,6 +1,7 @@
 """Decomposition: the ordered parts of a model, with the invariants that hold wherever one is made."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,6 +55,16 @@ class Part:
         """Whether it stands on the platform: the first part of each model does."""
         return self.base.offset_mm == 0.0 and bool((self.base.normal == UP).all())
 
+    def with_marks(self, change: Callable[[Marked], Marked], change_modifier: Callable[[Modifier], Modifier]) -> "Part":
+        """The part with its marks and modifiers changed."""
+        return replace(
+            self,
+            no_seam=change(self.no_seam),
+            no_support=change(self.no_support),
+            support=change(self.support),
+            modifiers=tuple(map(change_modifier, self.modifiers)),
+        )
+
     def in_part_frame(self) -> Mesh:
         """The part's mesh in its own frame: direction is +z, base plane is z = 0."""
         return self.mesh.transform(self.rotation, (0.0, 0.0, -self.base.offset_mm))
@@ -91,6 +102,7 @@ class Decomposition:
 
     risky_area_mm2 is what printing the whole model straight up leaves to support, residual_area_mm2 what the parts do.
     folded_mm3 is how far the mesh's volume may be from what the parts add up to, because its surface passes through itself.
+    uncut is each model as one part with its marks, about the turn axis; (): not known, nothing is marked.
     """
 
     name: str
@@ -106,6 +118,7 @@ class Decomposition:
     notes: tuple[str, ...] = ()
     folded_mm3: float = 0.0
     front: tuple[FrontRow, ...] = ()
+    uncut: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         self._check_volume()

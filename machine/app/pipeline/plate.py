@@ -170,13 +170,7 @@ def _room(mesh: Mesh) -> Zone:
 
 def _within(room: Zone, part: Part) -> Part:
     """A model's part with the boxes of its marks and the modifiers confined to the model's room."""
-    return replace(
-        part,
-        no_seam=part.no_seam.within(room),
-        no_support=part.no_support.within(room),
-        support=part.support.within(room),
-        modifiers=tuple(replace(modifier, room=room) for modifier in part.modifiers),
-    )
+    return part.with_marks(lambda mark: mark.within(room), lambda modifier: replace(modifier, room=room))
 
 
 def _joined(masks: Sequence[Mask | None]) -> Mask | None:
@@ -203,4 +197,5 @@ def _one_print(models: Sequence[Decomposition], parts: Sequence[Part]) -> Decomp
         residual_area_mm2=sum(model.residual_area_mm2 for model in models),
         folded_mm3=sum(model.folded_mm3 for model in models),
         front=(),
+        uncut=tuple(part for model in models for part in model.uncut),
     )
