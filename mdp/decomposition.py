@@ -26,7 +26,8 @@ class Part:
     than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
     up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up;
-    support: where whatever overhangs is to be held up; modifiers: where other settings hold.
+    support: where whatever overhangs is to be held up; modifiers: where other settings hold. of: which part of which model of the
+    plate it is, in words; "": of the only one, or of several.
     """
 
     index: int
@@ -44,6 +45,7 @@ class Part:
     no_support: Marked = UNMARKED
     modifiers: tuple[Modifier, ...] = ()
     support: Marked = UNMARKED
+    of: str = ""
 
     @property
     def direction(self) -> Floats:
