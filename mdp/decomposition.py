@@ -1,6 +1,7 @@
 """Decomposition: the ordered parts of a model, with the invariants that hold wherever one is made."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +26,8 @@ class Part:
     than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
     up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up;
-    support: where whatever overhangs is to be held up; modifiers: where other settings hold.
+    support: where whatever overhangs is to be held up; modifiers: where other settings hold. of: which part of which model of the
+    plate it is, in words; "": of the only one, or of several.
     """
 
     index: int
@@ -43,6 +45,7 @@ class Part:
     no_support: Marked = UNMARKED
     modifiers: tuple[Modifier, ...] = ()
     support: Marked = UNMARKED
+    of: str = ""
 
     @property
     def direction(self) -> Floats:
@@ -53,6 +56,16 @@ class Part:
     def on_platform(self) -> bool:
         """Whether it stands on the platform: the first part of each model does."""
         return self.base.offset_mm == 0.0 and bool((self.base.normal == UP).all())
+
+    def with_marks(self, change: Callable[[Marked], Marked], change_modifier: Callable[[Modifier], Modifier]) -> "Part":
+        """The part with its marks and modifiers changed."""
+        return replace(
+            self,
+            no_seam=change(self.no_seam),
+            no_support=change(self.no_support),
+            support=change(self.support),
+            modifiers=tuple(map(change_modifier, self.modifiers)),
+        )
 
     def in_part_frame(self) -> Mesh:
         """The part's mesh in its own frame: direction is +z, base plane is z = 0."""
@@ -91,6 +104,7 @@ class Decomposition:
 
     risky_area_mm2 is what printing the whole model straight up leaves to support, residual_area_mm2 what the parts do.
     folded_mm3 is how far the mesh's volume may be from what the parts add up to, because its surface passes through itself.
+    uncut is each model as one part with its marks, about the turn axis; (): not known, nothing is marked.
     """
 
     name: str
@@ -106,6 +120,7 @@ class Decomposition:
     notes: tuple[str, ...] = ()
     folded_mm3: float = 0.0
     front: tuple[FrontRow, ...] = ()
+    uncut: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         self._check_volume()

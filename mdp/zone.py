@@ -49,11 +49,16 @@ class Zone:
         own = corners(self.min_mm, self.max_mm)
         return own if self.axes is None else own @ np.array(self.axes)
 
-    def moved(self, shift_mm: Vector) -> "Zone":
-        """The box somewhere else."""
-        low, high = (np.add(corner, self.along(np.array(shift_mm))).tolist() for corner in (self.min_mm, self.max_mm))
-        room = None if self.room is None else self.room.moved(shift_mm)
-        return replace(self, min_mm=(low[0], low[1], low[2]), max_mm=(high[0], high[1], high[2]), room=room)
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Zone":
+        """The box with every place p of it at rotation @ p + shift_mm."""
+        axes = self.axes
+        if not np.array_equal(rotation, np.eye(3)):
+            x, y, z = ((np.eye(3) if axes is None else np.array(axes)) @ rotation.T).tolist()
+            axes = (x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])
+        shift = shift_mm if axes is None else np.array(axes) @ shift_mm
+        low, high = (np.add(corner, shift).tolist() for corner in (self.min_mm, self.max_mm))
+        room = None if self.room is None else self.room.transform(rotation, shift_mm)
+        return Zone((low[0], low[1], low[2]), (high[0], high[1], high[2]), axes, room)
 
     def spans_mm(self, directions: Floats) -> Floats:
         """(k, 1, 2) least and greatest direction . p over the box for (k, 3) directions."""
@@ -166,9 +171,9 @@ class MeshVolume:
     file: Path
     mesh: Mesh = field(compare=False, repr=False)
 
-    def moved(self, shift_mm: Vector) -> "MeshVolume":
-        """The mesh somewhere else."""
-        return replace(self, mesh=self.mesh.transform(np.eye(3), shift_mm))
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "MeshVolume":
+        """The volume with every place p of it at rotation @ p + shift_mm."""
+        return replace(self, mesh=self.mesh.transform(rotation, shift_mm))
 
 
 @dataclass(frozen=True)
@@ -180,9 +185,10 @@ class Modifier:
     process: dict[str, Any]
     room: Zone | None = None
 
-    def moved(self, shift_mm: Vector) -> "Modifier":
-        """The same somewhere else."""
-        return replace(self, volume=self.volume.moved(shift_mm), room=None if self.room is None else self.room.moved(shift_mm))
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Modifier":
+        """The same with every place p at rotation @ p + shift_mm."""
+        room = None if self.room is None else self.room.transform(rotation, shift_mm)
+        return replace(self, volume=self.volume.transform(rotation, shift_mm), room=room)
 
 
 @dataclass(frozen=True)
@@ -233,9 +239,9 @@ class Marked:
         known = (sources >= 0) & (sources < len(self.faces))
         return replace(self, faces=known & self.faces[np.where(known, sources, 0)])
 
-    def moved(self, shift_mm: Vector) -> "Marked":
-        """The same for a mesh that is moved."""
-        return replace(self, boxes=tuple(box.moved(shift_mm) for box in self.boxes))
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Marked":
+        """The same for a mesh with every vertex v at rotation @ v + shift_mm."""
+        return replace(self, boxes=tuple(box.transform(rotation, shift_mm) for box in self.boxes))
 
     def within(self, room: Zone) -> "Marked":
         """The same, but nothing is marked outside of a box around the mesh."""

@@ -90,7 +90,7 @@ def row(file: Path, profile: Profile, orient: bool) -> str:
         if len(decomposition.parts) == 1 and not orient:
             return f"| {file.name} | 1 | 1 | 1 | | {decomposition.risky_area_mm2:.0f} | | | stays whole |"
         program = build(decomposition, profile)
-        uncut = best_lying(mesh, profile) if orient else straight_up(decomposition, profile)
+        uncut = best_lying(decomposition, profile) if orient else straight_up(decomposition, profile)
         ours = in_parts(program, profile)
     except UserError as error:
         return f"| {file.name} | | | | | | | | {error} |"

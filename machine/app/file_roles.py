@@ -62,7 +62,8 @@ def _read_by(request: ModelRequest) -> list[Role]:
     profiles = zip(("--machine", "--material", "--process"), request.profile_names, strict=False)
     ranker = Path(request.ranker) if request.ranker.endswith(SUFFIX) else None
     own = [(option, Path(name)) for option, name in profiles if name is not None and is_file_name(name)]
-    return [*models, ("--plan", request.cuts.plan), ("--planes", request.cuts.planes), ("--ranker", ranker), *own]
+    plans = [("--plan", plan) for plan in request.cuts.plans]
+    return [*models, *plans, ("--planes", request.cuts.planes), ("--ranker", ranker), *own]
 
 
 def _written(outputs: Outputs) -> list[Role]:

@@ -48,7 +48,7 @@ def decompose(
     outputs = Outputs(
         folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=None if known else plan
     )
-    cuts = Cuts(plan if known else None, search.parts, planes)
+    cuts = Cuts((plan,) if known and plan else (), search.parts, planes)
     return decompose(options.model_request(model, search, given, outputs=outputs, cuts=cuts, compare=compare))
 
 

@@ -51,13 +51,18 @@ class Outputs:
 class Cuts:
     """What a person says of the cuts; None: nothing.
 
-    plan: file whose planes are cut instead of a search; parts: the most parts; planes: file of planes by hand that
-    the search starts from.
+    plans: files whose planes are cut instead of a search, one for each model that has one; parts: the most parts;
+    planes: file of planes by hand that the search starts from.
     """
 
-    plan: Path | None = None
+    plans: tuple[Path, ...] = ()
     parts: int | None = None
     planes: Path | None = None
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan of the only model; None: there is none."""
+        return self.plans[0] if self.plans else None
 
 
 @dataclass(frozen=True)

@@ -104,16 +104,10 @@ def mesh_moved(mesh: Mesh, place_mm: Place) -> Mesh:
 
 
 def _part_moved(part: Part, shift: Floats) -> Part:
-    x, y, z = shift.tolist()
-    return replace(
-        part,
-        mesh=mesh_moved(part.mesh, (x, y)),
-        base=_plane_moved(part.base, shift),
-        no_seam=part.no_seam.moved((x, y, z)),
-        no_support=part.no_support.moved((x, y, z)),
-        support=part.support.moved((x, y, z)),
-        modifiers=tuple(modifier.moved((x, y, z)) for modifier in part.modifiers),
-    )
+    x, y, _ = shift.tolist()
+    moved = replace(part, mesh=mesh_moved(part.mesh, (x, y)), base=_plane_moved(part.base, shift))
+    still = np.eye(3)
+    return moved.with_marks(lambda mark: mark.transform(still, shift), lambda modifier: modifier.transform(still, shift))
 
 
 def _plane_moved(plane: Plane, shift: Floats) -> Plane:

@@ -10,8 +10,8 @@ from math import inf, pi
 
 import numpy as np
 
-from machine.planning.limits import Speeds, path_speeds
-from machine.planning.moves import POINTS, RETRACT, RICHER, SPEED, Moves, add_point, add_row
+from machine.planning.limits import Speeds, path_speeds, stroke_filament_mm_s
+from machine.planning.moves import POINTS, RETRACT, SPEED, Moves, add_point, add_row
 from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
 from mdp.kernels.arrays import floats, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
@@ -62,7 +62,7 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
     machine, material = profile.machine, profile.material
     filament_mm2 = pi * material.diameter_mm**2 / 4.0
     area_mm2 = bead_area_mm2(layer.width_mm, layer.height_mm) * layer.flow
-    most_mm3_s = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s / RICHER * filament_mm2)
+    most_mm3_s = min(material.volumetric_limit_mm3_s, stroke_filament_mm_s(machine) * filament_mm2)
     with np.errstate(divide="ignore"):
         fastest = most_mm3_s / np.maximum(area_mm2, 0.0)
     accelerations = stroke_accelerations(profile, on_plate)
@@ -130,7 +130,7 @@ def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> fl
         return 0.0
     seen, taken_mm = layer.is_of(*SEEN), 0.0
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
-    fastest = min(profile.material.volumetric_limit_mm3_s / filament_mm2, profile.machine.extruder_speed_mm_s / RICHER)
+    fastest = min(profile.material.volumetric_limit_mm3_s / filament_mm2, stroke_filament_mm_s(profile.machine))
     needed_mm = bead_area_mm2(layer.width_mm, layer.height_mm) * profile.material.flow / filament_mm2  # for a millimetre
     ends = np.cumsum(strokes.rows[:, POINTS].astype(np.int64))
     for k in np.flatnonzero(~seen | seen.all()).tolist():

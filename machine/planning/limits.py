@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning.moves import REORIENT, BeginLayer, BeginPart, MachineProgram, Reorient
+from machine.planning.moves import REORIENT, RICHER, BeginLayer, BeginPart, MachineProgram, Reorient
 from machine.planning.timing import along, axis_speeds
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
@@ -82,6 +82,11 @@ def speeds_of(profile: Profile) -> Speeds:
         acceleration_mm_s2=travel_mm_s2(profile) or inf,
         axes_mm_s=axis_speeds(machine)[:3],
     )
+
+
+def stroke_filament_mm_s(machine: Machine) -> float:
+    """The greatest speed of the filament that a stroke may plan with: the text may round its ends to a little more."""
+    return machine.extruder_speed_mm_s / RICHER
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Parts of a node: its solids in print order, each at a pose, so that the table turns little, and the decomposition they are."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms
@@ -117,7 +117,14 @@ class Outcome:
 
 def made_of(problem: Problem, taken: Taken, outcome: Outcome) -> Decomposition:
     """The decomposition that was taken."""
-    mesh, parts = problem.mesh, taken.parts
+    mesh, parts, zones = problem.mesh, taken.parts, problem.zones
+    whole = replace(
+        one_piece(mesh, problem.machine),
+        no_seam=zones.no_seam,
+        no_support=zones.no_support,
+        support=zones.support,
+        modifiers=zones.modifiers,
+    )
     folded = folded_mm3(mesh, parts)
     return Decomposition(
         name=outcome.name,
@@ -133,6 +140,7 @@ def made_of(problem: Problem, taken: Taken, outcome: Outcome) -> Decomposition:
         notes=(*_folded_note(folded), *_feather_notes(parts), *outcome.notes, *taken.note),
         folded_mm3=folded,
         front=taken.front,
+        uncut=(whole,),
     )
 
 

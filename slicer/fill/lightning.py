@@ -15,7 +15,7 @@ from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices
 from slicer.geometry.clip import cut_line
-from slicer.geometry.edge_index import EdgeIndex, crossings, depths, index_edges, lie_within, nearest, within
+from slicer.geometry.edge_index import EdgeIndex, Grid, crossings, depths, index_edges, lie_within, nearest, within
 from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.polyline import Segment, length_mm
 
@@ -235,6 +235,41 @@ def _branch(
     return m
 
 
+@helper
+def _cell(grid: Grid, x: float, y: float) -> int:
+    """The number of the cell of a place, beyond the grid that of the nearest one."""
+    column, row = int((x - grid.x) / grid.size_mm), int((y - grid.y) / grid.size_mm)
+    return min(max(row, 0), grid.rows - 1) * grid.columns + min(max(column, 0), grid.columns - 1)
+
+
+@helper
+def _nearest_node(
+    out: Floats, first: Indices, after: Indices, grid: Grid, place: tuple[float, float], lengths: tuple[float, float]
+) -> tuple[int, bool]:
+    """The node nearest to a place, the first of several, and whether one holds it.
+
+    first, after: the last node of each cell of the grid, and for each node the one before it in its cell; -1: none. lengths: how
+    near a node has to be to hold a place, and how near to be the nearest; -1: none is.
+    """
+    (x, y), (near, most) = place, lengths
+    reach = max(near, grid.size_mm)
+    while True:
+        best, which, is_held = most, -1, False
+        low, high = _cell(grid, x - reach, y - reach), _cell(grid, x + reach, y + reach)
+        for r in range(low // grid.columns, high // grid.columns + 1):
+            for c in range(r * grid.columns + low % grid.columns, r * grid.columns + high % grid.columns + 1):
+                node = first[c]
+                while node >= 0:
+                    far = np.hypot(out[node, 0] - x, out[node, 1] - y)
+                    is_held = is_held or far <= near
+                    if far < best or (far == best and node < which):
+                        best, which = far, node
+                    node = after[node]
+        if best <= reach or reach >= most:
+            return which, is_held
+        reach *= 2.0
+
+
 @kernel
 def _grow(
     nodes: Floats, parent: Indices, wanting: Floats, border: EdgeIndex, sizes: tuple[float, float]
@@ -252,15 +287,17 @@ def _grow(
     out, above, m = table(room, 2), longs(room, -1), len(nodes)
     for k in range(m):
         out[k, 0], out[k, 1], above[k] = nodes[k, 0], nodes[k, 1], parent[k]
+    grid = border.grid
+    first, after, sorted_in = longs(grid.columns * grid.rows, -1), longs(room, -1), 0
     for k in range(len(wanting)):
+        for node in range(sorted_in, m):
+            c = _cell(grid, out[node, 0], out[node, 1])
+            first[c], after[node] = node, first[c]
+        sorted_in = m
         x, y = wanting[k, 0], wanting[k, 1]
-        best, which, held = np.hypot(ways[k, 0] - x, ways[k, 1] - y), -1, False
-        for node in range(m):
-            far = np.hypot(out[node, 0] - x, out[node, 1] - y)
-            held = held or far <= near
-            if far < best:
-                best, which = far, node
-        if held:
+        far = np.hypot(ways[k, 0] - x, ways[k, 1] - y)
+        which, is_held = _nearest_node(out, first, after, grid, (x, y), (near, far))
+        if is_held:
             continue
         begin = (ways[k, 0], ways[k, 1]) if which < 0 else (out[which, 0], out[which, 1])
         m = _branch(out, above, m, which, begin, (x, y), step)

@@ -359,15 +359,27 @@ def _without_near(k: int, bare: Polygons, areas: ReachableAreas) -> Polygons:
 
 
 def explain(supports: Supports, tops_mm: Floats) -> tuple[Unsupported, ...]:
-    """Every place that got no support, the largest first, with the number of its layer among those that print anything.
+    """Every place that lies bare, the largest first, with the number of its layer among those that print anything.
 
     tops_mm: heights of these.
     """
     sections, number = supports.sections, np.searchsorted(tops_mm, supports.sections.heights.tip_mm, side="right")
-    places = [(mm2, layer, _reason(layer, area, sections)) for mm2, layer, area in _connected_areas(supports.missed)]
+    places = [(mm2, layer, _reason(layer, area, sections)) for mm2, layer, area in _connected_areas(_beyond_a_line(supports))]
     places += [(mm2, layer, UNWANTED) for mm2, layer, _ in _connected_areas(supports.unwanted)]
     places.sort(key=lambda place: (-place[0], place[1]))
     return tuple(Unsupported(mm2, int(number[layer]), reason) for mm2, layer, reason in places)
+
+
+def _beyond_a_line(supports: Supports) -> list[Polygons]:
+    """The missed places of every layer without what the layer below carries: a line lies on that, or beside one that does. Slopes
+    too steep for the process are printed like that, layer upon layer."""
+    outlines, process = supports.sections.outlines, supports.sections.process
+    bare = list(supports.missed)
+    for k, missed in enumerate(bare):
+        if k and not missed.is_empty():
+            near = outlines[k - 1] ^ bounding_box(missed, 2.0 * process.line_width_mm)
+            bare[k] = missed - offset(near, process.line_width_mm)
+    return drop_small(bare, process.support_least_mm2)
 
 
 def _connected_areas(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, Polygons]]:

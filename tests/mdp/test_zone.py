@@ -53,10 +53,9 @@ def test_a_plane_passes_through_a_zone_between_its_lowest_and_its_highest_corner
 def test_a_box_that_is_turned_with_a_model_reaches_the_same_faces_and_the_same_planes(
     seed: int, height: int, around: int
 ) -> None:
-    mesh, plain, shift = random_solid(seed), Zone((-4.0, -6.0, 1.0), (3.0, 5.0, 6.0)), (3.0, -2.0, 1.0)
+    mesh, plain, shift = random_solid(seed), Zone((-4.0, -6.0, 1.0), (3.0, 5.0, 6.0)), np.array((3.0, -2.0, 1.0))
     turn, direction = about(random_direction(height, around), 0.001 * height), random_direction(around, height)
-    x, y, z = (tuple(row) for row in turn.T.tolist())
-    turned = Zone(plain.min_mm, plain.max_mm, (x, y, z)).moved(shift)
+    turned = plain.transform(turn, np.zeros(3)).transform(np.eye(3), shift)
     assert (turned.touches(mesh.transform(turn, shift)) == plain.touches(mesh)).all()
     np.testing.assert_allclose(turned.corners, plain.corners @ turn.T + shift, atol=1e-12)
     spans = spans_mm(direction[None], [plain])[0] + turn @ direction @ shift

@@ -113,9 +113,8 @@ def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> N
 
 def test_a_box_that_leans_shuts_of_each_layer_what_lies_in_it() -> None:
     part, half = whole(box(20.0, 20.0, 20.0)), 0.5**0.5
-    leaning = Zone((-5.0, -10.0, -5.0), (5.0, 10.0, 5.0), ((half, 0.0, -half), (0.0, 1.0, 0.0), (half, 0.0, half))).moved(
-        (0, 0, 10)
-    )
+    leaning = Zone((-5.0, -10.0, -5.0), (5.0, 10.0, 5.0), ((half, 0.0, -half), (0.0, 1.0, 0.0), (half, 0.0, half)))
+    leaning = leaning.transform(np.eye(3), np.array([0.0, 0.0, 10.0]))
     shut = marked_areas(Marked((leaning,)), part, part.mesh, np.array([2.0, 6.0, 10.0]))
     assert shut[-1].area() == pytest.approx(20.0 * 10.0 * 2.0**0.5)  # as wide as its side's diagonal half way up
 

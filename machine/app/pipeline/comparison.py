@@ -1,11 +1,13 @@
 """Compare: this print beside the same model printed in one part, straight up and in its best single orientation."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from machine.app.pipeline.pipeline import build
+from machine.app.pipeline.plate import on_one_plate
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
 from machine.dryrun.dryrun import DryRun
@@ -17,9 +19,8 @@ from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
 from mdp.mesh import Mesh
-from mdp.plane import PLATFORM
-from mdp.pose import level, rotation
 from mdp.save import joint_values
+from mdp.search.parts import one_piece
 from mdp.stairs import step_shares
 from profiles.errors import UserError
 from profiles.profile import Profile
@@ -39,8 +40,8 @@ def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternati
 
 
 def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = None) -> tuple[Alternative, Alternative]:
-    """The model of a decomposition in one part, straight up and laid down; both get support whatever the process says: without it
-    they would fail.
+    """The models of a decomposition in one part each, straight up and laid down, with the same marks and modifiers; all get
+    support whatever the process says: without it they would fail.
 
     An alternative that the machine cannot print stays in the list, with the reason. report: where progress is shown; None: on the
     terminal. The model lies about the turn axis.
@@ -48,10 +49,10 @@ def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = N
     tell = say if report is None else report
     tell("comparing: straight up")
     up = straight_up(ours, profile, report)
-    if np.allclose(_best(ours.mesh, profile).rotation, np.eye(3), atol=1e-9):
+    if all(np.allclose(_best(part.mesh, profile).rotation, np.eye(3), atol=1e-9) for part in _uncut(ours, profile)):
         return up, replace(up, name=BEST)
     tell(f"comparing: {BEST}")
-    return up, best_lying(ours.mesh, profile, report)
+    return up, best_lying(ours, profile, report)
 
 
 def in_parts(program: Program, profile: Profile) -> Alternative:
@@ -64,31 +65,50 @@ def in_parts(program: Program, profile: Profile) -> Alternative:
 
 
 def straight_up(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
-    """The model of a decomposition in one part as it stands."""
-    return _in_one_part(Alternative("straight up", "as it stands", 1, risky_mm2=ours.risky_area_mm2), ours.mesh, profile, report)
+    """The models of a decomposition in one part each as they stand."""
+    way = Alternative("straight up", "as it stands", 1, risky_mm2=ours.risky_area_mm2)
+    return _in_one_part(way, _uncut(ours, profile), profile, report)
 
 
-def best_lying(mesh: Mesh, profile: Profile, report: Report | None = None) -> Alternative:
-    """A model in one part, laid down so that least needs support."""
-    best = _best(mesh, profile)
-    turned = standing_still(mesh, best.rotation)
-    risky = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
-    return _in_one_part(Alternative(BEST, in_words(best), 1, risky_mm2=risky), turned, profile, report)
+def best_lying(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
+    """The models of a decomposition in one part each, laid down so that least needs support."""
+    parts = _uncut(ours, profile)
+    best = {part: _best(part.mesh, profile) for part in dict.fromkeys(parts)}
+    lying = {part: _laid_down(part, orientation) for part, orientation in best.items()}
+    words = "; ".join(dict.fromkeys(map(in_words, best.values())))
+    risky = {part: float(part.mesh.areas_mm2[needing_upright(part.mesh, profile)].sum()) for part in lying.values()}
+    way = Alternative(BEST, words, 1, risky_mm2=sum(risky[lying[part]] for part in parts))
+    return _in_one_part(way, [lying[part] for part in parts], profile, report)
+
+
+def _uncut(ours: Decomposition, profile: Profile) -> Sequence[Part]:
+    """The models of a decomposition in one part each; without marks where that is not known."""
+    return ours.uncut or (one_piece(ours.mesh, profile.machine),)
 
 
 def _best(mesh: Mesh, profile: Profile) -> Orientation:
     return best_orientation(mesh, profile.process.self_supporting_angle_deg)
 
 
-def _in_one_part(way: Alternative, mesh: Mesh, profile: Profile, report: Report | None) -> Alternative:
-    """A model in one part as it stands, with support whatever the process says. way: what is known of it beforehand."""
+def _laid_down(part: Part, best: Orientation) -> Part:
+    """A model in one part turned, with its marks."""
+    mesh, rotation = standing_still(part.mesh, best.rotation), best.rotation
+    shift = mesh.vertices[0] - rotation @ part.mesh.vertices[0]
+    turned = replace(part, mesh=mesh)
+    return turned.with_marks(lambda mark: mark.transform(rotation, shift), lambda modifier: modifier.transform(rotation, shift))
+
+
+def _in_one_part(way: Alternative, parts: Sequence[Part], profile: Profile, report: Report | None) -> Alternative:
+    """Models in one part each as they stand, with support whatever the process says. way: what is known of it beforehand."""
     bare = profile.of_all_parts
     profile = bare.model_copy(update={"process": bare.process.model_copy(update={"support": "auto"})})
-    pose = level(profile.machine)
-    part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, way.risky_mm2)
-    whole = Decomposition(way.name, mesh, (part,), 1, "classic", way.risky_mm2, way.risky_mm2, 0, 0, 0.0)
+    models = {
+        part: Decomposition(way.name, part.mesh, (part,), 1, "classic", way.risky_mm2, way.risky_mm2, 0, 0, 0.0)
+        for part in dict.fromkeys(parts)
+    }
     try:
-        program = build(whole, profile, report=report)
+        plate, profile = on_one_plate([models[part] for part in parts], profile)
+        program = build(plate, profile, report=report)
     except UserError as error:  # the others can still be compared
         return replace(way, message=str(error))
     return _figures(way, program, profile)

@@ -1,5 +1,6 @@
 """Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from machine.app.requests import MOST_COPIES, ModelRequest
@@ -14,16 +15,28 @@ from profiles.part_settings import problems_of_place
 from profiles.profile import Profile, with_part_settings
 
 
-def check_alone(request: ModelRequest) -> None:
-    """Raise PlanError for several models with an option that takes a single one."""
-    if not any(name != request.model for name in request.beside):
-        return
-    named = [("--plan", request.cuts.plan), ("--planes", request.cuts.planes), ("--record", request.outputs.record)]
-    given = [f"{option} {value}" for option, value in named if value is not None]
-    given += [f"--part {settings.part}" for settings in request.profile.parts] + ["--compare"] * request.compare
-    if given:
-        models = ", ".join(dict.fromkeys((request.model, *request.beside)))
-        raise PlanError(f"{given[0]} goes with one model, and several are given: {models}")
+def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
+    """What is asked for of each model of a plate alone, with the plan that names it. Raises PlanError."""
+    models = list(dict.fromkeys((request.model, *request.beside)))
+    each = {name: replace(request, model=name, beside=(), cuts=replace(request.cuts, plans=())) for name in models}
+    names = [own.name for own in each.values()]
+    if request.profile.parts and len(models) > 1:
+        part = request.profile.parts[0]
+        raise PlanError(
+            f"--part {part.part} goes with one model, and several are given, {', '.join(names)}: settings of a part of one of "
+            "them stand in its plan, as process = {...} of its [[part]], and --plan names that"
+        )
+    for file in request.cuts.plans:
+        model = read_plan(file).model if len(models) > 1 else names[0]
+        if names.count(model) != 1:
+            raise PlanError(
+                f'plan {file}: model is "{model}": beside other models it must be the name of one of these: {", ".join(names)}'
+            )
+        name = models[names.index(model)]
+        if each[name].cuts.plans:
+            raise PlanError(f"--plan {file}: --plan {each[name].cuts.plan} cuts {model} already, and one plan cuts a model")
+        each[name] = replace(each[name], cuts=replace(request.cuts, plans=(file,)))
+    return each
 
 
 def check_number(request: ModelRequest) -> None:

@@ -14,15 +14,15 @@ from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import (
     as_turned,
-    check_alone,
     check_number,
     check_parts_named,
     lays_down,
     read_given_plan,
+    request_of_each,
     with_plan_settings,
 )
 from machine.app.pipeline.memory import keep_modules, return_unused
-from machine.app.pipeline.plate import naming, on_one_plate
+from machine.app.pipeline.plate import naming, naming_parts, on_one_plate
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest, check_copies
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
@@ -78,17 +78,18 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     keep_modules()
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
     check_copies(request.copies, "--copies")
-    check_alone(request)
     check_number(request)
+    requests = request_of_each(request)
     began = perf_counter()
     models = [name for name in (request.model, *request.beside) for _ in range(request.copies)]
     each = {}
     for name in dict.fromkeys(models):
         with naming(Path(name).name if request.beside else ""):
-            each[name] = _decompose_alone(replace(request, model=name), to_build)
+            each[name] = _decompose_alone(requests[name], to_build)
     first = each[request.model]
     profile = first.profile if len(each) == 1 else request.profile  # each lies in its own way
-    decomposition, profile = on_one_plate([each[name].decomposition for name in models], profile)
+    settings = {own.decomposition: own.profile.parts for own in each.values()}
+    decomposition, profile = on_one_plate([each[name].decomposition for name in models], profile, settings)
     return replace(first, decomposition=decomposition, profile=profile, total_s=perf_counter() - began)
 
 
@@ -187,12 +188,13 @@ def build(
     """
     parts = decomposition.parts
     check_blocks(profile)
-    check_parts(parts, profile)
+    with naming_parts(parts):
+        check_parts(parts, profile)
     decomposition = standing_at(decomposition, profile.process.place_mm)
     parts = decomposition.parts
     compilers.wait_for(compilers.PROGRAM, report)
     return_unused()  # of the search
-    with reporting() if report is None else nullcontext(report) as tell:
+    with naming_parts(parts), reporting() if report is None else nullcontext(report) as tell:
 
         def show(slicing: SlicingProgress) -> None:
             if on_slices is not None:

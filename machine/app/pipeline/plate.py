@@ -4,7 +4,8 @@ Layer by layer: the first parts of all models are one part of the print, the oth
 printed beside what stands. Or one model after the other (process.complete_objects): then the first parts are such limbs, too.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -20,21 +21,26 @@ from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.topology.cross_section import cross_sections
-from mdp.zone import Marked, Zone
-from profiles.errors import MoveError, PlanError
+from mdp.zone import Marked, Modifier, Zone
+from profiles.errors import MoveError, PlanError, UserError
 from profiles.machine import Machine
+from profiles.part_settings import OF_A_PLACE, SPEEDS_OF_A_PLACE, PartSettings
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.geometry.polygons import clean
 
 GAP_MM = 5.0  # between models, or between their brims
+NUMBERED = re.compile(r"\bpart (\d{1,9})\b")
 
 
-def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Decomposition, Profile]:
+def on_one_plate(
+    models: Sequence[Decomposition], profile: Profile, settings: Mapping[Decomposition, Sequence[PartSettings]] | None = None
+) -> tuple[Decomposition, Profile]:
     """Models side by side about their place on the plate as one print, and what it is printed with. Copies of a model are one and
-    the same value. Settings of single parts hold for those of every model.
+    the same value. settings: of single parts of each model; None: those of the profile hold for the parts of every model.
 
-    Raises PlanError for models that the plate, or the head beside the others, has no room for.
+    Raises PlanError for models that the plate, or the head beside the others, has no room for, and for settings of a part that
+    cannot hold where the first parts of all models are one.
     """
     if len(models) == 1:
         return models[0], profile
@@ -44,20 +50,24 @@ def on_one_plate(models: Sequence[Decomposition], profile: Profile) -> tuple[Dec
     for model in dict.fromkeys(moved):
         with naming(model.name):
             check_parts(model.parts[:1], profile)
-    parts = [_first_of_all([moved[k].parts[n] for k, n in passing.together])] if passing.together else []
+    own = [profile.parts if settings is None else settings[model] for model in models]
+    confined = [[_within(_room(model.mesh), part) for part in model.parts] for model in moved]
+    first = [given for given in own[0] if given.part == 1]
+    if passing.together and any([given for given in each if given.part == 1] != first for each in own):
+        first = []
+        for model, each, of_model in zip(moved, own, confined, strict=True):
+            of_model[0] = _with_place_settings(of_model[0], model, each)
+    parts = [_first_of_all([confined[k][n] for k, n in passing.together])] if passing.together else []
     for (k, n), pose in zip(passing.alone, passing.poses(dict(enumerate(places))), strict=True):
-        parts.append(_beside(moved[k].parts[n], len(parts) + 1, pose, profile.machine))
-    numbers = [*([1] if passing.together else []), *(n + 1 for _, n in passing.alone)]
-    settings = [
-        given.model_copy(update={"part": number})
-        for number, own in enumerate(numbers, start=1)
-        for given in profile.parts
-        if given.part == own
-    ]
+        part = _beside(confined[k][n], len(parts) + 1, pose, profile.machine)
+        parts.append(replace(part, of=f"part {n + 1} of {models[k].name}"))
+    plated = first if passing.together else []
+    for number, (k, n) in enumerate(passing.alone, start=1 + len(passing.together[:1])):
+        plated += [given.model_copy(update={"part": number}) for given in own[k] if given.part == n + 1]
     process = profile.process
     if passing.together:
         process = process.model_copy(update={"brim_mm": passing.brim_mm})  # judged alone: together they stand wider
-    return _one_print(moved, parts), profile.model_copy(update={"process": process, "parts": settings})
+    return _one_print(moved, parts), profile.model_copy(update={"process": process, "parts": plated})
 
 
 @contextmanager
@@ -68,6 +78,19 @@ def naming(model: str) -> Iterator[None]:
     except MoveError as error:
         if model:
             error.args = (f"{model}: {error}",)
+        raise
+
+
+@contextmanager
+def naming_parts(parts: Sequence[Part]) -> Iterator[None]:
+    """Have a refused part of one of several models named by that, too."""
+    try:
+        yield
+    except UserError as error:
+        named = NUMBERED.search(str(error))
+        part = parts[int(named[1]) - 1] if named and 1 <= int(named[1]) <= len(parts) else None
+        if named and part is not None and part.of:
+            error.args = (f"{str(error)[: named.end()]} ({part.of}){str(error)[named.end() :]}",)
         raise
 
 
@@ -142,11 +165,10 @@ def _size_mm(mesh: Mesh) -> Place:
 
 def _first_of_all(parts: Sequence[Part]) -> Part:
     """The first parts of several models as one."""
-    mesh, rooms = together([part.mesh for part in parts]), [_room(part) for part in parts]
+    mesh, counts = together([part.mesh for part in parts]), [len(part.mesh.faces) for part in parts]
 
     def joined(marks: Iterable[Marked]) -> Marked:
-        pairs = zip(marks, rooms, parts, strict=True)
-        return Marked.together([(mark.within(room), len(part.mesh.faces)) for mark, room, part in pairs])
+        return Marked.together([*zip(marks, counts, strict=True)])
 
     return replace(
         parts[0],
@@ -158,14 +180,32 @@ def _first_of_all(parts: Sequence[Part]) -> Part:
         no_seam=joined(part.no_seam for part in parts),
         no_support=joined(part.no_support for part in parts),
         support=joined(part.support for part in parts),
-        modifiers=tuple(replace(own, room=room) for part, room in zip(parts, rooms, strict=True) for own in part.modifiers),
+        modifiers=tuple(modifier for part in parts for modifier in part.modifiers),
     )
 
 
-def _room(part: Part) -> Zone:
-    """The box around a model's first part that reaches half of the gap to other models."""
-    low, high = part.mesh.bounds_mm + 0.5 * GAP_MM * np.array([[-1.0], [1.0]])
+def _room(mesh: Mesh) -> Zone:
+    """The box around a model that reaches half of the gap to other models."""
+    low, high = mesh.bounds_mm + 0.5 * GAP_MM * np.array([[-1.0], [1.0]])
     return Zone((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+
+def _within(room: Zone, part: Part) -> Part:
+    """A model's part with the boxes of its marks and the modifiers confined to the model's room."""
+    return part.with_marks(lambda mark: mark.within(room), lambda modifier: replace(modifier, room=room))
+
+
+def _with_place_settings(part: Part, model: Decomposition, given: Sequence[PartSettings]) -> Part:
+    """A model's first part, which is printed as one with others', with its own settings as a modifier of its room."""
+    process = {key: value for own in given if own.part == 1 for key, value in own.process.items()}
+    for key in process:
+        if key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
+            raise PlanError(
+                f"part 1 of {model.name}: process.{key} holds for a whole part, and the first parts of all models are one part "
+                f"of the plate: --set process.{key}=... sets it for all, process.complete_objects = true prints each model alone"
+            )
+    room = _room(model.mesh)
+    return replace(part, modifiers=(Modifier(room, process, room), *part.modifiers)) if process else part
 
 
 def _joined(masks: Sequence[Mask | None]) -> Mask | None:
@@ -192,4 +232,5 @@ def _one_print(models: Sequence[Decomposition], parts: Sequence[Part]) -> Decomp
         residual_area_mm2=sum(model.residual_area_mm2 for model in models),
         folded_mm3=sum(model.folded_mm3 for model in models),
         front=(),
+        uncut=tuple(part for model in models for part in model.uncut),
     )

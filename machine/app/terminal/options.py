@@ -49,7 +49,10 @@ ModelsOrGcode = Annotated[
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", "; else the G-code file's own")]
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
-PlanGiven = Annotated[Path | None, typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search")]
+PlansGiven = Annotated[
+    list[Path] | None,
+    typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search; one for each model"),
+]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
@@ -107,7 +110,7 @@ class SearchOptions:
 class ProgramOptions(SearchOptions):
     """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
 
-    plan: PlanGiven = None
+    plan: PlansGiven = None
     pause: Annotated[
         list[str] | None,
         typer.Option(
@@ -195,7 +198,7 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     """The request for the program of models on a plate, or of a G-code file. Raises PlanError, SliceError, ProfileError."""
     from machine.planning.stops import parse_stops
 
-    stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(program.plan, program.parts)
+    stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(tuple(program.plan or ()), program.parts)
     first, *others = named_models(models)
     plate = {"copies": program.copies, "beside": tuple(others)}
     return model_request(first, program, given, cuts=cuts, stops=stops, **plate, **further)

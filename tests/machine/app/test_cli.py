@@ -90,11 +90,11 @@ WRONG = [
     (["export", "demo:tree", "nowhere.stl:2", "-o", "x.gcode"], "nowhere.stl: there is no such file"),
     (
         ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--plan", "box.toml"],
-        "--plan box.toml goes with one model, and several are",
+        'plan box.toml: model is "": beside other models it must be the name of one of these: demo:tree, demo:bracket',
     ),
     (
         ["export", "demo:tree", "demo:bracket", "-o", "x.gcode", "--part", "1:walls=4"],
-        "--part 1 goes with one model, and several are given",
+        "--part 1 goes with one model, and several are given, demo:tree, demo:bracket: settings of a part of one",
     ),
     (
         ["simulate", "short.gcode", "demo:tree"],

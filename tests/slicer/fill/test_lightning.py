@@ -6,9 +6,12 @@ import manifold3d as m3
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mdp.mesh import Floats
-from slicer.fill.lightning import LEAN_DEG, _prune, lightning_lines
+from slicer.fill.lightning import LEAN_DEG, _grow, _prune, lightning_lines
+from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
@@ -116,3 +119,22 @@ def test_a_trunk_loses_no_more_than_its_longest_branch_has_left(branches: tuple[
     nodes = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, branches[0]], [1.0, -branches[1]]])
     left, _ = _prune(nodes, np.array([-1, 0, 1, 1]), 0.6)
     assert left == pytest.approx(np.array([[0.0, 0.0], [0.9, 0.0]]))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 999))
+def test_branches_grow_from_the_nearest_node_or_wall_as_a_scan_of_all_nodes_finds_them(seed: int) -> None:
+    rng, near, step = np.random.default_rng(seed), 1.5, 0.7
+    border = index_edges(Polygons.square((40.0, 25.0)))
+    nodes, wanting = rng.uniform((0, 0), (40, 25), (8, 2)), rng.integers((1, 1), (39, 24), (40, 2)).astype(np.float64)
+    grown, parent = _grow(nodes, np.full(8, -1), wanting, border, (near, step))
+    at = 8
+    for x, y in wanting:
+        far = np.hypot(*(grown[:at] - (x, y)).T)
+        wall = min(x, 40 - x, y, 25 - y)
+        if far.min() <= near:
+            continue
+        since = int(np.argmin(far)) if far.min() < wall else at
+        assert parent[at] == (since if since < at else -1)
+        at = int(np.flatnonzero((grown == (x, y)).all(axis=1) & (np.arange(len(grown)) >= at))[0]) + 1
+    assert at == len(grown)

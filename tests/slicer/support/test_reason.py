@@ -1,12 +1,15 @@
 """Why a place gets no support: for every reason a part that has it."""
 
 import manifold3d as m3
+import numpy as np
 import pytest
 
 from mdp.decomposition import Part
 from slicer.slice import slice_part, slice_parts
 from tests.shapes import standing, tee
 from tests.slicer.hand import cut, profile, whole
+
+LINE_MM = profile().process.line_width_mm
 
 BLOCK = m3.Manifold.cube
 
@@ -56,6 +59,17 @@ def test_an_arm_farther_out_than_support_may_lean_from_its_part_s_own_foot() -> 
     assert arm.reason == "support would have to lean by more than 30 deg to find ground"
 
 
+def test_a_slope_whose_lines_lie_beside_those_below_is_not_bare_but_a_shelf_over_it_is() -> None:
+    rise, lean, shelf = 10.0, 1.3, 6.0  # a layer reaches 0.26 mm beyond the one below: past 45 degrees, but less than a line
+    tip = np.array([(x, y, z) for x, y in ((0, 0), (0, 8)) for z in (0, rise)] + [(lean * rise, y, rise) for y in (0, 8)])
+    over = BLOCK((8 + shelf, 8, 2)).translate((-8 + lean * rise, 0, rise))
+    wedge = m3.Manifold.hull_points(tip) + BLOCK((8, 8, rise)).translate((-8, 0, 0)) + over
+    base, top = cut(standing(wedge + BLOCK((8, 8, 10)).translate((-8, 0, -10))), ((0, 0, 1), 10.0))
+    far_out = ("process.support_branch_angle_deg=1", *NO_BRIDGES)
+    (bare,) = slice_part(top, profile(*far_out), [base]).unsupported
+    assert bare.mm2 == pytest.approx((shelf - LINE_MM) * 8, rel=0.05)
+
+
 def test_a_print_that_hangs_nowhere_has_no_reason_to_give() -> None:
     assert slice_part(whole(standing(BLOCK((10, 10, 5)))), profile()).unsupported == ()
 
@@ -65,5 +79,5 @@ def test_shelves_one_above_the_other_that_get_no_support_count_as_the_area_seen_
     comb = sum(shelves, BLOCK((8, 8, 16.1)))
     settings = (*NO_BRIDGES, "process.support_bottom_gap_mm=0.6")
     (bare,) = slice_part(whole(standing(comb)), profile(*settings)).unsupported
-    assert bare.mm2 == pytest.approx((20 - 8) * 8, rel=0.02)
+    assert bare.mm2 == pytest.approx((20 - 8 - LINE_MM) * 8, rel=0.02)  # a line along the post lies beside it
     assert bare.reason == "there is no room for support between it and the plastic below"

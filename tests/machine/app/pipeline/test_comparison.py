@@ -6,17 +6,30 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part, in_parts, straight_up
+from machine.app.pipeline.comparison import (
+    alternatives_json,
+    compare_table,
+    compare_with_one_part,
+    in_one_part,
+    in_parts,
+    straight_up,
+)
 from machine.app.pipeline.pipeline import build
+from machine.app.pipeline.plate import on_one_plate
 from machine.program import Alternative, Program, joints_of_print
 from mdp.cut import mesh_of
+from mdp.plans.plan_file import PlanFile
 from mdp.search.search import decompose
+from mdp.zone import Modifier, Zone, Zones
 from profiles.profile import Profile, load
 from tests.machine.app.terminal.test_report import alone
-from tests.shapes import tee
+from tests.shapes import standing, tee
 
 COARSE = ("process.layer_height_mm=0.4", "process.first_layer_height_mm=0.4", "process.line_width_mm=0.8", "process.walls=1")
 COARSE += ("search.directions=60", "search.beam_width=1", "process.infill_density=0", "process.support=none")
+
+
+FILAMENT_MM2 = np.pi / 4.0 * 1.75**2
 
 
 @cache
@@ -45,6 +58,30 @@ def test_an_alternative_that_the_machine_cannot_print_stays_in_the_list_with_the
     assert up.time_s is None
     assert "Z" in up.message
     assert up.message in compare_table((up,))
+
+
+def test_marks_and_modifiers_hold_for_the_model_in_one_part_too_as_it_lies() -> None:
+    profile, over_arm = load(settings=COARSE), Zone((5.5, -99.0, 24.0), (99.0, 99.0, 99.0))
+    zones = Zones(no_support=(over_arm,), modifiers=(Modifier(Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)), {"walls": 3}),))
+    marked = decompose(tee(), "tee", profile, by_hand=PlanFile("plan.toml", zones=zones), parts=1)
+    ways = in_one_part(marked, profile)
+    plain = in_one_part(decompose(tee(), "tee", profile, parts=1), profile)
+    thick = in_one_part(decompose(tee(), "tee", profile, parts=1), load(settings=[*COARSE, "process.walls=3"]))
+    own_mm = [[way.filament_mm - way.support_mm3 / FILAMENT_MM2 for way in each] for each in (ways, plain, thick)]
+    assert own_mm[0] == pytest.approx(own_mm[2], rel=0.02)
+    assert min(many / few for many, few in zip(own_mm[0], own_mm[1], strict=True)) > 1.2
+    assert ways[0].support_mm3 == pytest.approx(0.5 * plain[0].support_mm3, rel=0.1)  # of one of its two arms
+
+
+def test_copies_are_laid_down_each_for_itself() -> None:
+    profile = load(settings=COARSE)
+    cross = Manifold.cube((8, 8, 30), True) + Manifold.cube((30, 8, 8), True)  # nothing of it overhangs where it lies on its side
+    single = decompose(standing(cross), "cross", profile, parts=1)
+    many, plated = on_one_plate([single] * 4, profile)
+    one, four = in_one_part(single, profile)[1], in_one_part(many, plated)[1]
+    assert (four.message, four.orientation) == ("", one.orientation)
+    assert (four.risky_mm2, four.support_mm3) == (0.0, 0.0)
+    assert four.filament_mm == pytest.approx(4.0 * one.filament_mm, rel=0.05)
 
 
 def test_stairs_of_a_model_in_one_piece_are_those_of_its_slanted_faces_searched_or_not() -> None:

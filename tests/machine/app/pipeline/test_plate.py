@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 import shapely
 
+from machine.app.pipeline.given_plan import request_of_each
 from machine.app.pipeline.pipeline import build
-from machine.app.pipeline.plate import on_one_plate
+from machine.app.pipeline.plate import naming_parts, on_one_plate
+from machine.app.requests import Cuts, ModelRequest
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
 from machine.planning.arrange import places_on_plate
@@ -130,6 +132,66 @@ def test_a_box_that_reaches_beyond_its_model_marks_no_copy_beside_it(axes: Any) 
         assert mark.touched(many.mesh).tolist() == 2 * alone.tolist()
         (area,) = marked_areas(mark, many, many.in_part_frame(), cuts_mm)
         assert (section ^ area).area() == pytest.approx(0.5 * section.area())
+
+
+def test_a_box_of_a_model_that_is_printed_alone_does_not_reach_into_those_that_stand_beside_it() -> None:
+    everywhere = Marked((Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)),))
+    part = replace(whole(box(10, 10, 9)), no_seam=everywhere, no_support=everywhere, support=everywhere)
+    one, other = in_copies(decomposed(part), 2, plate("process.complete_objects=true"))[0].parts
+    cuts_mm = np.array([4.5])
+    sections = [of_contours(cross_sections(copy.mesh, cuts_mm)[0]) for copy in (one, other)]
+    for mark in (other.no_seam, other.no_support, other.support):
+        level = replace(other, rotation=np.eye(3))
+        (area,) = marked_areas(mark, level, other.mesh, cuts_mm)
+        assert [(section ^ area).area() for section in sections] == pytest.approx([0.0, 100.0])
+
+
+def test_settings_of_a_part_of_one_model_hold_for_no_other_model() -> None:
+    post = decomposed(whole(box(10, 10, 9)), name="post")
+    tilted = decomposed(*cut(box(20, 20, 14), ((0.5, 0.0, 1.0), 9.0)), name="tilted")
+    settings = {post: [own(1, walls=5)], tilted: [own(2, layer_height_mm=0.25)]}
+    print_, profile = on_one_plate([post, tilted], plate("process.skirt_loops=0"), settings)
+    (modifier,) = print_.parts[0].modifiers
+    inside = [face.all() for face in _inside(modifier.volume, print_.parts[0].mesh)]
+    assert (modifier.process, sum(inside)) == ({"walls": 5}, len(post.mesh.faces))
+    named = {part.index: part.of for part in print_.parts[1:]}
+    assert [(settings.part, named[settings.part]) for settings in profile.parts] == [(2, "part 2 of tilted")]
+    with pytest.raises(PlanError, match=r"part 1 of post: process.layer_height_mm holds for a whole part, .*complete_objects"):
+        on_one_plate([post, tilted], plate(), {post: [own(1, layer_height_mm=0.2)], tilted: []})
+
+
+def own(part: int, **process: Any) -> PartSettings:
+    return PartSettings(part=part, process=process)
+
+
+def _inside(volume: Any, mesh: Mesh) -> np.ndarray:
+    points = mesh.vertices[mesh.faces]
+    return np.all((points >= volume.min_mm) & (points <= volume.max_mm), axis=2)
+
+
+def test_a_refused_part_is_named_by_its_model_too() -> None:
+    parts = [whole(box(10, 10, 9)), replace(whole(box(10, 10, 9)), index=2, of="part 3 of hook.stl")]
+    with pytest.raises(MoveError, match=r"^part 2 \(part 3 of hook.stl\) reaches X 99 mm$"), naming_parts(parts):
+        raise MoveError("part 2 reaches X 99 mm")
+    with pytest.raises(MoveError, match=r"^part 1 reaches X 99 mm$"), naming_parts(parts):
+        raise MoveError("part 1 reaches X 99 mm")
+
+
+def test_each_plan_goes_with_the_model_that_it_names(tmp_path: Path) -> None:
+    for name in ("tee", "hook"):
+        (tmp_path / f"{name}.toml").write_text(f'version = 1\nmodel = "{name}.stl"\n')
+    tee_plan, hook_plan = tmp_path / "tee.toml", tmp_path / "hook.toml"
+
+    def of_each(*plans: Path) -> dict[str, ModelRequest]:
+        return request_of_each(ModelRequest("a/hook.stl", plate(), cuts=Cuts(plans), beside=("b/tee.stl", "post.stl")))
+
+    found = {name: request.cuts.plan for name, request in of_each(tee_plan, hook_plan).items()}
+    assert found == {"a/hook.stl": hook_plan, "b/tee.stl": tee_plan, "post.stl": None}
+    with pytest.raises(PlanError, match=r"tee.toml cuts tee.stl already"):
+        of_each(tee_plan, tee_plan)
+    hook_plan.write_text("version = 1\n")
+    with pytest.raises(PlanError, match=r'model is "": .* the name of one of these: hook.stl, tee.stl, post.stl'):
+        of_each(hook_plan)
 
 
 def test_slender_copies_have_the_brim_that_one_alone_would_have() -> None:
