@@ -25,7 +25,8 @@ class Part:
     than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
     up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up;
-    support: where whatever overhangs is to be held up; modifiers: where other settings hold.
+    support: where whatever overhangs is to be held up; modifiers: where other settings hold. lifted_mm: how far its base plane
+    lies above the platform where it stands on a raft there.
     """
 
     index: int
@@ -43,6 +44,7 @@ class Part:
     no_support: Marked = UNMARKED
     modifiers: tuple[Modifier, ...] = ()
     support: Marked = UNMARKED
+    lifted_mm: float = 0.0
 
     @property
     def direction(self) -> Floats:
@@ -51,8 +53,8 @@ class Part:
 
     @property
     def on_platform(self) -> bool:
-        """Whether it stands on the platform: the first part of each model does."""
-        return self.base.offset_mm == 0.0 and bool((self.base.normal == UP).all())
+        """Whether it stands on the platform, or on a raft there: the first part of each model does."""
+        return self.base.offset_mm == self.lifted_mm and bool((self.base.normal == UP).all())
 
     def in_part_frame(self) -> Mesh:
         """The part's mesh in its own frame: direction is +z, base plane is z = 0."""
