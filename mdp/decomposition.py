@@ -27,7 +27,8 @@ class Part:
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
     up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up;
     support: where whatever overhangs is to be held up; modifiers: where other settings hold. of: which part of which model of the
-    plate it is, in words; "": of the only one, or of several.
+    plate it is, in words; "": of the only one, or of several. lifted_mm: how far its base plane lies above the platform where it
+    stands on a raft there.
     """
 
     index: int
@@ -46,6 +47,7 @@ class Part:
     modifiers: tuple[Modifier, ...] = ()
     support: Marked = UNMARKED
     of: str = ""
+    lifted_mm: float = 0.0
 
     @property
     def direction(self) -> Floats:
@@ -54,8 +56,8 @@ class Part:
 
     @property
     def on_platform(self) -> bool:
-        """Whether it stands on the platform: the first part of each model does."""
-        return self.base.offset_mm == 0.0 and bool((self.base.normal == UP).all())
+        """Whether it stands on the platform, or on a raft there: the first part of each model does."""
+        return self.base.offset_mm == self.lifted_mm and bool((self.base.normal == UP).all())
 
     def with_marks(self, change: Callable[[Marked], Marked], change_modifier: Callable[[Modifier], Modifier]) -> "Part":
         """The part with its marks and modifiers changed."""

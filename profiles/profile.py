@@ -11,7 +11,7 @@ from profiles.machine import Machine
 from profiles.material import Material
 from profiles.part_settings import PartSettings, merge_part_settings, process_of_part
 from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables
-from profiles.problems.of_several import too_hot, unfit_for_nozzle
+from profiles.problems.of_several import lifted_twice, too_hot, unfit_for_nozzle
 from profiles.problems.of_table import TableProblems, table_problems
 from profiles.process import Process
 from profiles.search import Search
@@ -167,8 +167,12 @@ def _all_problems(whole: dict[str, Any]) -> list[str]:
 
 
 def _of_several(profile: Profile) -> list[str]:
-    machine = profile.machine
-    return [*too_hot(profile.material, machine), *unfit_for_nozzle(profile.process, machine.head.nozzle_mm)]
+    machine, process = profile.machine, profile.process
+    return [
+        *too_hot(profile.material, machine),
+        *unfit_for_nozzle(process, machine.head.nozzle_mm),
+        *lifted_twice(process, profile.search),
+    ]
 
 
 def _section_problems(name: str, table: Any) -> TableProblems:

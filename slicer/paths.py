@@ -1,7 +1,7 @@
 """Paths: what the slicer hands over: a table per layer, one row per stroke, all in the part frame."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import pi
 from typing import TypeVar
@@ -205,6 +205,14 @@ class SlicedPart:
     def points_mm(self) -> Floats:
         """(n, 3) points of all strokes in the part's frame."""
         return np.concatenate([layer.points_mm for layer in self.layers])
+
+    def moved(self, x_mm: float, y_mm: float) -> "SlicedPart":
+        """The part with its layers elsewhere in its frame."""
+        by_mm = np.array([x_mm, y_mm])
+        if not by_mm.any():
+            return self
+        layers = [replace(layer, points=layer.points + by_mm, approach=layer.approach + by_mm) for layer in self.layers]
+        return replace(self, layers=tuple(layers))
 
     @property
     def unsupported_mm2(self) -> float:

@@ -115,8 +115,13 @@ class Sections:
 
     @property
     def on_platform(self) -> bool:
-        """Whether the part stands on the platform."""
+        """Whether the part stands on the platform, or on a raft there."""
         return self.part.on_platform
+
+    @property
+    def on_raft(self) -> bool:
+        """Whether the part stands on a raft."""
+        return self.on_platform and self.process.raft_layers > 0
 
     @property
     def process(self) -> Process:
@@ -174,7 +179,7 @@ def section_part(
     places = modified_places(part, mesh, process, cuts_mm)
     beside, above, beneath = _model_around(part, earlier, later, heights, process, places)
     outlines = compensate(outlines, part, later, beside, cuts_mm, process)
-    if on_platform:
+    if on_platform and not process.raft_layers:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
     pins = plan_pins((*earlier, part, *later), of_print) if pins is None else pins
     ungrooved = cut_out(outlines, pin_holes(part, later, pins, of_print), cuts_mm)

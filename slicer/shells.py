@@ -108,7 +108,7 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     """
     sections = supports.sections
     process = sections.process
-    processes = layer_processes(process, sections.on_platform, len(sections.outlines))
+    processes = layer_processes(sections)
     processes = strengthen_overhangs(processes, sections.own, sections.plastic_below)
     model = model_sections(sections)
     counts, count = _wall_counts(sections, processes), len(processes)
@@ -207,10 +207,13 @@ def anchor_skins(
     return done, drawn
 
 
-def layer_processes(process: Process, on_platform: bool, layers: int) -> list[Process]:
-    """The settings of every layer: the first has widths of its own, and on plastic more walls, if it has any."""
-    first = first_layer_process(process) if on_platform else interface_process(process)
-    return [first if i == 0 else process for i in range(layers)]
+def layer_processes(sections: Sections) -> list[Process]:
+    """The settings of every layer: the first has widths of its own, but for one on a raft, and on plastic more walls, if it has
+    any."""
+    process, first = sections.process, sections.process
+    if not sections.on_raft:
+        first = first_layer_process(process) if sections.on_platform else interface_process(process)
+    return [first if i == 0 else process for i in range(len(sections.outlines))]
 
 
 def strengthen_overhangs(

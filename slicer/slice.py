@@ -26,19 +26,20 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons, offset
-from slicer.geometry.polyline import length_mm, mark_corners
+from slicer.geometry.polyline import length_mm
 from slicer.heights import shell_layers
 from slicer.interface.interface import pin_width_mm, skin_beside
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, bead_area_mm2
+from slicer.raft import raft_layers
 from slicer.sectioning import Sections, section_part, section_parts
 from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, lay_beads
 from slicer.strokes.order import order_beads
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import plan_seams, rear_of, seam_limits
-from slicer.strokes.speed import fan_share, first_layer_speeds, kinds_apart, own_fans, rising_fan, speeds_mm_s, travel_time_s
-from slicer.strokes.strokes import Strokes, in_pieces, split, split_overhangs, split_places
-from slicer.strokes.travels import may_wipe_over
+from slicer.strokes.speed import first_layer_speeds, kinds_apart, rising_fan
+from slicer.strokes.strokes import Strokes, split, split_overhangs, split_places
+from slicer.strokes.timed import layer_of, timed
 from slicer.strokes.vase import vase_layers
 from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, explain, own_supports
@@ -166,9 +167,9 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     limits = [seam_limits(edges, unwanted, z_mm, process) for unwanted, z_mm in rows]
     aligned = process.seam == "aligned" and process.walls > 0
     planned = plan_seams(sections, limits) if aligned else [NO_SEAMS] * len(limits)
-    layers: list[Layer] = []
+    layers, raft = list[Layer](), raft_layers(supports)
     bare: list[int] = []  # layers that hold something and print none of it
-    tip, seams, last, count = rear, np.zeros((0, 2)), 0, len(sections.outlines)
+    tip, seams, last, count = raft[-1].points[-1] if raft else rear, np.zeros((0, 2)), 0, len(sections.outlines)
     usual = min(max(1, shell_layers(process)[1]), count) if process.spiral_vase else count
     for i, (own, auxiliary) in enumerate(parallel_map(partial(lay_beads, shells), usual, FEWEST_LAYERS)):
         if own:
@@ -180,7 +181,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         if i and process.fuzzy_skin != "none":
             beads = fuzzy_walls(beads, process, _joints_near(sections, i), (sections.part.index, i))
         skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
-        layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers else None, skin)
+        layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers or raft else None, skin)
         if len(layer):
             tip = layer.points[-1]
             layers.append(layer)
@@ -194,6 +195,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     if sections.on_platform and process.walls:
         _check_on_plate(sections.part, layers, process)
     too_thin = [i for i in bare if i < last]
+    layers = [*raft, *layers]
     return SlicedPart(
         sections.part.index,
         tuple(layers),
@@ -214,36 +216,17 @@ def _joints_near(sections: Sections, layer: int) -> list[Polygons]:
 def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
     """The beads of a layer in order, with speeds, flow, fan and heat, as order_layer."""
     sections = shells.sections
-    profile, process, material, on_platform = sections.profile, sections.process, sections.profile.material, sections.on_platform
+    profile, process, material, heights = sections.profile, sections.process, sections.profile.material, sections.heights
     strokes, speeds, flow = order_layer(beads, shells, index, tip, skin)
     fan, add_c = 1.0, 0.0
-    if on_platform:
-        fan = rising_fan(material, index)
-        add_c = material.first_layer_nozzle_c - material.nozzle_c if index == 0 else 0.0
+    if sections.on_platform:
+        fan = rising_fan(material, index + process.raft_layers)
+        add_c = material.first_layer_nozzle_c - material.nozzle_c if index == 0 and not sections.on_raft else 0.0
     elif index < process.interface_layers:
         fan = process.interface_fan if index else process.interface_first_layer_fan
         add_c = process.interface_temperature_add_c
-    time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)  # at least: accelerations are left out
-    layer_fan = fan * fan_share(material, process, time_s)
-    own_fan = own_fans(strokes, material, fan, layer_fan)
-    return Layer(
-        z_mm=float(sections.heights.tip_mm[index]),
-        height_mm=float(sections.heights.height_mm[index]),
-        fan=layer_fan,
-        nozzle_add_c=add_c,
-        points=np.ascontiguousarray(strokes.points[:, :2]),
-        starts=strokes.starts,
-        kind=strokes.kind,
-        width_mm=strokes.width_mm,
-        speed_mm_s=speeds,
-        flow=strokes.flow * flow,
-        own_fan=own_fan,
-        retract=strokes.retract,
-        wiped=may_wipe_over(strokes, skin, material.wipe_mm),
-        below_mm=np.zeros((len(strokes), 2)),
-        approach=strokes.approach,
-        approach_starts=strokes.approach_starts,
-    )
+    at = {"z_mm": float(heights.tip_mm[index]), "height_mm": float(heights.height_mm[index])}
+    return layer_of(strokes, speeds, profile, **at, flow=flow, fan=fan, add_c=add_c, skin=skin)
 
 
 def order_layer(
@@ -269,14 +252,21 @@ def order_layer(
     if places:
         areas = [place.areas[index] for place in places]
         strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
-    strokes = in_pieces(strokes, height_mm)
-    flow = profile.material.flow
+    flow, fixed = profile.material.flow, None
     if index == 0:
-        flow *= process.first_layer_flow if on_platform else process.interface_flow
-    fixed = None if index else first_layer_speeds(process, on_platform)
-    speeds = speeds_mm_s(strokes, profile, height_mm, fixed, flow, of_places)
-    corners = mark_corners(strokes.points, strokes.starts, process.resolution_mm)
-    return replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts]), speeds, flow
+        own_flow, fixed = _first_layer(sections)
+        flow *= own_flow
+    return *timed(strokes, profile, height_mm, fixed, flow, of_places), flow
+
+
+def _first_layer(sections: Sections) -> tuple[float, dict[Kind, float]]:
+    """The flow of a part's first layer and its speeds by kind, on the plate, on a raft or on plastic."""
+    process = sections.process
+    if sections.on_raft:
+        return 1.0, dict.fromkeys(Kind, process.first_layer_speed_over_raft_mm_s)
+    if sections.on_platform:
+        return process.first_layer_flow, first_layer_speeds(process)
+    return process.interface_flow, dict.fromkeys(Kind, process.interface_speed_mm_s)
 
 
 def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:

@@ -50,7 +50,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         mine = rows[some.start : some.stop + 1]
         begins = (np.diff(part_of[program.remark[mine]]) != 0) | program.turned_between(mine)
         ends += (some.start + 1 + np.flatnonzero(begins)).tolist()
-    support, loose = program.rows_of_types(*SUPPORT), program.rows_of_types(*LOOSE)
+    support, loose = program.rows_of_types(*SUPPORT, Kind.SKIRT.value), program.rows_of_types(*LOOSE)
     problems, seen = [], set()
     for begin, end in pairwise([0, *ends, len(rows)]):
         mine = rows[begin:end]

@@ -77,7 +77,8 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     many_turns = np.count_nonzero(program.kind == MoveKind.ROTATE) > FEW_TURNS
     segments = deposited.segments() if many_turns else None  # computed once for all runs; else for each, which saves memory
     process = profile.process
-    gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
+    raft_gap_mm = process.raft_contact_distance_mm if process.raft_layers else 0.0
+    gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm, raft_gap_mm)
     width_mm, height_mm = deposited.sizes.max(axis=0)
     below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # what is lower under all moves of a run is not met
     for run, pose in pose_runs(program):

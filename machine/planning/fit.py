@@ -17,6 +17,8 @@ from profiles.errors import MoveError
 from profiles.machine import Table
 from profiles.profile import Profile
 from profiles.settings.plate import MIDDLE
+from slicer.paths import SlicedPart
+from slicer.raft import lift_mm
 
 Place = tuple[float, float]
 
@@ -67,8 +69,8 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
 
 
 def _shift(profile: Profile) -> Floats:
-    """(3,) what moves the model to its place, mm."""
-    return np.array([*profile.process.place_mm, 0.0])
+    """(3,) what moves the model to its place, on its raft where it has one, mm."""
+    return np.array([*profile.process.place_mm, lift_mm(profile)])
 
 
 def _advice(profile: Profile) -> str:
@@ -88,24 +90,41 @@ def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
     return over, f"it measures {x:g} x {y:g} mm"
 
 
-def standing_at(decomposition: Decomposition, place_mm: Place) -> Decomposition:
-    """A decomposition moved by x, y over the plate, its planes and marks too."""
-    if place_mm == MIDDLE:
+def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.0) -> Decomposition:
+    """A decomposition moved by x, y over the plate and lifted onto a raft, its planes and marks too."""
+    if place_mm == MIDDLE and up_mm == 0.0:
         return decomposition
-    shift = np.array([*place_mm, 0.0])
+    shift = np.array([*place_mm, up_mm])
     rows = tuple(replace(row, planes=tuple(_plane_moved(plane, shift) for plane in row.planes)) for row in decomposition.front)
     parts = tuple(_part_moved(part, shift) for part in decomposition.parts)
-    return replace(decomposition, mesh=mesh_moved(decomposition.mesh, place_mm), parts=parts, front=rows)
+    return replace(decomposition, mesh=mesh_moved(decomposition.mesh, shift), parts=parts, front=rows)
 
 
-def mesh_moved(mesh: Mesh, place_mm: Place) -> Mesh:
-    """A mesh moved by x, y over the plate."""
-    return Mesh(mesh.vertices + np.array([*place_mm, 0.0]), mesh.faces, mesh.colours)
+def lifted(
+    decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile
+) -> tuple[Decomposition, list[SlicedPart]]:
+    """Parts that were sliced as if they stood on the plate, and their layers, above their raft.
+
+    So the layers are those that they have without a raft, and all that keeps clear of the table keeps clear of the raft.
+    """
+    up = np.array([0.0, 0.0, lift_mm(profile)])
+    moved = [piece.moved(*(part.rotation @ up)[:2].tolist()) for part, piece in zip(decomposition.parts, sliced, strict=True)]
+    return standing_at(decomposition, MIDDLE, float(up[2])), moved
+
+
+def mesh_moved(mesh: Mesh, shift_mm: Floats) -> Mesh:
+    """A mesh moved by x, y, z."""
+    return Mesh(mesh.vertices + shift_mm, mesh.faces, mesh.colours)
+
+
+def mesh_at_place(mesh: Mesh, profile: Profile) -> Mesh:
+    """A mesh at its place on the plate, and on its raft, as it is printed."""
+    return mesh_moved(mesh, _shift(profile))
 
 
 def _part_moved(part: Part, shift: Floats) -> Part:
-    x, y, _ = shift.tolist()
-    moved = replace(part, mesh=mesh_moved(part.mesh, (x, y)), base=_plane_moved(part.base, shift))
+    lifted_mm = part.lifted_mm + float(shift[2]) if part.on_platform else 0.0
+    moved = replace(part, mesh=mesh_moved(part.mesh, shift), base=_plane_moved(part.base, shift), lifted_mm=lifted_mm)
     still = np.eye(3)
     return moved.with_marks(lambda mark: mark.transform(still, shift), lambda modifier: modifier.transform(still, shift))
 

@@ -32,7 +32,8 @@ class BeginPart:
 
 @dataclass(frozen=True)
 class BeginLayer:
-    """The strokes after this lie in one layer; z_mm is measured from the part's base plane, nozzle_add_c from the material's."""
+    """The strokes after this lie in one layer; z_mm is measured from the part's base plane,
+    or from the platform that its raft stands on, nozzle_add_c from the material's."""
 
     part: int
     index: int

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from machine.planning.fit import Place
+from machine.planning.fit import Place, standing_at
 from mdp.clearance import find_obstacle, passes_clear
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, Part
@@ -15,7 +15,9 @@ from mdp.mesh import Floats
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.pose import Pose, least_rotation, level, poses
 from profiles.profile import Profile
+from profiles.settings.plate import MIDDLE
 from slicer.interface.interface import AROUND_MM
+from slicer.raft import lift_mm, reach_mm
 
 ROUNDING_DIGITS = 6
 CELLS_MM = (2.0, 0.6)  # finer ones would bring models nearer to each other by 2 mm at most, and take many times as long
@@ -28,15 +30,17 @@ class Passing:
     """The models of a plate, each about the turn axis, and whether the head passes them.
 
     together: the parts that are printed first, layer by layer; alone: those that follow one after the other. brim_mm: width of
-    the brim around what stands on the plate.
+    the brim around what stands on the plate. With a raft all stand higher.
     """
 
     def __init__(
         self, models: Sequence[Decomposition], together: Sequence[Turn], alone: Sequence[Turn], profile: Profile, brim_mm: float
     ) -> None:
         self.models, self.together, self.alone, self.brim_mm = models, together, alone, brim_mm
-        self._profile = profile
-        self._around_mm = {model.parts[0]: self._width_around(model) for model in dict.fromkeys(models)}
+        self._profile, self._up_mm = profile, lift_mm(profile)
+        lifted = {model: standing_at(model, MIDDLE, self._up_mm) for model in dict.fromkeys(models)}
+        self._parts = [lifted[model].parts for model in models]
+        self._around_mm = {lifted[model].parts[0]: self._width_around(model) for model in lifted}
         self._hulls: dict[Part, Floats] = {}
         self._known: dict[tuple[object, ...], bool] = {}
 
@@ -55,12 +59,13 @@ class Passing:
         return least_rotation(self._profile.machine, [*begins, *options], fits)[len(begins) :]
 
     def _width_around(self, model: Decomposition) -> float:
-        """How far brim and support reach around a model on the plate, mm; the brim runs round the support."""
+        """How far brim or raft and support reach around a model on the plate, mm; both run round the support."""
         has_support = self._profile.process.support != "none" and any(part.risky_area_mm2 > 0.0 for part in model.parts)
-        return self.brim_mm + (AROUND_MM if has_support else 0.0)
+        around_mm = reach_mm(self._profile.process) if self._up_mm else self.brim_mm
+        return around_mm + (AROUND_MM if has_support else 0.0)
 
     def _part(self, turn: Turn) -> Part:
-        return self.models[turn[0]].parts[turn[1]]
+        return self._parts[turn[0]][turn[1]]
 
     def _allowed(self, number: int, places: Mapping[int, Place], tried: Sequence[Pose] | None = None) -> list[Pose]:
         """The poses at which a part can be printed while all that comes before it stands."""
@@ -92,7 +97,8 @@ class Passing:
         key = part, pose, standing, away_mm
         if key not in self._known:
             beside = self._hull(standing) + np.array([*away_mm, 0.0])
-            self._known[key] = passes_clear(self._profile.machine, pose, self._hull(part), beside, part.base.offset_mm, CELLS_MM)
+            base_mm = part.base.offset_mm - part.lifted_mm  # with its raft
+            self._known[key] = passes_clear(self._profile.machine, pose, self._hull(part), beside, base_mm, CELLS_MM)
         return self._known[key]
 
     def _hull(self, part: Part) -> Floats:
@@ -100,9 +106,10 @@ class Passing:
         if part not in self._hulls:
             hull = convex_hull(part.mesh.vertices)
             if self._around_mm.get(part, 0.0) > 0.0:
-                low = hull.vertices[hull.vertices[:, 2] <= PLATFORM_TOLERANCE_MM]
-                brims = low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND
-                hull = convex_hull(np.vstack([hull.vertices, brims.reshape(-1, 3)]))
+                low = hull.vertices[hull.vertices[:, 2] <= part.lifted_mm + PLATFORM_TOLERANCE_MM]
+                brims = (low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND).reshape(-1, 3)
+                plate = brims - [0.0, 0.0, part.lifted_mm]  # where a raft is as high as the part is lifted
+                hull = convex_hull(np.vstack([hull.vertices, brims, plate]))
             self._hulls[part] = hull.vertices[hull.faces]
         return self._hulls[part]
 

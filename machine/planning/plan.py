@@ -60,7 +60,8 @@ def plan(
             if (part.index, number) in stopped:
                 _stop(tip, Pause(part.index, number, stopped[part.index, number]), standing)
             if len(layer):
-                tip.mark(BeginLayer(part.index, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c))
+                z_mm = layer.z_mm + part.lifted_mm
+                tip.mark(BeginLayer(part.index, number, z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c))
                 print_layer(tip, layer, at + shift, shift, on_plate=part.on_platform and number == 1)
         widest_mm = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
         corners = hull(np.concatenate(points), 0.0).points_mm + shift

@@ -30,7 +30,7 @@ def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
     if part.needing is not None:
         return part.needing
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
-    return risky_upright(part.mesh, angle, counted) if part.on_platform else risky_above(part.mesh, part.base, angle)
+    return risky_upright(part.in_part_frame(), angle, counted) if part.on_platform else risky_above(part.mesh, part.base, angle)
 
 
 def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> NDArray[np.bool_]:

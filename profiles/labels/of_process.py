@@ -97,7 +97,12 @@ PLATE = {
     "small_base_brim_mm": advanced("Brim width of a small base", "adhesion auto brim"),
     "brim_gap_mm": advanced("Gap between brim and part", "adhesion brim separation object gap"),
     "elephant_foot_mm": advanced("Elephant foot compensation", "elefant first layer squish initial layer horizontal expansion"),
-    "pedestal_gap_mm": advanced("Gap between pedestal and model", "raft contact z distance air gap"),
+    "raft_layers": simple("Raft layers", "raft adhesion base"),
+    "raft_contact_distance_mm": advanced("Gap between raft and model", "raft contact z distance air gap"),
+    "raft_expansion_mm": advanced("Raft expansion", "raft margin extra"),
+    "raft_first_layer_density": advanced("Density of the raft's first layer", "raft base line spacing"),
+    "raft_first_layer_expansion_mm": advanced("Expansion of the raft's first layer", "raft base margin adhesion"),
+    "pedestal_gap_mm": advanced("Gap between pedestal and model", "contact z distance air gap"),
 }
 INTERFACE = {
     "interface_overlap": advanced("Press of the first layer on plastic", "bond weld overlap squish"),
@@ -135,6 +140,7 @@ MOTION = {
     "support_interface_speed_mm_s": advanced("Speed of dense support", "supports interface speed"),
     "first_layer_speed_mm_s": simple("First layer speed", "initial layer speed adhesion"),
     "first_layer_infill_speed_mm_s": advanced("First layer infill speed", "initial layer infill speed"),
+    "first_layer_speed_over_raft_mm_s": advanced("First layer speed on a raft", "initial layer speed over raft"),
     "gap_speed_mm_s": advanced("Gap fill speed", "gap infill thin walls"),
     "top_skin_speed_mm_s": advanced("Top surface speed", "top solid infill speed"),
     "small_wall_mm": advanced("Walls are small up to", "small perimeters threshold"),

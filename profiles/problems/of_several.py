@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from profiles.machine import Machine
 from profiles.material import Material
 from profiles.process import WIDTHS, Process
+from profiles.search import Search
 
 NOZZLE_TEMPERATURES = ("nozzle_c", "first_layer_nozzle_c", "homing_nozzle_c", "standby_c")
 LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diameters
@@ -19,6 +20,15 @@ def too_hot(material: Material, machine: Machine) -> Iterable[str]:
             yield f"material.{key} is {temperature_c:g}: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C"
     if material.bed_c > machine.bed_limit_c > 0:
         yield f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C"
+
+
+def lifted_twice(process: Process, search: Search) -> Iterable[str]:
+    """A raft under a model that a pedestal lifts already."""
+    if process.raft_layers and search.pedestal_mm > 0.0:
+        yield (
+            f"process.raft_layers is {process.raft_layers}: 0 is allowed with a pedestal (search.pedestal_mm is "
+            f"{search.pedestal_mm:g}), which is printed like a raft"
+        )
 
 
 def unfit_for_nozzle(process: Process, nozzle_mm: float) -> Iterable[str]:

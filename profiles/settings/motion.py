@@ -48,6 +48,9 @@ class Motion(Frozen):
         description="speed of skin and infill in the first layer on the plate, mm/s, once its walls hold; absent: "
         "first_layer_speed_mm_s",
     )
+    first_layer_speed_over_raft_mm_s: float = Field(
+        30.0, gt=0, le=1000, description="speed of a model's first layer on a raft, which spans the gap between them, mm/s"
+    )
     gap_speed_mm_s: float = Field(
         30.0, gt=0, le=1000, description="speed of the lines in gaps between walls, mm/s: their width changes all the time"
     )

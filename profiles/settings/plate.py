@@ -29,7 +29,8 @@ class Plate(Frozen):
         0.0,
         ge=0,
         le=50,
-        description="width of the brim around the first layer on the plate, mm; 0: only where a base is too small",
+        description="width of the brim around the first layer on the plate, mm; 0: only where a base is too small; a raft "
+        "has none",
     )
     small_base_brim_mm: float = Field(
         5.0,
@@ -44,7 +45,27 @@ class Plate(Frozen):
         0.0,
         ge=0,
         le=1,
-        description="the first layer on the plate is this much smaller all round, as a warm plate squeezes it out, mm",
+        description="the first layer on the plate is this much smaller all round, as a warm plate squeezes it out, mm; "
+        "none on a raft",
+    )
+    raft_layers: int = Field(
+        0,
+        ge=0,
+        le=50,
+        description="layers of a raft, which carries a model and the support that stands on the plate and is peeled off: one "
+        "that sticks, sparse ones, and half of all dense; 0: none",
+    )
+    raft_contact_distance_mm: float = Field(
+        0.1, ge=0, le=0.4, description="gap between a raft and the model on it, so that it comes off, mm; 0: it welds"
+    )
+    raft_expansion_mm: float = Field(
+        1.5, ge=0, le=50, description="a raft reaches this far beyond what stands on it, all round, mm"
+    )
+    raft_first_layer_density: float = Field(
+        0.9, ge=0.1, le=1, description="share of a raft's first layer that is filled: less is easier to take off the plate"
+    )
+    raft_first_layer_expansion_mm: float = Field(
+        3.0, ge=0, le=50, description="a raft's first layer reaches so much farther than the others, so that it sticks, mm"
     )
     pedestal_gap_mm: float = Field(
         0.1, ge=0, le=1, description="gap between a pedestal and the model on it, so that it breaks away, mm"

@@ -21,8 +21,10 @@ from slicer.estimate.duration import strokes_s
 from slicer.estimate.hanging import rough_supports, support_lengths_mm
 from slicer.estimate.rough import choose_layers, rough_lengths_mm
 from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import lengths_mm
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import bead_area_mm2
+from slicer.raft import raft_layers
 from slicer.sectioning import section_parts
 from slicer.shells import Shells, build_shells, lay_beads
 from slicer.slice import order_layer
@@ -81,7 +83,7 @@ def _estimate_part(supports: Supports, overhangs: Sequence[Overhang], samples: i
     support_mm3 = _support_mm3(held_mm.sum(axis=1) * bead_mm2, real[:, 2], layers, np.diff(begins, append=len(bead_mm2)))
     total = Estimate(time_s, (own_mm3 + support_mm3) / filament_mm2, support_mm3)
     if on_platform:
-        return total + _purged(profile)
+        return total + _purged(profile) + _raft(supports)
     heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
     return total + Estimate(TURN_S + heating_s, profile.material.prime_extra_mm, 0.0)
 
@@ -124,6 +126,14 @@ def _purged(profile: Profile) -> Estimate:
     process, material, length_mm = profile.process, profile.material, profile.machine.purge_mm
     mm3 = length_mm * bead_area_mm2(INTERFACE_WIDTH * process.line_width_mm, process.first_layer_height_mm) * material.flow
     return Estimate(length_mm / process.first_layer_speed_mm_s, mm3 / (0.25 * pi * material.diameter_mm**2), 0.0)
+
+
+def _raft(supports: Supports) -> Estimate:
+    """The raft under a part, if it has one; all of it counts as support."""
+    layers, profile = raft_layers(supports), supports.sections.profile
+    mm3 = float(sum(layer.volumes_mm3.sum() for layer in layers))
+    time_s = float(sum((lengths_mm(layer.points, layer.starts) / layer.speed_mm_s).sum() for layer in layers))
+    return Estimate(SLOWER * time_s + LAYER_S * len(layers), mm3 / (0.25 * pi * profile.material.diameter_mm**2), mm3)
 
 
 def _rough_s(drawn_mm: Floats, process: Process) -> Floats:

@@ -172,10 +172,8 @@ def stroke_speeds(process: Process) -> dict[Kind, float]:
     }
 
 
-def first_layer_speeds(process: Process, on_platform: bool) -> dict[Kind, float]:
-    """mm/s by kind of a part's first layer, on the platform or on plastic."""
-    if not on_platform:
-        return dict.fromkeys(Kind, process.interface_speed_mm_s)
+def first_layer_speeds(process: Process) -> dict[Kind, float]:
+    """mm/s by kind of the first layer on the plate."""
     inside = process.first_layer_infill_speed_mm_s or process.first_layer_speed_mm_s
     return dict.fromkeys(Kind, process.first_layer_speed_mm_s) | dict.fromkeys(INSIDE, inside)
 

@@ -114,7 +114,7 @@ def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floa
     length, least_s = length_mm(turn), process.least_layer_time_s
     slowed = length / least_s if least_s > 0.0 else fastest
     speed = max(min(fastest, slowed), min(fastest, process.least_speed_mm_s))
-    fan = rising_fan(material, k) * fan_share(material, process, length / speed)
+    fan = rising_fan(material, k + process.raft_layers) * fan_share(material, process, length / speed)
     # No wipe goes back down a turn: the tip would plough through the ones below where they are small.
     climb, pulled = (height_mm, 0.0), shares is not None
     whole = Path(Kind.OUTER_WALL, turn, width, speed, material.flow, NO_APPROACH, pulled, below_mm=climb, wiped=False)

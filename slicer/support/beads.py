@@ -35,6 +35,7 @@ from slicer.geometry.polygons import (
 )
 from slicer.geometry.polyline import Segment
 from slicer.paths import Kind
+from slicer.sectioning import Sections
 from slicer.support.reachable import SMOOTH_MM
 from slicer.support.support import Supports
 
@@ -51,18 +52,24 @@ def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Be
     sections = supports.sections
     outline, height_mm = sections.outlines[layer], float(sections.heights.height_mm[layer])
     on_plate = layer == 0 and sections.on_platform
+    if on_plate and sections.on_raft:
+        return []  # what lies beside the first layer there is the raft's (slicer.raft)
     support_process = with_line_width(process, process.support_line_width_mm)
     beads = support_beads(supports.areas[layer], supports.dense[layer], support_process, height_mm, on_plate)
     if layer < sections.pedestal_layers:
         beads += pedestal_beads(outline, layer, sections.pedestal_layers, process, height_mm)
     if on_plate:
-        own = (sections.part, *takewhile(lambda part: not part.on_platform, sections.later))  # until the next model begins
-        top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in own)
-        if sections.part.index > 1:  # where a skirt would go other models may stand
-            process = process.model_copy(update={"skirt_loops": 0})
-        footprint = union([outline, supports.areas[0]])
-        beads += brim(footprint, outline, sections.plate, process, top_mm=top_mm, height_mm=height_mm)
+        beads += beads_around(sections, union([outline, supports.areas[0]]), outline, process, height_mm)
     return beads
+
+
+def beads_around(sections: Sections, footprint: Polygons, base: Polygons, process: Process, height_mm: float) -> list[Bead]:
+    """Skirt and brim around a first layer on the plate; parameters as in brim()."""
+    own = (sections.part, *takewhile(lambda part: not part.on_platform, sections.later))  # until the next model begins
+    top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in own)
+    if sections.part.index > 1:  # where a skirt would go other models may stand
+        process = process.model_copy(update={"skirt_loops": 0})
+    return brim(footprint, base, sections.plate, process, top_mm=top_mm, height_mm=height_mm)
 
 
 def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: float, first: bool) -> list[Bead]:

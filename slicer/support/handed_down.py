@@ -252,8 +252,9 @@ def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supp
     wanted, missed, unwanted = (_padded(places, count) for places in (own.wanted, own.missed, own.unwanted))
     both = unite_layers(printed, _padded(own.areas, count))
     if sections.on_platform:
-        foot = widen_foot(printed[0], whole, (room.window ^ sections.plate) - room.shut)
-        both[0] = union([both[0], foot])
+        if not sections.on_raft:
+            foot = widen_foot(printed[0], whole, (room.window ^ sections.plate) - room.shut)
+            both[0] = union([both[0], foot])
     else:
         low = _hanging_low(areas, missed)
         missed = find_missed(missed, both, whole)

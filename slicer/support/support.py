@@ -82,7 +82,7 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     areas = reachable_areas(sections, blocked)
     printed, dense = stand(*grow(wanted, {}, areas), areas)
     missed = find_missed(wanted, printed, areas)
-    if sections.on_platform:
+    if sections.on_platform and not sections.on_raft:
         printed[0] = widen_foot(printed[0], areas, sections.plate - blocked[0])
     rest = nothing[len(printed) :]
     return Supports(sections, [*printed, *rest], [*dense, *rest], wanted, missed, unwanted)

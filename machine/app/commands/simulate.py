@@ -36,11 +36,11 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     program, profile = loaded.program, loaded.profile
     mesh = None if program.decomposition is None else program.decomposition.mesh
     if reference is not None:
-        from machine.planning.fit import mesh_moved
+        from machine.planning.fit import mesh_at_place
         from mdp.read import read_mesh
 
         mesh, _ = read_mesh(locate(reference), profile.process.scale, profile.process.rotate_deg)
-        mesh = mesh_moved(mesh, profile.process.place_mm)
+        mesh = mesh_at_place(mesh, profile)
     agreed = None
     if mesh is not None:
         from machine.dryrun.conformity.agreement import agreement

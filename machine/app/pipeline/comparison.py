@@ -25,6 +25,7 @@ from mdp.stairs import step_shares
 from profiles.errors import UserError
 from profiles.profile import Profile
 from slicer.paths import Kind
+from slicer.raft import lift_mm
 
 BEST = "best single orientation"
 NAMES = ("parts", "upright", "oriented")  # as scripts know the alternatives
@@ -36,7 +37,7 @@ def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternati
     if program.decomposition is None:
         return ()
     x, y = profile.process.place_mm
-    return in_parts(program, profile), *in_one_part(standing_at(program.decomposition, (-x, -y)), profile)
+    return in_parts(program, profile), *in_one_part(standing_at(program.decomposition, (-x, -y), -lift_mm(profile)), profile)
 
 
 def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = None) -> tuple[Alternative, Alternative]:

@@ -31,7 +31,7 @@ from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
 from machine.gcode.blocks import check_blocks
 from machine.gcode.writer import write_gcode
-from machine.planning.fit import check_parts, check_standing, standing_at
+from machine.planning.fit import check_parts, check_standing, lifted, standing_at
 from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from machine.planning.purge import has_purge
@@ -202,7 +202,7 @@ def build(
             begun, share = max(slicing.begun, 1), slicing.share
             tell(f"slicing part {begun} of {len(parts)}: {int(100 * share)} % of all layers", share)
 
-        sliced = slice_parts(parts, profile, show)
+        decomposition, sliced = lifted(decomposition, slice_parts(parts, profile, show), profile)
         tell("planning moves")
         program = plan(decomposition, sliced, profile, stops)
         for note in (*_too_thin(sliced, profile), *_without_pins(parts, sliced, profile), *_left_out(program, profile)):
@@ -215,7 +215,7 @@ def build(
         return_unused()
         tell("dry run")
         run = dry_run(lines, profile)
-    return Program(lines, run, _with_own_figures(decomposition, run), sliced)
+    return Program(lines, run, _with_own_figures(decomposition, run), tuple(sliced))
 
 
 def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decomposition:
@@ -251,6 +251,8 @@ def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
     """What was asked for and is not in the program."""
+    if profile.process.raft_layers and profile.process.brim_mm > 0.0:
+        yield "process.brim_mm has no effect with a raft: process.raft_first_layer_expansion_mm makes that wider"
     if profile.machine.purge_mm > 0.0 and not has_purge(program):
         yield "no place on the plate is clear of the print for a line of machine.purge_mm: there is none"
     dialect = dialect_of(profile.machine)

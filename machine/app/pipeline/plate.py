@@ -28,6 +28,7 @@ from profiles.part_settings import OF_A_PLACE, SPEEDS_OF_A_PLACE, PartSettings
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.geometry.polygons import clean
+from slicer.raft import reach_mm as raft_reach_mm
 
 GAP_MM = 5.0  # between models, or between their brims
 NUMBERED = re.compile(r"\bpart (\d{1,9})\b")
@@ -132,6 +133,8 @@ def _tips_over(mesh: Mesh, profile: Profile) -> bool:
 
 def _gap_mm(process: Process, brim_mm: float) -> float:
     """The distance that the boxes of models keep."""
+    if process.raft_layers:
+        brim_mm = raft_reach_mm(process)
     skirt_mm = process.skirt_distance_mm + (process.skirt_loops + 1) * process.line_width_mm
     if process.complete_objects and brim_mm == 0.0 and process.skirt_loops:  # round the first model alone
         return max(GAP_MM, skirt_mm)

@@ -1,0 +1,122 @@
+"""Raft: what is printed first under a model and its support, so that both stick to the plate, and is peeled off.
+
+Its first layer is sparse enough to come off the plate and reaches farthest, the next ones carry, and the upper half are dense
+as those of support under a part. The model begins a small gap above it and holds on here and there. The model's layers are
+those that it has on the plate; only the first one, which spans the gap, is printed as any other would be, neither wider nor
+squeezed. Support begins on the raft itself, with layers that fill the gap, too.
+"""
+
+from collections.abc import Sequence
+from math import ceil
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.bead import Bead, first_layer_process, with_line_width
+from slicer.geometry.polygons import Polygons, offset, offset_round, union
+from slicer.heights import Heights
+from slicer.paths import ON_PLATE_MM, Layer
+from slicer.strokes.order import order_beads
+from slicer.strokes.speed import first_layer_speeds, rising_fan
+from slicer.strokes.timed import layer_of, timed
+from slicer.support.beads import beads_around, support_beads
+from slicer.support.support import Supports
+
+THICK = 0.75  # of the nozzle: layers that nobody sees are as high as prints well, as PrusaSlicer's are
+
+
+def lift_mm(profile: Profile) -> float:
+    """How far above the plate a model on a raft begins; 0 without one."""
+    heights = raft_heights(profile)
+    return float(heights.height_mm.sum()) + profile.process.raft_contact_distance_mm if len(heights.tip_mm) else 0.0
+
+
+def reach_mm(process: Process) -> float:
+    """How far a raft reaches beyond what stands on it."""
+    return process.raft_expansion_mm + process.raft_first_layer_expansion_mm if process.raft_layers else 0.0
+
+
+def raft_heights(profile: Profile) -> Heights:
+    """The layers of a raft under the base plane of what stands on it, where z is 0."""
+    process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
+    others_mm = min(max(process.layer_height_mm, THICK * nozzle_mm), process.highest_layer_mm, nozzle_mm)
+    thick_mm = np.array([process.first_layer_height_mm, *[others_mm] * process.raft_layers][: process.raft_layers])
+    tips_mm = np.cumsum(thick_mm) - thick_mm.sum() - process.raft_contact_distance_mm
+    return Heights(tips_mm, thick_mm, tips_mm - 0.5 * thick_mm)
+
+
+def raft_layers(supports: Supports) -> list[Layer]:
+    """The raft of a part on the platform, and what of its support fills the gap and the part's first layer; [] without one."""
+    sections = supports.sections
+    if not sections.on_raft:
+        return []
+    heights, areas = raft_heights(sections.profile), raft_areas(supports)
+    layers: list[Layer] = []
+    for k, area in enumerate(areas):
+        process = _process_of_layer(sections.process, k)
+        beads = _raft_beads(area, sections.process.raft_layers - 1 - k, process, float(heights.height_mm[k]), first=k == 0)
+        if k == 0:
+            beads += beads_around(sections, area, area, process, float(heights.height_mm[0]))
+        layers.append(_layer(beads, area, sections.profile, heights[k : k + 1], layers))
+    return layers + _support_on_raft(supports, layers)
+
+
+def raft_areas(supports: Supports) -> list[Polygons]:
+    """What each layer of the raft covers: what stands there and hangs so low that it would sag onto the plate, and beyond."""
+    sections = supports.sections
+    process, bottom_mm = sections.process, sections.heights.bottom_mm
+    low = sections.outlines[: int(np.searchsorted(bottom_mm, ON_PLATE_MM))]
+    stands, plate = union([*low, supports.areas[0]]), offset(sections.plate, -0.5 * process.line_width_mm)
+    first, others = (offset_round(stands, far_mm) ^ plate for far_mm in (reach_mm(process), process.raft_expansion_mm))
+    return [first, *[others] * process.raft_layers][: process.raft_layers]
+
+
+def _process_of_layer(process: Process, layer: int) -> Process:
+    """The settings of a layer of the raft, which has a skirt at most around it."""
+    if layer:
+        return process
+    bare = {"brim_mm": 0.0, "small_base_brim_mm": 0.0, "support_foot_density": process.raft_first_layer_density}
+    return first_layer_process(process).model_copy(update=bare)
+
+
+def _raft_beads(area: Polygons, below_top: int, process: Process, height_mm: float, *, first: bool) -> list[Bead]:
+    """The beads of a layer that has so many others above it. Dense layers cross each other and what lies below them; sparse ones
+    stand on each other."""
+    dense = (process.raft_layers + 1) // 2
+    quarter_turns = dense + 1 if first else min(below_top, dense)
+    is_dense = below_top < dense and not first
+    angle_deg = process.infill_angle_deg + 90.0 * (quarter_turns % 2) - 90.0 * is_dense  # dense lines cross this angle
+    process = with_line_width(process, process.support_line_width_mm).model_copy(update={"infill_angle_deg": angle_deg})
+    return support_beads(area, area if is_dense else Polygons(), process, height_mm, first)
+
+
+def _support_on_raft(supports: Supports, below: Sequence[Layer]) -> list[Layer]:
+    """The lowest support as layers of its own, which fill the gap to the raft, too."""
+    sections, area = supports.sections, supports.areas[0]
+    if area.is_empty():
+        return []
+    profile, process, tip_mm = sections.profile, sections.support_process, float(sections.heights.tip_mm[0])
+    deep_mm = tip_mm + process.raft_contact_distance_mm
+    count = ceil(deep_mm / min(process.highest_layer_mm, profile.machine.head.nozzle_mm) - 1e-9)
+    thick_mm = np.full(count, deep_mm / count)
+    tips_mm = tip_mm - thick_mm[0] * np.arange(count)[::-1]
+    heights = Heights(tips_mm, thick_mm, tips_mm - 0.5 * thick_mm)
+    layers: list[Layer] = []
+    for k in range(count):
+        beads = support_beads(area, supports.dense[0], process, float(thick_mm[k]), False)
+        layers.append(_layer(beads, area, profile, heights[k : k + 1], [*below, *layers]))
+    return layers
+
+
+def _layer(beads: list[Bead], area: Polygons, profile: Profile, height: Heights, below: Sequence[Layer]) -> Layer:
+    """The beads of a layer in order, with speeds and heat; height: its own."""
+    process, material, number = profile.process, profile.material, len(below)
+    tip: Floats | None = below[-1].points[-1] if below and len(below[-1]) else None
+    strokes = order_beads(beads, Polygons(), process, tip, area)
+    height_mm, flow = float(height.height_mm[0]), material.flow * (1.0 if number else process.first_layer_flow)
+    strokes, speeds = timed(strokes, profile, height_mm, None if number else first_layer_speeds(process), flow)
+    add_c = 0.0 if number else material.first_layer_nozzle_c - material.nozzle_c
+    at = {"z_mm": float(height.tip_mm[0]), "height_mm": height_mm}
+    return layer_of(strokes, speeds, profile, **at, flow=flow, fan=rising_fan(material, number), add_c=add_c)
