@@ -14,11 +14,10 @@ from math import pi, radians, sqrt, tan
 from profiles.process import Process
 from slicer.bead import spacing_mm
 from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, union
-from slicer.support.reachable import BEYOND, COARSE_MM, SPECK_MM2, ReachableAreas, dilate, drop_slivers
+from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
 
 SLENDER = 12.0  # times its diameter: what stands higher on a piece sways under the nozzle
-LOPSIDED = 3.0  # times what a piece lacks all round: how far it grows on the sides that are free
-HALVINGS = 4  # of the way between these two
+HALVINGS = 4  # of the way from what a piece lacks all round to its diameter: how far it grows on the sides that are free
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,35 +66,36 @@ def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int
         return Piece(thin, thin, float(heights.tip_mm[m]), bounds)
     top_mm = max(piece.top_mm for piece in over)
     least_mm = least_diameter_mm(top_mm - float(heights.bottom_mm[m]), areas.process)
-    hung = [offset(piece.area, -float(areas.lean_mm[m + 1])) for piece in over if piece.area is not piece.thin]
-    lacking_mm = 0.5 * (least_mm - 2.0 * sqrt(thin.area() / pi))
-    if lacking_mm <= 0.0 and not hung:
+    lacking_mm, grown = 0.5 * (least_mm - 2.0 * sqrt(thin.area() / pi)), [piece for piece in over if piece.area is not piece.thin]
+    if lacking_mm <= 0.0 and not grown:
         return Piece(thin, thin, top_mm, bounds)
-    window = bounding_box(union([thin, *hung]), LOPSIDED * max(lacking_mm, 0.0) + areas.radius_mm)
-    room = dilate(areas.reachable[m] ^ window, areas.radius_mm)
-    area = union([thin, *(piece ^ room for piece in hung)])
+    room = dilate(areas.reachable[m] ^ bounding_box(thin, least_mm + areas.radius_mm), areas.radius_mm)
+    lean_mm, near = float(areas.lean_mm[m + 1]), room ^ bounding_box(thin, least_mm)
+    # What of the pieces above is theirs before they grow is carried by whatever has carried it.
+    hung = [offset(piece.area, -lean_mm) - (piece.thin - dilate(thin, lean_mm)) for piece in grown]
+    area = _touching(thin, union(hung) ^ near) if hung else thin
     if lacking_mm > 0.0:
-        area = _filled(area, thin, room, lacking_mm, 0.25 * pi * least_mm**2)
+        area = _filled(area, thin, room, lacking_mm, least_mm)
     return Piece(thin, area.simplify(COARSE_MM), top_mm, bounds)
 
 
-def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm2: float) -> Polygons:
-    """An area with the room about a thin piece, no farther from it than makes it large enough, or than LOPSIDED allows."""
+def _touching(thin: Polygons, about: Polygons) -> Polygons:
+    """A thin piece with the places about it that touch it."""
+    return union([thin, *(piece for piece in islands(about) if not (piece ^ thin).is_empty())])
 
-    def with_room(reach_mm: float) -> Polygons:
-        about = islands(dilate(thin, reach_mm) ^ room)
-        return union([area, *(piece for piece in about if not (piece ^ thin).is_empty())])
 
+def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
+    """An area with the room about a thin piece, no farther from it than its diameter nor than makes it as large as it should be."""
+    least_mm2, near_mm, far_mm = 0.25 * pi * least_mm**2, lacking_mm, least_mm
     if area.area() >= least_mm2:
         return area
-    near_mm, far_mm = lacking_mm, LOPSIDED * lacking_mm
-    filled = with_room(near_mm)
+    filled = area + _touching(thin, dilate(thin, near_mm) ^ room)
     if filled.area() >= least_mm2:
         return filled
-    filled = with_room(far_mm)
+    filled = area + _touching(thin, dilate(thin, far_mm) ^ room)
     for _ in range(HALVINGS if filled.area() > least_mm2 else 0):
         middle_mm = 0.5 * (near_mm + far_mm)
-        less = with_room(middle_mm)
+        less = area + _touching(thin, dilate(thin, middle_mm) ^ room)
         if less.area() >= least_mm2:
             far_mm, filled = middle_mm, less
         else:
@@ -104,15 +104,15 @@ def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, l
 
 
 def _loose(body: Polygons, wide: Polygons, below: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """What has grown of a layer's support neither within the lean of the layer below nor beside what ends on something."""
-    lean_mm, added = float(areas.lean_mm[m]), wide - below
+    """What has grown of a layer's support neither within the lean of the layer below nor, where it needs that, on something."""
+    lean_mm, branch_mm, added = float(areas.lean_mm[m]), areas.process.support_branch_mm, wide - below
     loose = added if below.is_empty() else drop_slivers(added - dilate(below, lean_mm))
     if loose.is_empty() or areas.placeable[m].is_empty():
         return loose
-    ends = union([piece for piece in islands(body) if (piece ^ below).area() < SPECK_MM2])
-    if ends.is_empty():
+    needles = [piece for piece in islands(body) if piece.area() < 0.25 * pi * branch_mm**2 or (piece ^ below).is_empty()]
+    if not needles:
         return loose
-    beside = areas.placeable[m] ^ bounding_box(ends, areas.process.support_branch_mm)
+    beside = areas.placeable[m] ^ union([bounding_box(piece, branch_mm) for piece in needles])
     return loose - dilate(beside, (1.0 - BEYOND) * areas.radius_mm)
 
 

@@ -98,8 +98,6 @@ def test_a_trunk_under_a_narrow_tip_is_hollow_and_a_wide_column_is_not() -> None
     aside = slab.translate((30.0, 0.0))
     nothing = Polygons()
     printed = [stem + aside, stem + aside, tip + aside]
-    hollow = hollow_places(printed, [nothing, nothing, tip + aside], process)
-    assert [area.area() for area in hollow] == pytest.approx([36.0, 36.0, 4.0 + 144.0])
     hollow = hollow_places([*printed, tip + aside], [nothing, nothing, nothing, tip + aside], process)
     assert [area.area() for area in hollow[:3]] == pytest.approx([36.0, 36.0, 4.0])
     beads = support_beads(printed[0], nothing, hollow[0], process, 0.2, False)
