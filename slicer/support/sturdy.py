@@ -85,7 +85,7 @@ def _touching(thin: Polygons, about: Polygons) -> Polygons:
 
 
 def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
-    """An area with the room about a thin piece, no farther from it than its diameter nor than makes it as large as it should be."""
+    """An area with the room about a thin piece, no farther from it than that diameter nor than it takes to be as large."""
     least_mm2, near_mm, far_mm = 0.25 * pi * least_mm**2, lacking_mm, least_mm
     if area.area() >= least_mm2:
         return area
