@@ -1,1 +1,1 @@
-"""Support: where it may stand, how it grows down, how thick it is, its beads, why a place gets none. Public: support.own_supports."""
+"""Support: where it may stand, how it grows down, its beads, why a place gets none. Public: support.own_supports."""
