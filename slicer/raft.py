@@ -89,7 +89,7 @@ def _raft_beads(area: Polygons, below_top: int, process: Process, height_mm: flo
     is_dense = below_top < dense and not first
     angle_deg = process.infill_angle_deg + 90.0 * (quarter_turns % 2) - 90.0 * is_dense  # dense lines cross this angle
     process = with_line_width(process, process.support_line_width_mm).model_copy(update={"infill_angle_deg": angle_deg})
-    return support_beads(area, area if is_dense else Polygons(), process, height_mm, first)
+    return support_beads(area, area if is_dense else Polygons(), Polygons(), process, height_mm, first)
 
 
 def _support_on_raft(supports: Supports, below: Sequence[Layer]) -> list[Layer]:
@@ -105,7 +105,7 @@ def _support_on_raft(supports: Supports, below: Sequence[Layer]) -> list[Layer]:
     heights = Heights(tips_mm, thick_mm, tips_mm - 0.5 * thick_mm)
     layers: list[Layer] = []
     for k in range(count):
-        beads = support_beads(area, supports.dense[0], process, float(thick_mm[k]), False)
+        beads = support_beads(area, supports.dense[0], Polygons(), process, float(thick_mm[k]), False)
         layers.append(_layer(beads, area, profile, heights[k : k + 1], [*below, *layers]))
     return layers
 

@@ -15,7 +15,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.fill.infill import infill_cell_mm
 from slicer.paths import Kind
-from slicer.support.beads import support_cell_mm
+from slicer.support.sturdy import support_cell_mm
 
 SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
 LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose

@@ -68,8 +68,18 @@ class Support(Frozen):
     support_branch_mm: float = Field(
         2.0, ge=0.2, le=20, description="diameter of a branch at its top, mm; thinner ones are knocked over by the nozzle"
     )
-    support_branch_growth_deg: float = Field(
-        1.0, ge=0, le=20, description="branches get thicker downward, each side leaning by this, deg: tall ones must not sway"
+    support_branch_diameter_angle_deg: float = Field(
+        5.0,
+        ge=0,
+        le=15,
+        description="branches get thicker downward until they meet, each side leaning by this, deg; 0: evenly thick",
+    )
+    support_trunk_mm: float = Field(
+        3.0,
+        ge=0.2,
+        le=25,
+        description="diameter up to which branches get thicker by their angle, mm; where the part leaves room they have at least "
+        "a twelfth of the height that stands on them: tall ones must not sway",
     )
     support_pattern: Literal["lines", "grid"] = Field("lines", description="what fills support: lines are easily broken away")
     support_density: float = Field(0.15, gt=0, le=1, description="share of the support's inside that is filled")

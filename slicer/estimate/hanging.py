@@ -13,7 +13,7 @@ from mdp.mesh import Floats
 from slicer.bead import spacing_mm
 from slicer.geometry.polygons import Polygons, edges, union
 from slicer.heights import Heights
-from slicer.overhangs import Overhang
+from slicer.overhangs import LEAST_MM2, Overhang
 from slicer.sectioning import Sections
 from slicer.support.handed_down import plan_supports, up_to
 from slicer.support.support import Supports, own_supports, wanted_places
@@ -76,23 +76,25 @@ def _of_layers(sections: Sections, thick: Supports) -> Supports:
     standing = [float(tips_mm[k]) for k, area in enumerate(thick.areas) if not area.is_empty()]
     sections = up_to(sections, max(standing, default=0.0))
     which = np.searchsorted(tips_mm, sections.heights.cut_mm).tolist()
-    areas, dense = ([[*places, Polygons()][k] for k in which] for places in (thick.areas, thick.dense))
+    areas, dense, hollow = ([[*places, Polygons()][k] for k in which] for places in (thick.areas, thick.dense, thick.hollow))
     nothing = [Polygons()] * len(which)
-    return Supports(sections, areas, dense, nothing, nothing, nothing)
+    return Supports(sections, areas, dense, hollow, nothing, nothing, nothing)
 
 
 def support_lengths_mm(supports: Supports) -> Floats:
     """(n, 2) sparse and dense lines of the support of every layer of a part."""
     sections, process = supports.sections, supports.sections.support_process
-    extents = [(area.area(), _around_mm(area), dense.area()) for area, dense in zip(supports.areas, supports.dense, strict=True)]
-    area, around, close = np.array(extents).T
+    several = zip(supports.areas, supports.dense, supports.hollow, strict=True)
+    extents = [(whole.area(), _around_mm(whole), dense.area(), (whole - hollow).area()) for whole, dense, hollow in several]
+    area, around, close, filled = np.array(extents).T
     spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
     walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
     if sections.on_platform:
         density[0] = process.support_foot_density
     inside = np.maximum(area - walls_mm * spacing, 0.0)
     dense = np.minimum(close, inside)
-    return np.column_stack([walls_mm + (inside - dense) * density / spacing, dense * process.support_interface_density / spacing])
+    sparse = (inside - dense) * filled / np.maximum(area, LEAST_MM2)
+    return np.column_stack([walls_mm + sparse * density / spacing, dense * process.support_interface_density / spacing])
 
 
 def _around_mm(area: Polygons) -> float:

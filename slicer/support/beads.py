@@ -37,6 +37,7 @@ from slicer.geometry.polyline import Segment
 from slicer.paths import Kind
 from slicer.sectioning import Sections
 from slicer.support.reachable import SMOOTH_MM
+from slicer.support.sturdy import support_cell_mm
 from slicer.support.support import Supports
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
@@ -55,7 +56,8 @@ def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Be
     if on_plate and sections.on_raft:
         return []  # what lies beside the first layer there is the raft's (slicer.raft)
     support_process = with_line_width(process, process.support_line_width_mm)
-    beads = support_beads(supports.areas[layer], supports.dense[layer], support_process, height_mm, on_plate)
+    places = supports.areas[layer], supports.dense[layer], supports.hollow[layer]
+    beads = support_beads(*places, support_process, height_mm, on_plate)
     if layer < sections.pedestal_layers:
         beads += pedestal_beads(outline, layer, sections.pedestal_layers, process, height_mm)
     if on_plate:
@@ -72,8 +74,11 @@ def beads_around(sections: Sections, footprint: Polygons, base: Polygons, proces
     return brim(footprint, base, sections.plate, process, top_mm=top_mm, height_mm=height_mm)
 
 
-def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: float, first: bool) -> list[Bead]:
-    """The beads of a layer's support, its dense places as an interface; first: the first layer on the platform."""
+def support_beads(
+    area: Polygons, dense: Polygons, hollow: Polygons, process: Process, height_mm: float, first: bool
+) -> list[Bead]:
+    """The beads of a layer's support, its dense places as an interface, hollow ones with nothing else inside their walls; first:
+    the first layer on the platform, which is filled everywhere."""
     if area.is_empty():
         return []
     width = process.line_width_mm
@@ -86,6 +91,7 @@ def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: 
     edge = process.support_walls * spacing
     inner = offset(area, SEAM * width - edge) if edge else area
     roof = opening(_joined(dense, 0.5 * support_cell_mm(process), width) ^ inner, 0.5 * width)
+    inner = inner if first or hollow.is_empty() else inner - hollow
     rest = inner if roof.is_empty() else opening(inner - roof, 0.25 * width)
     across_deg = process.infill_angle_deg + 90.0
     angles_deg = [process.infill_angle_deg] if process.support_pattern == "lines" else [process.infill_angle_deg, across_deg]
@@ -214,9 +220,3 @@ def start_at_rear(loop: Floats) -> Floats:
     """A loop (n, 2) closed and begun at its rearmost point, the leftmost of several."""
     at = int(np.lexsort((loop[:, 0], -loop[:, 1]))[0])
     return np.concatenate([loop[at:], loop[: at + 1]])
-
-
-def support_cell_mm(process: Process) -> float:
-    """How far apart the sparse lines of support lie, mm: what dense lines laid over it have to span."""
-    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
-    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density

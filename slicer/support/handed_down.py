@@ -20,6 +20,7 @@ from slicer.interface.interface import BasePlane, frame_change, sections_of
 from slicer.overhangs import LEAST_MM2
 from slicer.sectioning import Sections, marked_areas, no_seam_segments
 from slicer.support.reachable import ReachableAreas, blocked_areas, near_table, reachable_areas, support_reach_mm
+from slicer.support.sturdy import hollow_places
 from slicer.support.support import Supports, find_missed, grow, stand, widen_foot
 
 AROUND_MM = 3.0  # support handed down may go so much farther aside than its lean takes it
@@ -261,7 +262,8 @@ def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supp
         for layer, _ in low:
             held = _held(room, earlier, _gap_mm(areas, layer))
             missed[layer] = missed[layer] - offset(held, 0.5 * process.line_width_mm)
-    return Supports(sections, both, unite_layers(dense, _padded(own.dense, count)), wanted, missed, unwanted)
+    dense = unite_layers(dense, _padded(own.dense, count))
+    return Supports(sections, both, dense, hollow_places(both, dense, process), wanted, missed, unwanted)
 
 
 def _padded(places: Sequence[Polygons], count: int) -> list[Polygons]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import radians, tan
+from math import pi, radians, tan
 
 import numpy as np
 
@@ -28,14 +28,13 @@ from slicer.support.reachable import (
     reachable_areas,
     support_reach_mm,
 )
+from slicer.support.sturdy import hollow_places, thicken
 from slicer.support.tree import (
     JOIN_MM,
     Branch,
     add_contact,
     carrying_area,
-    least_section_mm2,
     lower_branches,
-    places_about_needles,
 )
 
 SLACK_MM = 0.01  # what rounding may add to the lean
@@ -52,13 +51,14 @@ HEAP = 12  # layers united at a time: a sweep over all of them at once meets man
 class Supports:
     """The support of a part's sections, which go up as far as it does.
 
-    Of every layer: where support is printed, where it is dense, which hanging places want it, which of them nothing holds, and
-    which a person wants to be held by nothing.
+    Of every layer: where support is printed, where it is dense, where it is hollow, which hanging places want it, which of them
+    nothing holds, and which a person wants to be held by nothing.
     """
 
     sections: Sections
     areas: Sequence[Polygons]
     dense: Sequence[Polygons]
+    hollow: Sequence[Polygons]
     wanted: Sequence[Polygons]
     missed: Sequence[Polygons]
     unwanted: Sequence[Polygons]
@@ -77,15 +77,15 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
         unwanted = drop_small([overhang.unwanted for overhang in overhangs], process.support_least_mm2)
     count = max((k for k, area in enumerate(wanted) if not area.is_empty()), default=-1)
     if count < 0:
-        return Supports(sections, nothing, nothing, nothing, nothing, unwanted)
+        return Supports(sections, nothing, nothing, nothing, nothing, nothing, unwanted)
     blocked = blocked_areas(sections, count, process.support_distance_mm, support_reach_mm(sections))
     areas = reachable_areas(sections, blocked)
     printed, dense = stand(*grow(wanted, {}, areas), areas)
     missed = find_missed(wanted, printed, areas)
     if sections.on_platform and not sections.on_raft:
         printed[0] = widen_foot(printed[0], areas, sections.plate - blocked[0])
-    rest = nothing[len(printed) :]
-    return Supports(sections, [*printed, *rest], [*dense, *rest], wanted, missed, unwanted)
+    hollow, rest = hollow_places(printed, dense, process), nothing[len(printed) :]
+    return Supports(sections, [*printed, *rest], [*dense, *rest], [*hollow, *rest], wanted, missed, unwanted)
 
 
 def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Polygons]:
@@ -144,12 +144,12 @@ def grow(
     for m in range(count - 1, -1, -1):
         pending += beginning.get(m, [])
         area = union([branch.area for branch in branches]) if is_tree else area
-        body, about = _body(area, radius), places_about_needles(area, areas.reachable[m], areas)
+        body = _body(area, radius)
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
             contact = _contact(union(asked), body, areas.reachable[m], radius)
             if is_tree:
-                branches = add_contact(branches, contact, areas.reachable[m], float(areas.heights.tip_mm[m]))
+                branches = add_contact(branches, contact, areas.reachable[m])
             elif not contact.is_empty():
                 area = closing(area + contact, JOIN_MM).simplify(SMOOTH_MM) ^ areas.reachable[m]
             contacts[m] = _body(contact, radius)
@@ -157,13 +157,13 @@ def grow(
         left = [(hanging - body, last) for hanging, last in pending if last < m]
         pending = [(hanging, last) for hanging, last in left if hanging.area() >= LEAST_MM2]
         if not body.is_empty():
-            bodies[m] = body if about.is_empty() else body + _body(about, radius)
+            bodies[m] = body
             if is_tree and m:
                 branches = lower_branches(branches, areas, m)
             elif m and not (area - areas.reachable[m - 1]).is_empty():
                 carrying = carrying_area(area, areas.reachable[m - 1], areas.placeable[m], float(areas.lean_mm[m]))
                 area = carrying.simplify(SLIVER_MM)
-    return bodies, contacts
+    return thicken(bodies, areas), contacts
 
 
 def _body(area: Polygons, radius: float) -> Polygons:
@@ -201,7 +201,7 @@ def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygo
     across = process.support_distance_mm + 2.0 * areas.radius_mm
     angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
     deep = across / max(tan(radians(angle)), 0.5)
-    grown, least_mm2 = list(bodies), least_section_mm2(process)
+    grown, least_mm2 = list(bodies), 0.25 * pi * process.support_branch_mm**2
     roots: list[tuple[Polygons, float]] = []
     for m in range(len(bodies) - 2, -1, -1):
         bottom_mm, ends = areas.heights.bottom_mm[m : m + 2].tolist(), _loose_ends(bodies, areas, m + 1)

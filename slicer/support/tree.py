@@ -11,7 +11,7 @@ Then, from the top down, each layer's branches are made from those above, never 
       \  /   \  /   \  /        |       |
        \ \   / /     ||         |       |   then it is a trunk, round: nearest ones go to meet each other, half way each,
         \ \_/ /      ||    .----'       |   where the height that is left is enough,
-         \   /        \\   |            |   and get thicker downward;
+         \   /        \\   |            |   it gets thicker afterwards (sturdy.thicken);
           | |         ||   |            |   what comes in its way a branch passes as it is or thinner, moves aside from
          /   \        ||   |            |   within the lean, or ends on where the part may be stood on (`placeable`)
     ____/_____\______/__\__|____________|____
@@ -23,28 +23,24 @@ wide as a bead and does stand is sifted afterwards (support.stand); what hangs a
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import cos, floor, hypot, pi, radians, sqrt, tan
+from math import cos, floor, hypot, pi
 
 import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
-from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, offset, union
+from slicer.geometry.polygons import Polygons, closing, contours, islands, offset, union
 from slicer.heights import SAME_MM
 from slicer.support.reachable import FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
 JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
 CORNERS = 12  # of a trunk's outline
-THICKEST_MM = 2.5  # a trunk's radius: enough for any part that fits a machine
 MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
-FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin recovers
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
 TIDY_EVERY = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
 INSET = 0.7  # of the lean: then right corners move by the lean
-LEAST_SECTION = 0.8  # share of a branch's section: support with less is a needle, which the nozzle knocks over
-STOUT = (0.3, 0.5, 0.8, 1.2)  # branch diameters from a needle's middle within which places are added to it
 
 
 STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
@@ -53,16 +49,12 @@ WIDEST = 1.3  # times the distance: how far corners of widened places may reach;
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """The places of a branch's middle in one layer, all within `radius` of x, y; top_mm: where the branch ends.
-
-    full: the area has every place within the radius.
-    """
+    """The places of a branch's middle in one layer, all within `radius` of x, y; full: every place within it."""
 
     area: Polygons
     x: float
     y: float
     radius: float
-    top_mm: float
     full: bool = False
 
     @property
@@ -74,23 +66,23 @@ class Branch:
         """Every place moved towards the middle, by no more than the radius becomes less."""
         share = radius / self.radius
         matrix = np.array([[share, 0.0, (1.0 - share) * self.x], [0.0, share, (1.0 - share) * self.y]])
-        return Branch(self.area.transform(matrix), self.x, self.y, radius, self.top_mm)
+        return Branch(self.area.transform(matrix), self.x, self.y, radius)
 
 
-def branch_of(area: Polygons, top_mm: float) -> Branch:
+def branch_of(area: Polygons) -> Branch:
     """A branch through all places of an area."""
     points = np.concatenate(contours(area))
     x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return Branch(area, float(x), float(y), float(np.hypot(points[:, 0] - x, points[:, 1] - y).max()), top_mm)
+    return Branch(area, float(x), float(y), float(np.hypot(points[:, 0] - x, points[:, 1] - y).max()))
 
 
-def trunk(x: float, y: float, radius: float, top_mm: float) -> Branch:
+def trunk(x: float, y: float, radius: float) -> Branch:
     """A round branch."""
     around = Polygons.circle(radius / cos(pi / CORNERS), CORNERS)
-    return Branch(around.translate((x, y)), x, y, radius, top_mm, True)
+    return Branch(around.translate((x, y)), x, y, radius, True)
 
 
-def add_contact(branches: Sequence[Branch], contact: Polygons, reachable: Polygons, top_mm: float) -> list[Branch]:
+def add_contact(branches: Sequence[Branch], contact: Polygons, reachable: Polygons) -> list[Branch]:
     """The branches of a layer with what begins in it: those that are no trunks yet take up what begins in their square."""
     grown = list(branches)
     young = {_cell(branch.x, branch.y): k for k, branch in enumerate(branches) if not branch.full}
@@ -101,9 +93,9 @@ def add_contact(branches: Sequence[Branch], contact: Polygons, reachable: Polygo
         if area.area() <= LEAST_MM2:
             continue
         if k is None:
-            grown.append(branch_of(area, top_mm))
+            grown.append(branch_of(area))
         else:
-            grown[k] = branch_of(area, grown[k].top_mm)
+            grown[k] = branch_of(area)
     return grown
 
 
@@ -126,14 +118,9 @@ def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
     return [(cell, Polygons.compose(several)) for cell, several in sorted(pieces.items())]
 
 
-def growth(process: Process, radius_mm: float) -> tuple[float, float]:
-    """Radius of a trunk's places at its top, mm, and its growth per mm downward; radius_mm: how far beads reach round a place."""
-    return max(0.5 * process.support_branch_mm - radius_mm, 0.1 * radius_mm), tan(radians(process.support_branch_growth_deg))
-
-
-def trunk_radius_mm(below_mm: float, least_mm: float, per_mm: float) -> float:
-    """Radius of a trunk so far below its top."""
-    return min(least_mm + per_mm * max(below_mm, 0.0), max(THICKEST_MM, least_mm))
+def trunk_radius_mm(process: Process, radius_mm: float) -> float:
+    """Radius of a trunk's places; radius_mm: how far beads reach round a place."""
+    return max(0.5 * process.support_branch_mm - radius_mm, 0.1 * radius_mm)
 
 
 def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
@@ -164,33 +151,6 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
     return _drop_enclosed(low + _move_aside(left, areas, layer))
 
 
-def least_section_mm2(process: Process) -> float:
-    """The area, seen from above, below which a piece of support in a layer is a needle."""
-    return LEAST_SECTION * 0.25 * pi * process.support_branch_mm**2
-
-
-def places_about_needles(places: Polygons, reachable: Polygons, areas: ReachableAreas) -> Polygons:
-    """The places of needles in a layer's support, with the reached places about them that make each thick enough."""
-    radius, least_mm2, added = areas.radius_mm, least_section_mm2(areas.process), []
-    for piece in islands(places):
-        # No piece of that area has a smaller section than a round one (Brunn and Minkowski).
-        if (sqrt(piece.area()) + sqrt(pi) * radius) ** 2 < least_mm2 and dilate(piece, radius).area() < least_mm2:
-            added.append(_about(piece, reachable, areas, least_mm2))
-    return union(added)
-
-
-def _about(needle: Polygons, reachable: Polygons, areas: ReachableAreas, least_mm2: float) -> Polygons:
-    """A needle with the reached places about it, as far as it takes to get a section of least_mm2, or as there are any."""
-    middle, branch_mm = branch_of(needle, 0.0), areas.process.support_branch_mm
-    free, wider = reachable ^ bounding_box(needle, STOUT[-1] * branch_mm), needle
-    for share in STOUT:
-        about = trunk(middle.x, middle.y, share * branch_mm, 0.0).area ^ free
-        wider = union([needle, *(piece for piece in islands(about) if not (piece ^ needle).is_empty())])
-        if dilate(wider, areas.radius_mm).area() >= least_mm2:
-            break
-    return wider
-
-
 def _depths(branches: Sequence[Branch], borders: EdgeIndex) -> Floats:
     """How deep the middles of branches lie inside an area with those edges."""
     depths_mm: Floats = depths(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
@@ -200,22 +160,20 @@ def _depths(branches: Sequence[Branch], borders: EdgeIndex) -> Floats:
 def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
     """Where the branches would go if nothing was in their way: wide ones shrink, trunks go to meet the nearest trunk."""
     z_mm, lean = float(areas.heights.tip_mm[layer - 1]), float(areas.lean_mm[layer])
-    rise, (least_mm, per_mm) = float(areas.heights.tip_mm[layer]) - z_mm, growth(areas.process, areas.radius_mm)
-    thick = [trunk_radius_mm(branch.top_mm - z_mm, least_mm, per_mm) for branch in branches]
-    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + SAME_MM]
+    rise, thick = float(areas.heights.tip_mm[layer]) - z_mm, trunk_radius_mm(areas.process, areas.radius_mm)
+    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick + SAME_MM]
     goals = _goals(np.array([[branches[k].x, branches[k].y] for k in trunks]), z_mm * lean / rise)
     goal_of = dict(zip(trunks, goals, strict=True))
     targets = []
     for k, branch in enumerate(branches):
-        if branch.radius - lean > thick[k]:
+        if branch.radius - lean > thick:
             targets.append(branch.shrink(branch.radius - lean))
             continue
         x, y = goal_of.get(k, (branch.x, branch.y))
         away = hypot(x - branch.x, y - branch.y)
         share = 1.0 if away <= lean else lean / away
         x, y = branch.x + share * (x - branch.x), branch.y + share * (y - branch.y)
-        radius = max(least_mm, branch.radius + FATTER * per_mm * rise)
-        targets.append(trunk(x, y, min(thick[k], radius), branch.top_mm))
+        targets.append(trunk(x, y, thick))
     return targets
 
 
@@ -241,7 +199,7 @@ def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: f
     if branch.radius <= THIN_MM:
         return None
     if branch.full or branch.radius - lean <= THIN_MM:
-        thin = trunk(branch.x, branch.y, max(branch.radius - lean, THIN_MM), branch.top_mm)
+        thin = trunk(branch.x, branch.y, max(branch.radius - lean, THIN_MM))
         return thin if depth_mm >= thin.reach_mm else None
     thin = branch.shrink(branch.radius - lean)
     if depth_mm >= thin.radius:
@@ -267,8 +225,7 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
         below = islands(thick.simplify(FINE_MM) + _widened(carrying - thick, reachable))
     for island in () if tidy else islands(carrying):  # what is just a thin limb of one can wait
         below += islands(_widened(island, reachable)) if _sliver(island) else [island.simplify(FINE_MM)]
-    top = max(branch.top_mm for branch in branches)
-    return [branch_of(island, top) for island in below if island.area() >= LEAST_MM2]
+    return [branch_of(island) for island in below if island.area() >= LEAST_MM2]
 
 
 def _widened(slivers: Polygons, reachable: Polygons) -> Polygons:

@@ -11,31 +11,29 @@ from slicer.support.reachable import ReachableAreas
 from slicer.support.tree import (
     CELL_MM,
     MEETING,
-    THICKEST_MM,
     add_contact,
     branch_of,
-    growth,
     lower_branches,
     trunk,
     trunk_radius_mm,
 )
 from tests.shapes import box
-from tests.slicer.hand import as_shapely, profile, ragged, sections_at
+from tests.slicer.hand import as_shapely, ragged, sections_at
 
 seeds = st.integers(0, 10**6)
 
 
-def in_the_open(lean_mm: float, growth_deg: float) -> ReachableAreas:
+def in_the_open(lean_mm: float) -> ReachableAreas:
     """Two layers of 0.2 mm with nothing in the way of branches."""
     wide, cuts_mm = Polygons.square((200.0, 200.0), True), np.array([0.1, 0.3])
-    sections = sections_at(box(1, 1, 1), cuts_mm, f"process.support_branch_growth_deg={growth_deg}")
+    sections = sections_at(box(1, 1, 1), cuts_mm)
     return ReachableAreas(sections, np.full(2, lean_mm), (Polygons(), Polygons()), (wide, wide))
 
 
 @settings(max_examples=25)
 @given(seeds, st.floats(0.05, 0.95))
 def test_a_branch_that_shrinks_moves_no_place_further_than_its_radius_becomes_less(seed: int, share: float) -> None:
-    whole = branch_of(ragged(seed), 20.0)
+    whole = branch_of(ragged(seed))
     middle = shapely.Point(whole.x, whole.y)
     assert middle.hausdorff_distance(as_shapely(whole.area)) == pytest.approx(whole.radius)
     low = whole.shrink(share * whole.radius)
@@ -47,7 +45,7 @@ def test_a_branch_that_shrinks_moves_no_place_further_than_its_radius_becomes_le
 
 @given(st.floats(0.1, 5.0))
 def test_a_trunk_has_every_place_within_its_radius_and_reaches_little_further(radius: float) -> None:
-    branch = trunk(3.0, -2.0, radius, 20.0)
+    branch = trunk(3.0, -2.0, radius)
     area = as_shapely(branch.area)
     assert area.buffer(1e-9).covers(shapely.Point(3.0, -2.0).buffer(radius - 1e-9))
     assert shapely.Point(3.0, -2.0).hausdorff_distance(area) == pytest.approx(branch.reach_mm)
@@ -56,20 +54,12 @@ def test_a_trunk_has_every_place_within_its_radius_and_reaches_little_further(ra
 
 @settings(max_examples=40)
 @given(seeds, st.integers(0, 12))
-def test_a_branch_is_dropped_where_a_trunk_has_all_its_places_and_of_equal_ones_one_stays(seed: int, count: int) -> None:
-    areas = in_the_open(1e-9, 10.0)
-    low_mm, high_mm = areas.heights.tip_mm.tolist()
-    thick = growth(areas.process, areas.radius_mm)
-    rows = np.random.default_rng(seed).uniform((-9, -9, 1.0), (9, 9, 40.0), (count, 3)).tolist()
-    trunks = [trunk(x, y, trunk_radius_mm(top_mm - high_mm, *thick), top_mm) for x, y, top_mm in [*rows, *rows[: count // 3]]]
-    left = lower_branches(trunks, areas, 1)
-    radii = [trunk_radius_mm(top_mm - low_mm, *thick) for _, _, top_mm in rows]
-    discs = [shapely.Point(x, y).buffer(radius, quad_segs=64) for (x, y, _), radius in zip(rows, radii, strict=True)]
-    kept = shapely.union_all([shapely.Point(b.x, b.y).buffer(b.radius, quad_segs=64) for b in left])
-    assert shapely.union_all(discs).difference(kept).area < 1e-6
-    pairs = [(a, b) for a in left for b in left if a is not b]
-    assert all(np.hypot(a.x - b.x, a.y - b.y) > a.radius - b.radius for a, b in pairs)
-    assert len({(b.x, b.y, b.radius) for b in left}) == len(left)
+def test_of_trunks_in_one_place_one_stays(seed: int, count: int) -> None:
+    areas = in_the_open(1e-9)
+    thick_mm = trunk_radius_mm(areas.process, areas.radius_mm)
+    rows = np.random.default_rng(seed).uniform((-2, -2), (2, 2), (count, 2)).tolist()
+    left = lower_branches([trunk(x, y, thick_mm) for x, y in [*rows, *rows[: count // 3]]], areas, 1)
+    assert sorted((round(b.x, 6), round(b.y, 6)) for b in left) == sorted((round(x, 6), round(y, 6)) for x, y in rows)
 
 
 @settings(max_examples=40)
@@ -81,35 +71,26 @@ def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: 
         others = sorted((float(np.hypot(*(own - neighbour))), j) for j, neighbour in enumerate(at) if j != k)
         meets = others and others[0][0] <= 2.0 * MEETING * reach
         expected.append(tuple(0.5 * (own + at[others[0][1]])) if meets else tuple(own))
-    areas = in_the_open(reach, 0.0)
-    least_mm, top_mm = growth(areas.process, areas.radius_mm)[0], float(areas.heights.tip_mm[1])
-    lower = lower_branches([trunk(x, y, least_mm, top_mm) for x, y in at.tolist()], areas, 1)
+    areas = in_the_open(reach)
+    thick_mm = trunk_radius_mm(areas.process, areas.radius_mm)
+    lower = lower_branches([trunk(x, y, thick_mm) for x, y in at.tolist()], areas, 1)
     places = {tuple(np.round(place, 6)) for place in expected}  # of two that have met one is left
     assert {(round(b.x, 6), round(b.y, 6)) for b in lower} == places
-
-
-@pytest.mark.parametrize(
-    ("depth_mm", "radius"), [(-5.0, 0.55), (0.0, 0.55), (10.0, 0.55 + 10 * np.tan(np.pi / 36)), (1e4, THICKEST_MM)]
-)
-def test_a_trunk_gets_thicker_downward_by_its_angle_and_no_thicker_than_the_thickest(depth_mm: float, radius: float) -> None:
-    process = profile("process.support_branch_mm=2", "process.support_branch_growth_deg=5").process
-    assert trunk_radius_mm(depth_mm, *growth(process, 0.45)) == pytest.approx(radius)
 
 
 @settings(max_examples=25)
 @given(seeds)
 def test_a_tree_takes_up_all_of_a_contact_that_is_reachable_in_a_branch_for_every_square(seed: int) -> None:
     contact, reachable = ragged(seed), Polygons.square((60.0, 60.0), True) - Polygons.square((9.0, 60.0)).translate((4.0, -30.0))
-    grown = add_contact([], contact ^ reachable, reachable, 20.0)
+    grown = add_contact([], contact ^ reachable, reachable)
     wanted, area = as_shapely(contact ^ reachable), as_shapely(union([branch.area for branch in grown]))
     assert wanted.difference(area).area < 0.02 * wanted.area
     assert as_shapely(reachable).buffer(1e-6).covers(area)
     squares = {(int(np.floor(b.x / CELL_MM)), int(np.floor(b.y / CELL_MM))) for b in grown}
     assert len(squares) <= len(grown) <= len(islands(contact ^ reachable)) + 36
-    assert all(b.top_mm == 20.0 for b in grown)
 
 
 def test_nothing_that_begins_changes_no_tree_and_no_branches_go_nowhere() -> None:
-    tree = [trunk(3.0, -2.0, 1.0, 20.0)]
-    assert add_contact(tree, Polygons(), Polygons.square((9.0, 9.0)), 20.0) == tree
+    tree = [trunk(3.0, -2.0, 1.0)]
+    assert add_contact(tree, Polygons(), Polygons.square((9.0, 9.0))) == tree
     assert lower_branches([], None, 3) == []  # type: ignore[arg-type]

@@ -13,8 +13,9 @@ from slicer.geometry.polygons import Polygons, union
 from slicer.heights import Heights
 from slicer.paths import Kind
 from slicer.sectioning import section_part
-from slicer.support.beads import support_beads, support_cell_mm
+from slicer.support.beads import support_beads
 from slicer.support.reachable import ReachableAreas, above_base_planes
+from slicer.support.sturdy import support_cell_mm
 from tests.mdp.solids import random_direction
 from tests.shapes import box
 from tests.slicer.hand import as_shapely, profile, ragged, whole
@@ -71,7 +72,7 @@ def test_support_has_the_density_asked_for_inside_its_walls(seed: int, density: 
         f"process.support_density={density}", f"process.support_pattern={pattern}", "process.support_walls=0"
     ).process
     area = Polygons.square((60.0, 50.0)) - ragged(seed).translate((80.0, 0.0))
-    beads = support_beads(area, Polygons(), process, 0.2, False)
+    beads = support_beads(area, Polygons(), Polygons(), process, 0.2, False)
     plastic_mm2 = sum(bead.length_mm for bead in beads) * spacing_mm(process.line_width_mm, 0.2)
     assert plastic_mm2 / area.area() == pytest.approx(density, rel=0.2)
     assert {bead.kind for bead in beads} == {Kind.SUPPORT}
@@ -80,18 +81,18 @@ def test_support_has_the_density_asked_for_inside_its_walls(seed: int, density: 
 def test_every_bead_of_support_lies_in_its_place_and_the_dense_ones_in_theirs() -> None:
     process, area = profile("process.support_walls=1").process, ragged(5)
     dense = area ^ Polygons.square((30.0, 60.0)).translate((0.0, -30.0))
-    beads = support_beads(area, dense, process, 0.2, False)
+    beads = support_beads(area, dense, Polygons(), process, 0.2, False)
     for room, kind in ((area, None), (dense, Kind.SUPPORT_INTERFACE)):
         lines = [shapely.LineString(bead.points) for bead in beads if kind in (None, bead.kind)]
         assert lines
         assert as_shapely(room).buffer(0.01).covers(shapely.union_all(lines))
-    assert support_beads(Polygons(), dense, process, 0.2, False) == []
+    assert support_beads(Polygons(), dense, Polygons(), process, 0.2, False) == []
 
 
 def test_dense_places_nearer_than_sparse_lines_are_filled_as_one() -> None:
     process = profile("process.support_walls=0", "process.support_density=0.2").process
     bars = union([Polygons.square((0.8, 20.0)).translate((1.7 * k, 0.0)) for k in range(12)])
-    beads = support_beads(Polygons.square((19.5, 20.0)), bars, process, 0.2, False)
+    beads = support_beads(Polygons.square((19.5, 20.0)), bars, Polygons(), process, 0.2, False)
     assert {bead.kind for bead in beads} == {Kind.SUPPORT_INTERFACE}
 
 
@@ -104,5 +105,5 @@ def test_sparse_lines_leave_cells_of_their_distance(pattern: str, cell: float) -
 def test_a_place_too_small_for_a_grid_gets_its_outline_once() -> None:
     process = profile("process.support_pattern=grid", "process.support_walls=0", "process.support_density=0.1").process
     place = Polygons.square((1.0, 1.0)).translate((0.5, 0.5)).rotate(-process.infill_angle_deg)
-    (bead,) = support_beads(place, Polygons(), process, 0.2, False)
+    (bead,) = support_beads(place, Polygons(), Polygons(), process, 0.2, False)
     assert bead.length_mm == pytest.approx(4.0 * (1.0 - process.line_width_mm))

@@ -1,0 +1,147 @@
+"""Sturdy: pieces of support are thick enough for what stands on them, as far as there is room, and hollow where that will do.
+
+What is printed of a tree or a column is seen here as pieces, the connected places of a layer, with the height to which support
+goes on above each. From it follows the diameter that a piece should have (least_diameter_mm): it grows downward from a branch's
+by an angle, and is never less than a share of that height. A thinner piece is grown into the room beside the part, all round or,
+where the part is near, on the side that is free. So a branch finds its way as thin as it may be, and thick plastic costs no
+place its support: pieces of two branches that have met count as one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi, radians, sqrt, tan
+
+from profiles.process import Process
+from slicer.bead import spacing_mm
+from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, union
+from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
+
+SLENDER = 12.0  # times its diameter: what stands higher on a piece sways under the nozzle
+HALVINGS = 4  # of the way from what a piece lacks all round to its diameter: how far it grows on the sides that are free
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A connected place of a layer's support, before and after it grows; top_mm: how high support goes on above it."""
+
+    thin: Polygons
+    area: Polygons
+    top_mm: float
+    bounds: tuple[float, float, float, float]
+
+    def touches(self, other: Polygons, bounds: tuple[float, float, float, float]) -> bool:
+        """Whether the thin piece lies over a place."""
+        (x0, y0, x1, y1), (a0, b0, a1, b1) = self.bounds, bounds
+        return x0 < a1 and x1 > a0 and y0 < b1 and y1 > b0 and not (self.thin ^ other).is_empty()
+
+
+def least_diameter_mm(above_mm: float, process: Process) -> float:
+    """The diameter of a circle as large as a piece on which support stands so high."""
+    top_mm = process.support_branch_mm
+    tapered = top_mm + 2.0 * above_mm * tan(radians(process.support_branch_diameter_angle_deg))
+    return max(min(tapered, max(process.support_trunk_mm, top_mm)), above_mm / SLENDER)
+
+
+def thicken(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
+    """The support of every layer with its thin pieces grown; what is added lies within the lean of the layer below, or stands."""
+    above: list[Piece] = []
+    wide: list[Polygons] = list(bodies)
+    for m in range(len(bodies) - 1, -1, -1):
+        above = [_grown(piece, above, areas, m) for piece in islands(bodies[m])]
+        if any(piece.area is not piece.thin for piece in above):
+            wide[m] = union([piece.area for piece in above])
+    for m in range(1, len(bodies)):
+        if wide[m] is not bodies[m]:
+            loose = _loose(bodies[m], wide[m], wide[m - 1], areas, m)
+            if not loose.is_empty():
+                wide[m] = (bodies[m] + (wide[m] - loose)).simplify(COARSE_MM)
+    return wide
+
+
+def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int) -> Piece:
+    """A piece of a layer, grown where it is thinner than what stands on it asks for, and under what has grown above."""
+    bounds, heights = thin.bounds(), areas.heights
+    over = [piece for piece in above if piece.touches(thin, bounds)]
+    if not over:
+        return Piece(thin, thin, float(heights.tip_mm[m]), bounds)
+    top_mm = max(piece.top_mm for piece in over)
+    least_mm = least_diameter_mm(top_mm - float(heights.bottom_mm[m]), areas.process)
+    lacking_mm, grown = 0.5 * (least_mm - 2.0 * sqrt(thin.area() / pi)), [piece for piece in over if piece.area is not piece.thin]
+    if lacking_mm <= 0.0 and not grown:
+        return Piece(thin, thin, top_mm, bounds)
+    room = dilate(areas.reachable[m] ^ bounding_box(thin, least_mm + areas.radius_mm), areas.radius_mm)
+    lean_mm, near = float(areas.lean_mm[m + 1]), room ^ bounding_box(thin, least_mm)
+    # What of the pieces above is theirs before they grow is carried by whatever has carried it.
+    hung = [offset(piece.area, -lean_mm) - (piece.thin - dilate(thin, lean_mm)) for piece in grown]
+    area = _touching(thin, union(hung) ^ near) if hung else thin
+    if lacking_mm > 0.0:
+        area = _filled(area, thin, room, lacking_mm, least_mm)
+    return Piece(thin, area.simplify(COARSE_MM), top_mm, bounds)
+
+
+def _touching(thin: Polygons, about: Polygons) -> Polygons:
+    """A thin piece with the places about it that touch it."""
+    return union([thin, *(piece for piece in islands(about) if not (piece ^ thin).is_empty())])
+
+
+def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
+    """An area with the room about a thin piece, no farther from it than that diameter nor than it takes to be as large."""
+    least_mm2, near_mm, far_mm = 0.25 * pi * least_mm**2, lacking_mm, least_mm
+    if area.area() >= least_mm2:
+        return area
+    filled = area + _touching(thin, dilate(thin, near_mm) ^ room)
+    if filled.area() >= least_mm2:
+        return filled
+    filled = area + _touching(thin, dilate(thin, far_mm) ^ room)
+    for _ in range(HALVINGS if filled.area() > least_mm2 else 0):
+        middle_mm = 0.5 * (near_mm + far_mm)
+        less = area + _touching(thin, dilate(thin, middle_mm) ^ room)
+        if less.area() >= least_mm2:
+            far_mm, filled = middle_mm, less
+        else:
+            near_mm = middle_mm
+    return filled
+
+
+def _loose(body: Polygons, wide: Polygons, below: Polygons, areas: ReachableAreas, m: int) -> Polygons:
+    """What has grown of a layer's support neither within the lean of the layer below nor, where it needs that, on something."""
+    lean_mm, branch_mm, added = float(areas.lean_mm[m]), areas.process.support_branch_mm, wide - below
+    loose = added if below.is_empty() else drop_slivers(added - dilate(below, lean_mm))
+    if loose.is_empty() or areas.placeable[m].is_empty():
+        return loose
+    needles = [piece for piece in islands(body) if piece.area() < 0.25 * pi * branch_mm**2 or (piece ^ below).is_empty()]
+    if not needles:
+        return loose
+    beside = areas.placeable[m] ^ union([bounding_box(piece, branch_mm) for piece in needles])
+    return loose - dilate(beside, (1.0 - BEYOND) * areas.radius_mm)
+
+
+def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], process: Process) -> list[Polygons]:
+    """The pieces of each layer's support whose walls are enough.
+
+    Those have lines inside that are wider than sparse lines lie apart, from where lines of the layer above lie on them; narrow
+    ones only right under dense lines, which may run along them.
+    """
+    hollow, filled = [Polygons()] * len(printed), Polygons()
+    if process.support_walls == 0:
+        return hollow
+    spacing, cell_mm = spacing_mm(process.line_width_mm, process.layer_height_mm), support_cell_mm(process)
+    walls_mm, dense_above = process.support_walls * spacing, Polygons()
+    for m in range(len(printed) - 1, -1, -1):
+        filling: list[Polygons] = []
+        empty: list[Polygons] = []
+        for piece in islands(printed[m]):
+            x0, y0, x1, y1 = piece.bounds()
+            is_small = max(x1 - x0, y1 - y0) <= 2.0 * walls_mm + cell_mm
+            is_narrow = is_small or offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
+            lying = dense_above if is_narrow else filled + dense_above
+            has_lines = not is_small and not (piece ^ lying).is_empty()
+            (filling if has_lines else empty).append(piece)
+        hollow[m], filled, dense_above = union(empty), union(filling), dense[m]
+    return hollow
+
+
+def support_cell_mm(process: Process) -> float:
+    """How far apart the sparse lines of support lie, mm: what dense lines laid over it have to span."""
+    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
+    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density

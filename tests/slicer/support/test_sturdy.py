@@ -1,0 +1,120 @@
+"""No piece of support is too slender for what stands on it; thick trunks are hollow: judged from the printed areas alone."""
+
+from collections.abc import Sequence
+from math import pi, radians, sqrt, tan
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.mesh import Mesh
+from slicer.geometry.polygons import Polygons, islands
+from slicer.support.beads import support_beads
+from slicer.support.sturdy import SLENDER, hollow_places, least_diameter_mm, support_cell_mm
+from slicer.support.support import Supports
+from tests.shapes import standing
+from tests.slicer.hand import profile, whole
+from tests.slicer.support.laws import assert_sound, supported
+from tests.slicer.support.test_tree import bored_bracket
+
+SHORT_MM = 2.0  # roots of what stands on the part are thinner over no more than this
+
+
+def gallows(arm_mm: float, height_mm: float, wall_mm: float = 0.0) -> Mesh:
+    """A post with a narrow arm to one side, and a wall along one side of the arm, up to below it."""
+    solid = m3.Manifold.cube((8, 8, height_mm)) + m3.Manifold.cube((8 + arm_mm, 3, 3)).translate((0, 0, height_mm))
+    if wall_mm:
+        solid += m3.Manifold.cube((30, 4, height_mm)).translate((0, 3 + wall_mm, 0)) + m3.Manifold.cube((8, 20, 2))
+    return standing(solid)
+
+
+def height_of_slender_support_mm(areas: Sequence[Polygons], layer_mm: float, most: float) -> float:
+    """The greatest height over which pieces follow each other that have more above them than so many of their diameters."""
+    above: list[tuple[Polygons, float, float]] = []
+    highest = 0.0
+    for m in range(len(areas) - 1, 0, -1):
+        pieces = []
+        for piece in islands(areas[m]):
+            over = [(up_mm, slender_mm) for upper, up_mm, slender_mm in above if not (upper ^ piece).is_empty()]
+            up_mm = max((mm for mm, _ in over), default=0.0) + layer_mm
+            is_slender = up_mm > most * 2.0 * sqrt(piece.area() / pi)
+            slender_mm = max((mm for _, mm in over), default=0.0) + layer_mm if is_slender else 0.0
+            pieces.append((piece, up_mm, slender_mm))
+            highest = max(highest, slender_mm)
+        above = pieces
+    return highest
+
+
+def sections_mm2(supports: Supports) -> np.ndarray:
+    return np.array([area.area() for area in supports.areas])
+
+
+@pytest.mark.parametrize("style", ["tree", "grid"])
+@pytest.mark.parametrize("seed", [4, 8])
+def test_no_piece_of_support_is_slender_over_more_than_a_root(seed: int, style: str) -> None:
+    _, supports = supported(whole(bored_bracket(seed)), f"process.support_style={style}")
+    assert height_of_slender_support_mm(supports.areas, 0.2, 1.1 * SLENDER) <= SHORT_MM
+
+
+@pytest.mark.parametrize("height_mm", [30.0, 70.0])
+def test_a_trunk_that_stands_alone_has_its_diameter_at_every_height(height_mm: float) -> None:
+    overhangs, supports = supported(whole(gallows(4.0, height_mm)))
+    assert_sound(overhangs, supports)
+    assert supports.unsupported_mm2 == 0.0
+    down_mm = height_mm - 0.2 - supports.sections.heights.tip_mm
+    for mm, mm2 in zip(down_mm[1:], sections_mm2(supports)[1:], strict=True):
+        if mm > 6.0:
+            assert mm2 >= 0.9 * 0.25 * pi * max(3.0, mm / SLENDER) ** 2
+
+
+def test_branches_get_thicker_by_their_angle_up_to_a_trunk() -> None:
+    widths = ("process.support_branch_mm=2", "process.support_trunk_mm=6", "process.support_branch_diameter_angle_deg=5")
+    _, supports = supported(whole(gallows(4.0, 40.0)), *widths)
+    down_mm = 39.8 - supports.sections.heights.tip_mm
+    diameters_mm = 2.0 * np.sqrt(sections_mm2(supports) / pi)
+    free = (down_mm > 8.0) & (down_mm < 20.0)
+    assert diameters_mm[free] == pytest.approx(2.0 + 2.0 * (down_mm[free] + 0.2) * tan(radians(5.0)), rel=0.08)
+    assert diameters_mm[(down_mm > 25.0) & (down_mm < 39.0)] == pytest.approx(6.0, rel=0.04)
+
+
+@pytest.mark.parametrize(("above_mm", "diameter_mm"), [(0.0, 2.0), (5.0, 2.8749), (20.0, 3.0), (120.0, 10.0)])
+def test_the_least_diameter_follows_the_angle_the_trunk_and_the_height(above_mm: float, diameter_mm: float) -> None:
+    widths = ("process.support_branch_mm=2", "process.support_trunk_mm=3", "process.support_branch_diameter_angle_deg=5")
+    assert least_diameter_mm(above_mm, profile(*widths).process) == pytest.approx(diameter_mm, abs=1e-3)
+
+
+@pytest.mark.parametrize("wall_mm", [0.5, 1.2])
+def test_where_the_part_is_near_a_trunk_is_thinner_but_nothing_loses_its_support(wall_mm: float) -> None:
+    mesh = gallows(10.0, 40.0, wall_mm)
+    for trunk_mm in (2, 12):
+        overhangs, supports = supported(whole(mesh), f"process.support_trunk_mm={trunk_mm}")
+        assert_sound(overhangs, supports)
+        assert supports.unsupported_mm2 == 0.0
+
+
+def test_a_trunk_under_a_narrow_tip_is_hollow_and_a_wide_column_is_not() -> None:
+    process = profile().process
+    tip, stem, slab = (Polygons.square((mm, mm), True) for mm in (2.0, 6.0, 12.0))
+    aside = slab.translate((30.0, 0.0))
+    nothing = Polygons()
+    printed = [stem + aside, stem + aside, tip + aside]
+    hollow = hollow_places([*printed, tip + aside], [nothing, nothing, nothing, tip + aside], process)
+    assert [area.area() for area in hollow[:3]] == pytest.approx([36.0, 36.0, 4.0])
+    beads = support_beads(printed[0], nothing, hollow[0], process, 0.2, False)
+    inside = [bead for bead in beads if not np.array_equal(bead.points[0], bead.points[-1])]
+    assert inside
+    assert min(bead.points[:, 0].min() for bead in inside) > 20.0
+    assert support_beads(stem, nothing, stem, process, 0.2, True)[1:], "the first layer is filled"
+
+
+def test_a_ridge_as_narrow_as_the_cells_is_filled_only_right_under_its_dense_lines() -> None:
+    process = profile().process
+    ridge = Polygons.square((support_cell_mm(process), 20.0), True)
+    nothing = Polygons()
+    hollow = hollow_places([ridge] * 4, [nothing, nothing, nothing, ridge], process)
+    assert [area.is_empty() for area in hollow] == [False, False, True, False]
+
+
+def test_support_without_walls_is_never_hollow() -> None:
+    piece = Polygons.square((2.0, 2.0))
+    assert hollow_places([piece], [Polygons()], profile("process.support_walls=0").process)[0].is_empty()
