@@ -99,9 +99,10 @@ class Plate:
 
     @classmethod
     def under(cls, mesh: Mesh, profile: Profile) -> "Plate":
-        """The plate under a mesh, by a profile. A pedestal holds no more than a plate; a brim goes round the pedestal."""
-        process, on_pedestal = profile.process, profile.search.pedestal_mm > 0.0
-        brim_mm = 0.0 if on_pedestal else process.brim_mm or process.small_base_brim_mm
+        """The plate under a mesh, by a profile. A pedestal or a raft holds no more than a plate; a brim would go round that."""
+        process = profile.process
+        stands_off = profile.search.pedestal_mm > 0.0 or process.raft_layers > 0
+        brim_mm = 0.0 if stands_off else process.brim_mm or process.small_base_brim_mm
         return cls(mesh, opposites(mesh.faces), centre_of_mass(mesh), diameter_mm(mesh), brim_mm, profile.material.density_g_cm3)
 
     @cached_property

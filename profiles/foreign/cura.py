@@ -62,6 +62,8 @@ KEYS = {
     "support_enable": "support_material",
     "support_type": "support_material_buildplate_only",
     "brim_gap": "brim_separation",
+    "raft_margin": "raft_expansion",
+    "raft_surface_margin": "raft_expansion",
     "skirt_line_count": "skirts",
     "skirt_gap": "skirt_distance",
     "material_print_temperature": "temperature",
@@ -82,6 +84,7 @@ KEYS = {
     "hole_xy_offset": "xy_hole_compensation",
     "machine_nozzle_size": "nozzle_diameter",
 }
+RAFT_LAYERS = {"raft_base_layers": "1", "raft_interface_layers": "1", "raft_surface_layers": "2"}  # with Cura's own numbers
 WORDS = {
     "fill_pattern": {
         "lines": "rectilinear",
@@ -102,6 +105,8 @@ def read_profile(file: Path) -> Config:
     values, name = _values(file)
     entries, formulas = dict[str, Entry](), list[str]()
     for own, text in values.items():
+        if own in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
+            continue
         if text.startswith("="):
             formulas.append(own)
         else:
@@ -109,9 +114,23 @@ def read_profile(file: Path) -> Config:
             entries[key] = Entry(own, _said(key, text))
     if NUMBER.fullmatch(values.get("support_angle", "")):  # Cura's is from the vertical
         entries["support_material_threshold"] = Entry("support_angle", f"{90.0 - float(values['support_angle']):g}")
+    entries |= _raft(values)
     if "min_fan_speed" in entries:
         entries["fan_always_on"] = Entry(entries["min_fan_speed"].name, "1")
     return Config(PROGRAM, entries, tuple(f"{own} (a formula)" for own in formulas), name, name)
+
+
+def _raft(values: Mapping[str, str]) -> dict[str, Entry]:
+    """The layers of a raft, Cura's own where the file tells none, and the gap over it less what the first layer takes of it."""
+    kind, told = values.get("adhesion_type", ""), dict[str, Entry]()
+    if kind:
+        layers = [values.get(own, usual) for own, usual in RAFT_LAYERS.items()]
+        known = kind == "raft" and all(NUMBER.fullmatch(text) for text in layers)
+        told["raft_layers"] = Entry("adhesion_type", f"{sum(map(float, layers)):g}" if known else "0")
+    gap, into = values.get("raft_airgap", ""), values.get("layer_0_z_overlap", "0")
+    if NUMBER.fullmatch(gap) and NUMBER.fullmatch(into):
+        told["raft_contact_distance"] = Entry("raft_airgap", f"{max(float(gap) - float(into), 0.0):g}")
+    return told
 
 
 def _values(file: Path) -> tuple[Mapping[str, str], str]:

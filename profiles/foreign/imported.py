@@ -17,7 +17,14 @@ RULES = {"process": process_rules.RULES, "material": material_rules.RULES}
 CONDITIONS = frozenset(  # read beside others, and told with them
     {
         *("extrusion_width", "nozzle_diameter", "filament_type", "fan_always_on", "cooling", "brim_type", "thick_bridges"),
-        *("wipe_distance", "enable_pressure_advance", "enable_dynamic_overhang_speeds", "enable_overhang_speed", "curr_bed_type"),
+        *(
+            "wipe_distance",
+            "enable_pressure_advance",
+            "enable_dynamic_overhang_speeds",
+            "enable_overhang_speed",
+            "curr_bed_type",
+            "adhesion_type",
+        ),
     }
 )
 SPARE = frozenset(f"process.{key}" for key in WIDTHS) - {"process.line_width_mm"}  # widths that may be those of all lines

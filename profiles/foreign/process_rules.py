@@ -72,6 +72,13 @@ def _steepest(config: Config, key: str) -> Converted:
     return Left("0: found by the slicer") if threshold == 0.0 else Value(90.0 - threshold, f"90 less {threshold:g}")
 
 
+def _found_by_the_slicer(config: Config, key: str) -> Converted:
+    """A number, below 0 where the slicer works it out."""
+    converted = number(config, key)
+    below = isinstance(converted, Value) and isinstance(converted.value, float) and converted.value < 0.0
+    return Left("below 0: worked out by the slicer; ours stays") if below else converted
+
+
 def _support_density(config: Config, key: str) -> Converted:
     filled = density(key, "support_material_extrusion_width")(config)
     return Left("needs a width and a layer height") if filled is None else Value(filled, "lines that far apart")
@@ -211,6 +218,12 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.skirt_distance_mm", "skirt_distance", number),
     ("process.brim_mm", "brim_width", _brim),
     ("process.brim_gap_mm", "brim_separation", number),
+    ("process.raft_layers", "raft_layers", whole),
+    ("process.raft_contact_distance_mm", "raft_contact_distance", number),
+    ("process.raft_expansion_mm", "raft_expansion", number),
+    ("process.raft_first_layer_density", "raft_first_layer_density", share),
+    ("process.raft_first_layer_expansion_mm", "raft_first_layer_expansion", _found_by_the_slicer),
+    ("process.first_layer_speed_over_raft_mm_s", "first_layer_speed_over_raft", part_of("perimeter_speed", AUTO)),
     ("", "support_material", left("parts that need support have it: process.support is auto")),
     ("process.self_supporting_angle_deg", "support_material_threshold", _steepest),
     ("process.support_style", "support_material_style", one_of(STYLES)),

@@ -58,6 +58,7 @@ def test_a_unit_is_that_of_the_name(key: str, unit: str) -> None:
         ("cooling", "material.fan"),
         ("brim", "process.brim_mm"),
         ("raft", "search.pedestal_mm"),
+        ("raft", "process.raft_layers"),
         ("retract", "material.retract_mm"),
         ("z hop", "process.lift_mm"),
         ("extrusion multiplier", "material.flow"),

@@ -6,6 +6,7 @@ import pytest
 
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
+from profiles.profile import load
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, SlicedPart
 from slicer.sectioning import compensate_elephant_foot
@@ -116,6 +117,36 @@ def test_only_the_first_layer_is_smaller_against_the_elephants_foot() -> None:
     layers = slice_part(whole(box(20, 20, 2)), profile(*BARE, "process.elephant_foot_mm=0.2")).layers
     edges = [max(np.abs(p.points).max() for p in layer.paths) for layer in layers[:3]]
     assert edges == pytest.approx([10 - 0.2 - 0.225, 10 - 0.225, 10 - 0.225])
+
+
+@pytest.mark.parametrize(("process", "foot_mm"), [("standard", 0.2), ("draft", 0.2), ("fine", 0.1)])
+def test_every_process_makes_up_for_the_elephant_s_foot_of_its_nozzle(process: str, foot_mm: float) -> None:
+    chosen = load(process=process, settings=BARE)
+    first = slice_part(whole(box(20, 20, 2)), chosen).layers[0]
+    assert max(np.abs(p.points).max() for p in first.paths) == pytest.approx(10 - foot_mm - 0.5 * chosen.process.line_width_mm)
+
+
+@pytest.mark.parametrize("side_mm", [0.5, 0.84])
+def test_pins_and_thin_walls_keep_their_first_layer(side_mm: float) -> None:
+    pins = m3.Manifold.cube((side_mm, side_mm, 3), True)
+    fence = m3.Manifold.cube((side_mm, 20, 3), True).translate((6, 0, 0))
+    kept, whole_foot = (
+        slice_part(whole(standing(pins + fence)), profile(*BARE, f"process.elephant_foot_mm={foot_mm}"))
+        .layers[0]
+        .volumes_mm3.sum()
+        for foot_mm in (0.2, 0.0)
+    )
+    assert kept == pytest.approx(whole_foot, rel=1e-3)
+
+
+def test_the_second_layer_lies_on_what_the_plate_squeezes_out() -> None:
+    shape = whole(standing(m3.Manifold.cylinder(6, 8, 10)))
+    usual, less = (
+        slice_part(shape, profile(*BARE, "process.overhang_share=0.7", f"process.elephant_foot_mm={foot_mm}")).layers[1]
+        for foot_mm in (0.0, 0.2)
+    )
+    assert less.volumes_mm3.sum() == pytest.approx(usual.volumes_mm3.sum(), rel=1e-6)
+    assert sorted(set(less.speed_mm_s.round(3))) == sorted(set(usual.speed_mm_s.round(3)))
 
 
 def test_a_part_on_plastic_has_no_elephants_foot() -> None:

@@ -153,3 +153,10 @@ def test_the_hull_bounds_what_touches_and_how_far_a_model_may_lean(seed: int) ->
     assert footing.touching_share * shadow_mm2 <= touching_mm2[0] + 1e-4
     assert footing.lean_deg <= lean_deg[0] + 1e-4
     assert touching_mm2[0] < 1.1 * shadow_mm2
+
+
+@pytest.mark.parametrize("setting", ["process.raft_layers=3", "search.pedestal_mm=5"])
+def test_no_brim_holds_what_stands_on_a_raft_or_a_pedestal(setting: str) -> None:
+    mesh = mesh_of(rod(5.0, 60.0))
+    footing = Plate.under(mesh, load(settings=[setting, "process.brim_mm=10"])).footing(UPRIGHT)
+    assert footing.brimmed_mpa == pytest.approx(footing.tension_mpa)

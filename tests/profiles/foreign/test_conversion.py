@@ -47,11 +47,21 @@ def taken(kind: str = "process", **values: str) -> dict[str, str]:
         ({"solid_infill_direction": "30"}, "skin_angle_deg", "30.0"),
         ({"top_one_perimeter_type": "topmost"}, "only_one_wall_top", "true"),
         ({"only_one_perimeter_first_layer": "1"}, "only_one_wall_first_layer", "true"),
+        ({"raft_layers": "3"}, "raft_layers", "3"),
+        ({"raft_contact_distance": "0.25"}, "raft_contact_distance_mm", "0.25"),
+        ({"raft_expansion": "2"}, "raft_expansion_mm", "2.0"),
+        ({"raft_first_layer_density": "80%"}, "raft_first_layer_density", "0.8"),
+        ({"raft_first_layer_expansion": "2"}, "raft_first_layer_expansion_mm", "2.0"),
+        ({"first_layer_speed_over_raft": "50%", "perimeter_speed": "60"}, "first_layer_speed_over_raft_mm_s", "30.0"),
         ({"cooling": "0", "slowdown_below_layer_time": "15"}, "least_layer_time_s", "0.0"),
     ],
 )
 def test_a_print_setting_becomes_ours(values: dict[str, str], key: str, value: str) -> None:
     assert taken(**values)[key] == value
+
+
+def test_an_expansion_that_the_slicer_works_out_is_left() -> None:
+    assert "raft_first_layer_expansion_mm" not in taken(raft_first_layer_expansion="-1", perimeters="2")
 
 
 @pytest.mark.parametrize(

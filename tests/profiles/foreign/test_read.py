@@ -143,6 +143,23 @@ def test_a_profile_of_cura_is_read_without_its_formulas(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("values", "layers", "gap_mm"),
+    [
+        ("adhesion_type = raft", 4, None),
+        ("adhesion_type = raft\nraft_surface_layers = 3\nraft_airgap = 0.3\nlayer_0_z_overlap = 0.15", 5, 0.15),
+        ("adhesion_type = brim\nraft_surface_layers = 3", 0, None),
+        ("layer_height = 0.2", None, None),
+    ],
+)
+def test_the_layers_of_cura_s_raft_are_added_up(tmp_path: Path, values: str, layers: int | None, gap_mm: float | None) -> None:
+    file = tmp_path / "mine.curaprofile"
+    with ZipFile(file, "w") as archive:
+        archive.writestr("mine", f"[general]\nversion = 4\nname = mine\n[values]\n{values}\n")
+    config = read_config(file)
+    assert (config.number("raft_layers"), config.number("raft_contact_distance")) == (layers, gap_mm)
+
+
+@pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
         ("notes.txt", b"hello", "holds no settings"),
