@@ -73,7 +73,9 @@ def test_branches_get_thicker_by_their_angle_up_to_a_trunk() -> None:
     down_mm = 39.8 - supports.sections.heights.tip_mm
     diameters_mm = 2.0 * np.sqrt(sections_mm2(supports) / pi)
     free = (down_mm > 8.0) & (down_mm < 20.0)
-    assert diameters_mm[free] == pytest.approx(2.0 + 2.0 * (down_mm[free] + 0.2) * tan(radians(5.0)), rel=0.08)
+    tapered_mm = 2.0 + 2.0 * down_mm[free] * tan(radians(5.0))
+    assert (diameters_mm[free] > 0.98 * tapered_mm).all()
+    assert (diameters_mm[free] < 1.15 * tapered_mm).all()
     assert diameters_mm[(down_mm > 25.0) & (down_mm < 39.0)] == pytest.approx(6.0, rel=0.04)
 
 
