@@ -34,6 +34,9 @@ class Kind(StrEnum):
     PURGE = "Custom"
 
 
+SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
+
+
 KINDS = tuple(Kind)
 NUMBER = {kind: number for number, kind in enumerate(KINDS)}
 Width = TypeVar("Width", float, Floats)

@@ -5,7 +5,6 @@ A part that is cut from a model has all walls and skins along the model's surfac
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from math import pi, sqrt
 from typing import TypeAlias
 
@@ -27,11 +26,11 @@ from slicer.bead import (
     varying,
     wall_rank,
 )
-from slicer.fill.infill import Filling, filling_beads, has_lightning, open_area, plan_fillings, widest_cell_mm
-from slicer.fill.over_infill import ANCHORED, anchored, infill_bridges
+from slicer.fill.infill import Filling, filling_beads, has_lightning, leaning_walls, open_area, plan_fillings, widest_cell_mm
+from slicer.fill.over_infill import ANCHORED, anchor_skins, infill_bridges
 from slicer.fill.region import Cover, Region, ironed_areas, regions
-from slicer.fill.skin import SolidLines, skin_lines
-from slicer.geometry.clip import cut_line
+from slicer.fill.skin import SolidLines, lines_angle_deg, skin_lines
+from slicer.geometry.clip import runs_within
 from slicer.geometry.polygons import (
     CLOSING_MM,
     Polygons,
@@ -46,7 +45,6 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm
-from slicer.heights import Heights
 from slicer.interface.interface import limb_planes, plane_in_frame_of
 from slicer.modifiers import LEAST_MM2, WallCounts, combined, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
@@ -74,14 +72,15 @@ class Shell:
     """One layer of the part itself.
 
     process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of the plate's first layer;
-    ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; ironed: smoothed tops;
-    infill: of the region's sparse places, None where it is not drawn yet.
+    ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; leaning: as
+    leaning_walls; ironed: smoothed tops; infill: of the region's sparse places, None where it is not drawn yet.
     """
 
     process: Process
     walls: Walls
     ending: tuple[Bead, ...]
     region: Region
+    leaning: Polygons
     bridges: tuple[Bridge, ...]
     ironed: Polygons
     infill: list[Bead] | None
@@ -124,7 +123,8 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     sparse = [region.sparse for region in filled]
     fillings = plan_fillings(sparse, sections.own, process, sections.places, sections.heights.height_mm)
-    filled, drawn = anchor_skins(filled, processes, fillings, sections.heights)
+    leaning = leaning_walls(sparse, sections.own, [walls.inside for walls, _, _ in walled], runs, process.line_width_mm)
+    filled, drawn = anchor_skins(filled, leaning, processes, fillings, sections.heights)
     ranked = [
         own if of.all == [own.walls] else own.model_copy(update={"walls": max(of.all)})
         for own, of in zip(processes, counts, strict=True)
@@ -132,9 +132,9 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     return Shells(
         supports,
         [
-            Shell(own, walls, ending, region, spans, smooth, drawn.get(layer))
-            for layer, (own, (walls, ending, _), region, spans, smooth) in enumerate(
-                zip(ranked, walled, filled, bridges, ironed, strict=True)
+            Shell(own, walls, ending, region, over, spans, smooth, drawn.get(layer))
+            for layer, (own, (walls, ending, _), region, over, spans, smooth) in enumerate(
+                zip(ranked, walled, filled, leaning, bridges, ironed, strict=True)
             )
         ],
         fillings,
@@ -185,27 +185,6 @@ def _walled(
     for layer, found in zip(needed, parallel_map(contours_of, len(needed), FEWEST_LAYERS), strict=True):
         walled[layer] = _walls_from(*found)
     return walled
-
-
-def lines_angle_deg(process: Process, layer: int) -> float:
-    """Direction of the solid lines of a layer: neighbouring layers cross at right angles."""
-    return process.infill_angle_deg + 90.0 * (layer % 2)
-
-
-def anchor_skins(
-    filled: Sequence[Region], processes: Sequence[Process], fillings: Sequence[Filling], heights: Heights
-) -> tuple[list[Region], dict[int, list[Bead]]]:
-    """The regions of all layers with skins that end on infill or on what is solid, and the infill of those below such skins."""
-    done, drawn = list(filled), dict[int, list[Bead]]()
-    for layer, (region, process) in enumerate(zip(filled[1:], processes, strict=False), 1):
-        k, width = layer - 1, processes[layer].line_width_mm
-        below = open_area(done[k].sparse, fillings, process, k, lightning=False)
-        if below.is_empty() or ((region.solid + region.top) ^ below).area() < width**2:
-            continue
-        drawn[k] = filling_beads(done[k].sparse, fillings, process, heights, k)
-        lines, angle_deg = [bead.points for bead in drawn[k]], lines_angle_deg(process, layer)
-        done[layer] = anchored(region, below, lines, angle_deg, width, widest_cell_mm(fillings, process, k))
-    return done, drawn
 
 
 def layer_processes(sections: Sections) -> list[Process]:
@@ -297,7 +276,9 @@ def cut_walls(
     loops, ending = [*round_.loops, *((),) * (around - len(round_.loops))], []
     for level in range(around, len(enclosing[most].loops)):
         room = counts.where_more(level, within, short_mm)
-        runs = [run for loop in enclosing[most].loops[level] for run in _within(loop, room) if length_mm(run) > width]
+        runs = [
+            run for loop in enclosing[most].loops[level] for run in runs_within(close_loop(loop), room) if length_mm(run) > width
+        ]
         beads = [Bead(Kind.INNER_WALL, run, width, wall_rank(level, ranked)) for run in runs]
         loops.append(tuple(bead.points[:-1] for bead in beads if bead.closed))
         ending += [bead for bead in beads if not bead.closed]
@@ -306,20 +287,6 @@ def cut_walls(
     ending += gaps([uncovered_area(round_.inside - inside, lines, width)], width, height_mm)
     model_inside = inside if model is None and not more else model_inside
     return replace(round_, loops=tuple(loops), inside=inside), tuple(ending), model_inside
-
-
-def _within(loop: Floats, area: Polygons) -> list[Floats]:
-    """The parts of a loop (n, 2) inside an area, as open or closed polylines."""
-    if area.is_empty():
-        return []
-    points, within = cut_line(close_loop(loop), area)
-    if within.all():
-        return [points]
-    bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
-    runs = [points[a : b + 1] for a, b in pairwise(bounds) if within[a]]
-    if len(runs) > 1 and within[0] and within[-1]:
-        runs = [*runs[1:-1], np.concatenate([runs[-1], runs[0][1:]])]
-    return runs
 
 
 def _walls_from(
@@ -395,7 +362,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     beads = [bead for bead in beads if bead.kind is not Kind.GAP or bead.length_mm >= process.gap_least_mm]
     if shell.infill is not None and region.sparse is shell.region.sparse:
         return beads + shell.infill
-    return beads + filling_beads(region.sparse, shells.fillings, process, heights, layer)
+    return beads + filling_beads(region.sparse, shell.leaning, shells.fillings, process, heights, layer)
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:

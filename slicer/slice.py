@@ -25,12 +25,13 @@ from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
+from slicer.fill.ends import hold_ends
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from slicer.heights import shell_layers
 from slicer.interface.interface import pin_width_mm, skin_beside
 from slicer.overhangs import Overhang, find_overhangs
-from slicer.paths import ON_PLATE_MM, Kind, Layer, SlicedPart, bead_area_mm2
+from slicer.paths import ON_PLATE_MM, SKINS, Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.raft import raft_layers
 from slicer.sectioning import Sections, section_part, section_parts
 from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, lay_beads
@@ -47,7 +48,6 @@ from slicer.walls.fuzzy import fuzzy_walls
 
 FEWEST_IN_ALL = 250  # fewer are sliced sooner than processes are forked and their paths brought back
 LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it
-SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
 PIN_RANK = OUTSIDE - 1  # pins come before all else of a layer
 PIN_CHORDS = 12  # chords of the circle that the tip goes round a pin
 PIN_MOST_AREA = 3.0  # section of its stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
@@ -168,6 +168,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     aligned = process.seam == "aligned" and process.walls > 0
     planned = plan_seams(sections, limits) if aligned else [NO_SEAMS] * len(limits)
     layers, raft = list[Layer](), raft_layers(supports)
+    below: list[Bead] = []
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = raft[-1].points[-1] if raft else rear, np.zeros((0, 2)), 0, len(sections.outlines)
     usual = min(max(1, shell_layers(process)[1]), count) if process.spiral_vase else count
@@ -178,6 +179,8 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
             bare.append(i)
         around = Surroundings(rear, seams, tip, limits[i], i, planned[i])
         beads, seams = place_seams([*own, *auxiliary], process, around)
+        beads = hold_ends(beads, below, sections.own[i - 1], process.line_width_mm) if i else beads
+        below = [*beads, *shells.layers[i].ending]
         if i and process.fuzzy_skin != "none":
             beads = fuzzy_walls(beads, process, _joints_near(sections, i), (sections.part.index, i))
         skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)

@@ -30,15 +30,18 @@ from slicer.fill.lines import (
     grid_numbers,
     parallel_lines,
 )
-from slicer.geometry.clip import merge_pieces
+from slicer.geometry.clip import merge_pieces, runs_within
 from slicer.geometry.edge_index import index_edges
-from slicer.geometry.polygons import Polygons, closing, offset, opening, strips_beside, union
+from slicer.geometry.polygons import Polygons, close_loop, closing, contours, offset, opening, strips, strips_beside, union
 from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
+MIDDLE = 0.5  # line widths: a wall that lies so far beside the one below has its middle over the infill
+BEYOND = 0.5  # line widths that a line under walls goes on beyond where they lean out
+SHORTEST = 2.0  # line widths: a wall spans less without a line under it
 RANK = 3  # behind skins (slicer.fill.skin)
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}  # of straight families
@@ -150,15 +153,47 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     return drawn
 
 
-def filling_beads(sparse: Polygons, fillings: Sequence[Filling], process: Process, heights: Heights, layer: int) -> list[Bead]:
-    """Beads of all infills in the sparse area of a layer, whose settings those of the process are."""
+def filling_beads(
+    sparse: Polygons, leaning: Polygons, fillings: Sequence[Filling], process: Process, heights: Heights, layer: int
+) -> list[Bead]:
+    """Beads of all infills in the sparse area of a layer, whose settings those of the process are.
+
+    leaning: where walls of the next layer begin to leave those of this one; a line beside these carries them.
+    """
     at = {"z_mm": float(heights.tip_mm[layer]), "height_mm": float(heights.height_mm[layer])}
-    beads = list[Bead]()
+    width = process.line_width_mm
+    lines, sparse = _lines_under_walls(sparse, leaning, width, spacing_mm(width, at["height_mm"]))
+    beads = [Bead(Kind.INFILL, line, width, RANK) for line in lines]
     for filling, area in zip(fillings, divided(sparse, fillings, layer, process, _apart_mm(process)), strict=True):
-        lines = filling.lightning[layer] if filling.lightning else ()
+        branches = filling.lightning[layer] if filling.lightning else ()
         own = filling.process(process)
-        beads += infill_beads(area, own, density=filling.density, layer=layer, lightning=lines, **at)
+        beads += infill_beads(area, own, density=filling.density, layer=layer, lightning=branches, **at)
     return beads
+
+
+def leaning_walls(
+    sparse: Sequence[Polygons], sections: Sequence[Polygons], insides: Sequence[Polygons], runs: Sequence[range], width_mm: float
+) -> list[Polygons]:
+    """Where over the sparse places of each layer a wall of the next one has its middle beside the wall below, as where a shape
+    shrinks; runs: of layers whose walls are known."""
+    leaning = [Polygons()] * len(sparse)
+    for layer in (layer for run in runs for layer in run[:-1]):
+        over = sparse[layer] - insides[layer + 1]
+        if over.area() > (MIDDLE * width_mm) ** 2:
+            leaning[layer] = opening(over ^ sections[layer + 1], 0.5 * MIDDLE * width_mm)
+    return leaning
+
+
+def _lines_under_walls(sparse: Polygons, leaning: Polygons, width_mm: float, spacing_mm: float) -> tuple[list[Floats], Polygons]:
+    """The lines along the border of a sparse area where walls lean over it, and what they leave of the area."""
+    middle = leaning if leaning.is_empty() else offset(sparse, -0.5 * spacing_mm)
+    if middle.is_empty():
+        return [], sparse
+    room = offset(leaning, BEYOND * width_mm)
+    lines = [
+        line for loop in contours(middle) for line in runs_within(close_loop(loop), room) if length_mm(line) > SHORTEST * width_mm
+    ]
+    return lines, sparse - strips(lines, 0.5 * spacing_mm) if lines else sparse
 
 
 def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int, lightning: bool = True) -> Polygons:

@@ -13,9 +13,14 @@ from numpy.typing import NDArray
 from mdp.kernels.arrays import table
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import Bead
+from slicer.fill.infill import Filling, filling_beads, open_area, widest_cell_mm
 from slicer.fill.region import Region
+from slicer.fill.skin import lines_angle_deg
 from slicer.geometry.clip import rotation_2d
 from slicer.geometry.polygons import Polygons, closing, edges, islands, of_contours, offset, opening, union
+from slicer.heights import Heights
 
 NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
@@ -27,6 +32,26 @@ MOST_ROUNDS = 4  # newly solid places may themselves end over a void
 SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
 
 Indices = NDArray[np.int64]
+
+
+def anchor_skins(
+    filled: Sequence[Region],
+    leaning: Sequence[Polygons],
+    processes: Sequence[Process],
+    fillings: Sequence[Filling],
+    heights: Heights,
+) -> tuple[list[Region], dict[int, list[Bead]]]:
+    """The regions of all layers with skins that end on infill or on what is solid, and the infill of those below such skins."""
+    done, drawn = list(filled), dict[int, list[Bead]]()
+    for layer, (region, process) in enumerate(zip(filled[1:], processes, strict=False), 1):
+        k, width = layer - 1, processes[layer].line_width_mm
+        below = open_area(done[k].sparse, fillings, process, k, lightning=False)
+        if below.is_empty() or ((region.solid + region.top) ^ below).area() < width**2:
+            continue
+        drawn[k] = filling_beads(done[k].sparse, leaning[k], fillings, process, heights, k)
+        lines, angle_deg = [bead.points for bead in drawn[k]], lines_angle_deg(process, layer)
+        done[layer] = anchored(region, below, lines, angle_deg, width, widest_cell_mm(fillings, process, k))
+    return done, drawn
 
 
 def anchored(

@@ -13,6 +13,7 @@ from math import ceil
 import numpy as np
 
 from mdp.mesh import Floats, Indices
+from profiles.process import Process
 from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
 from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines
@@ -50,6 +51,11 @@ class SolidLines:
     def spacing_mm(self) -> float:
         """Distance of neighbouring lines."""
         return spacing_mm(self.width_mm, self.height_mm)
+
+
+def lines_angle_deg(process: Process, layer: int) -> float:
+    """Direction of the solid lines of a layer: neighbouring layers cross at right angles."""
+    return process.infill_angle_deg + 90.0 * (layer % 2)
 
 
 def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:

@@ -1,6 +1,7 @@
 """Clip: open lines clipped to the inside of polygons, each piece with the edges of the border on which it ends, and lines cut
 where they enter and leave."""
 
+from itertools import pairwise
 from math import cos, radians, sin
 from typing import NamedTuple
 
@@ -97,6 +98,21 @@ def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
         size = _cut(points, index, out, marks)
         room *= 4
     return out[:size], marks[: size - 1]
+
+
+def runs_within(points: Floats, area: Polygons) -> list[Floats]:
+    """The parts of a polyline (n, 2) inside an area; of a closed one, the part over its first point in one piece."""
+    if area.is_empty():
+        return []
+    points, within = cut_line(points, area)
+    if within.all():
+        return [points]
+    bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
+    runs = [points[a : b + 1] for a, b in pairwise(bounds) if within[a]]
+    closed = bool((points[0] == points[-1]).all())
+    if closed and len(runs) > 1 and within[0] and within[-1]:
+        runs = [*runs[1:-1], np.concatenate([runs[-1], runs[0][1:]])]
+    return runs
 
 
 @kernel

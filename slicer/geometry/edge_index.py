@@ -54,6 +54,12 @@ def index_edges(polygons: Polygons) -> EdgeIndex:
     return index
 
 
+def index_segments(segments: Floats) -> EdgeIndex:
+    """Segments (n, 4) that bound nothing, for the search of the nearest."""
+    index: EdgeIndex = _index(segments, np.zeros(len(segments), np.int64), np.array([0, len(segments)]))
+    return index
+
+
 @kernel
 def _index(edges: Floats, loop: Indices, begins: Indices) -> EdgeIndex:
     x0, y0, x1, y1 = 1e9, 1e9, -1e9, -1e9
