@@ -85,8 +85,7 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_platform))
     faces = faces_by_layer(mesh, cuts_mm, risky)
     for i in range(int(sections.on_platform), len(outlines)):
-        below = sections.below(i) or Polygons()
-        below = below if i else offset(below, RIM_MM)
+        below = outlines[i - 1] if i else offset(sections.plastic_below or Polygons(), RIM_MM)
         beyond, triangles = outlines[i] - below, faces.get(i, [])
         floating = _floating(outlines[i], below, beyond.area())
         hanging = beyond ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()

@@ -76,7 +76,8 @@ class Sections:
     """A part's layers, one entry each, before anything is laid, and all that is known of the model's other parts around them.
 
     Part: printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame.
-    Layers: `outlines` are all of each; `own` without the pedestal, `ungrooved` those before the grooves for later parts.
+    Layers: `outlines` are all of each, as they are once printed; `own` what is drawn of each, without the pedestal and what the
+    first layer is squeezed out by; `ungrooved` those before the grooves for later parts.
     Model around: later parts have `beside` of each layer and `above` of those over the last one, as many as shells reach; the
     model has `beneath` of those under the base plane, the nearest first, () where earlier parts are not known; earlier parts
     have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is the
@@ -84,7 +85,6 @@ class Sections:
     Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
     Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, and what overhangs in its
     `enforced` does, () for nowhere. In `places` other settings hold, those of a later one over those of an earlier one.
-    foot: the first layer as it is squeezed out on the plate, None where nothing is taken off it for that;
     pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold something, but nothing that gets a
     line.
     """
@@ -111,7 +111,6 @@ class Sections:
     no_support: Sequence[Polygons] = ()
     enforced: Sequence[Polygons] = ()
     places: Sequence[Place] = ()
-    foot: Polygons | None = None
     pedestal_layers: int = 0
     too_thin: frozenset[int] = frozenset()
 
@@ -147,8 +146,6 @@ class Sections:
 
     def below(self, layer: int) -> Polygons | None:
         """The plastic that a layer lies on; None for the platform."""
-        if layer == 1 and self.foot is not None:
-            return self.foot
         return self.outlines[layer - 1] if layer else self.plastic_below
 
 
@@ -183,15 +180,16 @@ def section_part(
     places = modified_places(part, mesh, process, cuts_mm)
     beside, above, beneath = _model_around(part, earlier, later, heights, process, places)
     outlines = compensate(outlines, part, later, beside, cuts_mm, process)
-    foot = outlines[0] if on_platform and not process.raft_layers and process.elephant_foot_mm > 0.0 else None
-    if foot is not None:
-        outlines[0] = compensate_elephant_foot(foot, process.elephant_foot_mm, first_layer_process(process).line_width_mm)
     pins = plan_pins((*earlier, part, *later), of_print) if pins is None else pins
     ungrooved = cut_out(outlines, pin_holes(part, later, pins, of_print), cuts_mm)
     outlines = own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
     if pedestal:
         ungrooved = _without_pedestal(ungrooved, mesh, cuts_mm, pedestal_mm, pedestal)
         own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
+    elif on_platform and not process.raft_layers and process.elephant_foot_mm > 0.0:
+        width_mm = first_layer_process(process).line_width_mm
+        first = compensate_elephant_foot(own[0], process.elephant_foot_mm, width_mm)
+        ungrooved, own = [first, *ungrooved[1:]], [first, *own[1:]]
     below = plastic_below(part, earlier, outlines[0])
     return Sections(
         part=part,
@@ -216,7 +214,6 @@ def section_part(
         no_support=marked_areas(part.no_support, part, mesh, cuts_mm),
         enforced=marked_areas(part.support, part, mesh, cuts_mm),
         places=places,
-        foot=foot,
         pedestal_layers=pedestal,
         too_thin=too_thin,
     )

@@ -108,8 +108,8 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     sections = supports.sections
     process = sections.process
     processes = layer_processes(sections)
-    printed = sections.own if sections.foot is None else [sections.foot, *sections.own[1:]]
-    processes = strengthen_overhangs(processes, printed, sections.plastic_below)
+    lying = sections.own if sections.pedestal_layers else sections.outlines
+    processes = strengthen_overhangs(processes, lying, sections.plastic_below)
     model = model_sections(sections)
     counts, count = _wall_counts(sections, processes), len(processes)
     # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.

@@ -61,7 +61,8 @@ def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Be
     if layer < sections.pedestal_layers:
         beads += pedestal_beads(outline, layer, sections.pedestal_layers, process, height_mm)
     if on_plate:
-        beads += beads_around(sections, union([outline, supports.areas[0]]), outline, process, height_mm)
+        base = outline if sections.pedestal_layers else sections.own[0]
+        beads += beads_around(sections, union([base, supports.areas[0]]), base, process, height_mm)
     return beads
 
 

@@ -42,7 +42,7 @@ def test_the_gap_lies_between_roof_and_model() -> None:
 
 def test_the_model_is_printed_as_on_the_platform() -> None:
     _, model = lifted(box())
-    alone = slice_part(whole(box()), profile("process.skirt_loops=0")).layers
+    alone = slice_part(whole(box()), profile("process.skirt_loops=0", "process.elephant_foot_mm=0")).layers
     assert [lay.height_mm for lay in model] == pytest.approx([lay.height_mm for lay in alone])
     for ours, theirs in zip(model, alone, strict=True):
         plastic = [lay.volumes_mm3.sum() for lay in (ours, theirs)]
