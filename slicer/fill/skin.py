@@ -15,7 +15,7 @@ import numpy as np
 from mdp.mesh import Floats, Indices
 from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
-from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines
+from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines, join_groups
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons, islands, offset
@@ -51,6 +51,11 @@ class SolidLines:
         """Distance of neighbouring lines."""
         return spacing_mm(self.width_mm, self.height_mm)
 
+    @property
+    def reach_mm(self) -> float:
+        """How far inside the area the lines end."""
+        return 0.5 * self.spacing_mm - self.overlap * self.width_mm
+
 
 def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
     """Beads that fill an area completely: lines, and what fills the places that they leave."""
@@ -79,7 +84,7 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
 
 def _filled(island: Polygons, solid: SolidLines) -> tuple[list[Floats], Polygons, float]:
     """The lines of a connected piece, the places that they leave, and the flow that fills the rest; 0 without lines."""
-    lines = _lines(offset(island, -(0.5 * solid.spacing_mm - solid.overlap * solid.width_mm)), solid)
+    lines = _lines(offset(island, -solid.reach_mm), solid)
     rest = uncovered_area(island, lines, solid.width_mm)
     total = sum(length_mm(line) for line in lines)
     return lines, rest, (island.area() - rest.area()) / (total * solid.spacing_mm) if lines else 0.0
@@ -95,9 +100,9 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
     joint_mm = JOIN * solid.spacing_mm
     if solid.pattern == "monotonic":
-        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm)
+        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm, solid.reach_mm)
     else:
-        lines = anchor_lines(pieces, border, joint_mm)
+        lines = anchor_lines(pieces, border, joint_mm, solid_mm=(solid.spacing_mm, solid.reach_mm))
     return [line for line in lines if length_mm(line) > 0.5 * solid.width_mm]
 
 
@@ -113,18 +118,22 @@ def _even(spacing: float) -> Draw:
     return draw
 
 
-def monotonic_lines(pieces: Pieces, border: EdgeIndex, angle_deg: float, spacing_mm: float, most_mm: float) -> list[Floats]:
-    """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart."""
+def monotonic_lines(
+    pieces: Pieces, border: EdgeIndex, angle_deg: float, spacing_mm: float, most_mm: float, reach_mm: float
+) -> list[Floats]:
+    """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart.
+
+    reach_mm: from the border to what bounds the area.
+    """
     if not len(pieces.ends):
         return []
     cell, before = _cells(pieces, angle_deg, spacing_mm)
-    lines = anchor_lines(pieces, border, most_mm, group=cell)
+    lines, of = join_groups(pieces, border, cell, (most_mm, 0.0, 0.0), (spacing_mm, reach_mm))
     if len(lines) < 2:
         return lines
-    piece = {(x, y): k // 2 for k, (x, y) in enumerate(pieces.points.tolist())}
     by_cell: list[list[Floats]] = [[] for _ in before]
-    for line in lines:
-        by_cell[cell[piece[line[0, 0], line[0, 1]]]].append(line)
+    for line, own in zip(lines, of.tolist(), strict=True):
+        by_cell[own].append(line)
     return _order_lines(by_cell, before, rotation_2d(angle_deg))
 
 
