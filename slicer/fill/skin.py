@@ -15,20 +15,21 @@ import numpy as np
 from mdp.mesh import Floats, Indices
 from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
-from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines, join_groups
+from slicer.fill.lines import MARGIN_MM, OPEN, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines, join_groups
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons, islands, offset
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
-from slicer.walls.walls import gaps, uncovered_area
+from slicer.walls.walls import FEW, gaps, uncovered_area
 
 JOIN = 12.0  # spacings along the border: line ends nearer than this are joined
-EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
+EDGE = 0.27  # spacings that the outermost lines keep from the extreme points: in a corner a shorter line would be a mere dot
 RANK = 2  # behind gaps (slicer.walls.walls), before infill
 TOUCHING = 0.01  # of the spacing: neighbouring lines overlap by this at least, however little flow a skin asks for
 MOST_FLOW = 1.15  # only specks whose lines hardly fit ask for more
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
+FEW_HIDDEN = 1.0  # of the line width squared: a smaller place beside lines that nobody sees stays open
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
 
 
@@ -37,7 +38,8 @@ class SolidLines:
     """How an area is filled completely: direction, width and height of the lines, and how they meet what is around.
 
     overlap: their reach into the walls around, share of a line width. pattern: monotonic, every line on the same side of its
-    neighbour; rectilinear, in any order; or concentric, without a direction.
+    neighbour; rectilinear, in any order; or concentric, without a direction. seen: from above or below, so that lines reach into
+    what stays open beside them, and small places are filled, too.
     """
 
     angle_deg: float
@@ -45,6 +47,7 @@ class SolidLines:
     height_mm: float
     overlap: float = 0.0
     pattern: SkinPattern = "rectilinear"
+    seen: bool = False
 
     @property
     def spacing_mm(self) -> float:
@@ -55,6 +58,11 @@ class SolidLines:
     def reach_mm(self) -> float:
         """How far inside the area the lines end."""
         return 0.5 * self.spacing_mm - self.overlap * self.width_mm
+
+    @property
+    def border_mm(self) -> tuple[float, float]:
+        """The spacing and how far inside the area lines end that reach into what stays open beside them."""
+        return (self.spacing_mm, self.reach_mm) if self.seen else OPEN
 
 
 def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
@@ -85,7 +93,7 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
 def _filled(island: Polygons, solid: SolidLines) -> tuple[list[Floats], Polygons, float]:
     """The lines of a connected piece, the places that they leave, and the flow that fills the rest; 0 without lines."""
     lines = _lines(offset(island, -solid.reach_mm), solid)
-    rest = uncovered_area(island, lines, solid.width_mm)
+    rest = uncovered_area(island, lines, solid.width_mm, FEW if solid.seen else FEW_HIDDEN)
     total = sum(length_mm(line) for line in lines)
     return lines, rest, (island.area() - rest.area()) / (total * solid.spacing_mm) if lines else 0.0
 
@@ -100,9 +108,9 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
     joint_mm = JOIN * solid.spacing_mm
     if solid.pattern == "monotonic":
-        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm, solid.reach_mm)
+        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm, solid.border_mm)
     else:
-        lines = anchor_lines(pieces, border, joint_mm, solid_mm=(solid.spacing_mm, solid.reach_mm))
+        lines = anchor_lines(pieces, border, joint_mm, solid_mm=solid.border_mm)
     return [line for line in lines if length_mm(line) > 0.5 * solid.width_mm]
 
 
@@ -119,16 +127,21 @@ def _even(spacing: float) -> Draw:
 
 
 def monotonic_lines(
-    pieces: Pieces, border: EdgeIndex, angle_deg: float, spacing_mm: float, most_mm: float, reach_mm: float
+    pieces: Pieces,
+    border: EdgeIndex,
+    angle_deg: float,
+    spacing_mm: float,
+    most_mm: float,
+    solid_mm: tuple[float, float] = OPEN,
 ) -> list[Floats]:
     """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart.
 
-    reach_mm: from the border to what bounds the area.
+    solid_mm: as anchor_lines.
     """
     if not len(pieces.ends):
         return []
     cell, before = _cells(pieces, angle_deg, spacing_mm)
-    lines, of = join_groups(pieces, border, cell, (most_mm, 0.0, 0.0), (spacing_mm, reach_mm))
+    lines, of = join_groups(pieces, border, cell, (most_mm, 0.0, 0.0), solid_mm)
     if len(lines) < 2:
         return lines
     by_cell: list[list[Floats]] = [[] for _ in before]
