@@ -329,7 +329,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
             # where infill beside it would be narrower than a cell it goes on to the walls
             area += union(strips_beside(area, region.sparse, widest_cell_mm(shells.fillings, process, layer)))
-            across = replace(lines, angle_deg=bridge.angle_deg)
+            across = replace(lines, angle_deg=bridge.angle_deg, seen=True)
             if process.thick_bridges:
                 beads += thread_beads(area, across, sqrt(process.bridge_flow) * shells.sections.profile.machine.head.nozzle_mm)
             else:
@@ -341,10 +341,12 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         if not area.is_empty():
             onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width  # so that lines end over the walls, not beside them
             held = area + (offset(area, onto_mm) - shell.walls.inside)
-            beads += bridge_beads(held, lines, process.infill_bridge_flow, over_infill=True)
+            above = replace(lines, seen=not (area ^ region.bare).is_empty())
+            beads += bridge_beads(held, above, process.infill_bridge_flow, over_infill=True)
             region = replace(_without(region, area, width), sparse=region.sparse)
     skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))
-    top = replace(skins, width_mm=process.top_skin_line_width_mm or width, pattern=process.top_skin_pattern)
+    skins = replace(skins, seen=layer == 0)
+    top = replace(skins, width_mm=process.top_skin_line_width_mm or width, pattern=process.top_skin_pattern, seen=True)
     bottom = replace(skins, pattern=process.bottom_skin_pattern)
     solid, under = region.solid, Polygons()
     if bottom != skins:

@@ -1,7 +1,9 @@
 """Lines: open lines over a box in a frame turned by an angle, clipped to an area, and joined along its border or to zigzags.
 
 Ends that follow each other on the border are joined by rising distance, unless that would close a ring or the distance
-is beyond a limit; an end left alone gets a short run along the border, towards the side with more room.
+is beyond a limit; an end left alone gets a short run along the border, towards the side with more room. Where a line of a
+solid fill meets the border aslant, a wedge stays open outside the sharp bend, between it and the next line: the joint reaches
+into it.
 """
 
 from collections.abc import Callable
@@ -21,7 +23,13 @@ Box = tuple[float, float, float, float]
 Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
 Draw = Callable[[Box], Lines]  # for a box x0 y0 x1 y1
 LinePattern = tuple[float, Draw]  # the angle of the frame, deg, in which it is drawn
+OPEN = (0.0, 0.0)  # for lines that do not fill an area
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
+WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: farther in it is too narrow for a bead
+LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a wedge that is smaller stays as it is
+CORNER = 0.75  # spacings that a path at least goes on into an open corner
+FLAT = 0.05  # sine of the angle between a line and the border: they hardly part
+BEND = 0.6  # spacings before the border at which a line turns into its wedge
 TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
 
 
@@ -68,33 +76,51 @@ def horizontal_lines(heights: Floats, box: Box) -> Lines:
 
 
 def anchor_lines(
-    pieces: Pieces, border: EdgeIndex, most_mm: float, hook_mm: float = 0.0, apart_mm: float = 0.0, group: Indices | None = None
+    pieces: Pieces,
+    border: EdgeIndex,
+    most_mm: float,
+    hook_mm: float = 0.0,
+    apart_mm: float = 0.0,
+    solid_mm: tuple[float, float] = OPEN,
 ) -> list[Floats]:
     """Pieces as long lines (n, 2): joined where ends are at most most_mm apart along the border, else with hooks.
 
-    hook_mm: length of a hook, less where it would not keep apart_mm from the next end or hook; group: (k,) only pieces of one
-    group are joined.
+    hook_mm: length of a hook, less where it would not keep apart_mm from the next end or hook; solid_mm: of straight pieces that
+    fill an area their distance, and how far inside the area they end.
     """
+    return join_groups(pieces, border, np.zeros(len(pieces.ends), np.int64), (most_mm, hook_mm, apart_mm), solid_mm)[0]
+
+
+def join_groups(
+    pieces: Pieces, border: EdgeIndex, group: Indices, limits_mm: tuple[float, float, float], solid_mm: tuple[float, float]
+) -> tuple[list[Floats], Indices]:
+    """Lines and the group of each; only pieces of one group (k,) are joined. limits_mm: the lengths that anchor_lines has."""
     if not len(pieces.ends):
-        return []
-    own = np.zeros(len(pieces.ends), np.int64) if group is None else group
-    out = np.empty((len(pieces.points) + 2 * len(border.edges) + 4 * len(pieces.ends) + 8, 2))
-    starts = np.empty(len(pieces.ends), np.int64)
-    n, count = _lay_lines(pieces, border, own, (most_mm, hook_mm, apart_mm), out, starts)
-    return np.split(out[:n].copy(), starts[1:count])
+        return [], group
+    out = np.empty((len(pieces.points) + 2 * len(border.edges) + 8 * len(pieces.ends) + 8, 2))
+    starts, of = np.empty((2, len(pieces.ends)), np.int64)
+    n, count = _lay_lines(pieces, border, group, limits_mm, solid_mm, (out, starts, of))
+    return np.split(out[:n].copy(), starts[1:count]), of[:count]
 
 
 @kernel
 def _lay_lines(
-    pieces: Pieces, border: EdgeIndex, group: Indices, limits_mm: tuple[float, float, float], out: Floats, starts: Indices
+    pieces: Pieces,
+    border: EdgeIndex,
+    group: Indices,
+    limits_mm: tuple[float, float, float],
+    solid_mm: tuple[float, float],
+    filled: tuple[Floats, Indices, Indices],
 ) -> tuple[int, int]:
-    """Fills in the lines and where each begins; returns the number of points and of lines. limits_mm: as anchor_lines."""
+    """Fills in the lines, where each begins and its group; returns the number of points and of lines."""
     most_mm, hook_mm, apart_mm = limits_mm
+    out, starts, of = filled
     way = _way(border.edges)
     along_border = _ways_along_border(pieces, border.edges, way)
     after, gap = _next_ends(along_border, pieces.ends, border, way)
     partner, sense = _join_ends(after, gap, group, most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, hook_mm, apart_mm))
+    wedges = _wedges(pieces, border.edges, sense, after, gap, solid_mm)
     done = flags(len(pieces.ends))
     n = count = 0
     for seed in range(len(pieces.ends)):
@@ -103,23 +129,43 @@ def _lay_lines(
         end = 2 * seed
         while partner[end] >= 0:
             end = partner[end] ^ 1
-        starts[count] = n
+        starts[count], of[count] = n, group[seed]
         count += 1
-        if runs[end] != 0.0:
-            since = (pieces.ends[end // 2, end % 2], along_border[end])
-            first, n = n, _append_run(out, n, since, runs[end], border, way)
+        since = (pieces.ends[end // 2, end % 2], along_border[end])
+        beyond = runs[end] if runs[end] != 0.0 else wedges[end] if abs(wedges[end]) > solid_mm[0] else 0.0
+        if beyond != 0.0:
+            first, n = n, _append_run(out, n, since, beyond, border, way)
             _reverse(out, first, n)
+        elif wedges[end] != 0.0:
+            n = _append_tip(out, n, since, wedges[end], border, way)
         while True:
             done[end // 2] = True
-            n = _append_piece(out, n, pieces, end)
+            first, n = n, _append_piece(out, n, pieces, end)
+            if beyond == 0.0:
+                _bend(out, first, first + 1, wedges[end], solid_mm[0])
             end ^= 1
-            if runs[end] != 0.0:
-                since = (pieces.ends[end // 2, end % 2], along_border[end])
-                n = _append_run(out, n, since, runs[end], border, way)
+            since = (pieces.ends[end // 2, end % 2], along_border[end])
             if partner[end] < 0:
+                beyond = runs[end] if runs[end] != 0.0 else wedges[end] if abs(wedges[end]) > solid_mm[0] else 0.0
+                if beyond != 0.0:
+                    n = _append_run(out, n, since, beyond, border, way)
+                elif wedges[end] != 0.0:
+                    _bend(out, n - 1, n - 2, wedges[end], solid_mm[0])
+                    n = _append_tip(out, n, since, wedges[end], border, way)
                 break
-            n -= 1  # the run's last point is the partner itself
-            end = partner[end]
+            if wedges[end] != 0.0:
+                meets = out[n - 1, 0], out[n - 1, 1]
+                _bend(out, n - 1, n - 2, wedges[end], solid_mm[0])
+                n = _append_tip(out, n, since, wedges[end], border, way)
+                out[n, 0], out[n, 1] = meets
+                n += 1
+            n = _append_run(out, n, since, runs[end], border, way)
+            end, beyond = partner[end], 0.0
+            if wedges[end] != 0.0:
+                since = (pieces.ends[end // 2, end % 2], along_border[end])
+                n = _append_tip(out, n, since, wedges[end], border, way)
+            else:
+                n -= 1  # the run's last point is the partner itself
     return n, count
 
 
@@ -225,6 +271,80 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
         if partner[here] >= 0:
             runs[here] = gap[here] if sense[here] > 0 else -gap[partner[here]]
     return runs
+
+
+@helper
+def _wedges(
+    pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, solid_mm: tuple[float, float]
+) -> Floats:
+    """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward.
+
+    Beads half a spacing to both sides of a line and round its end leave open so much of what bounds the area: its length up to
+    the next end, less what lies under them. That is wide at the sharp side of a line, and round a corner with room for a line
+    but without one.
+    """
+    spacing, deep = solid_mm
+    wedges, before, slants = floats(len(sense), 0.0), longs(len(sense), 0), floats(len(sense), 0.0)
+    if spacing <= 0.0:
+        return wedges
+    for here in range(len(after)):
+        before[after[here]] = here
+        slants[here] = _slant(pieces, edges, here)
+    round_mm = np.sqrt(max(0.25 * spacing * spacing - deep * deep, 0.0))
+    for here in range(len(sense)):
+        sine = np.sqrt(1.0 - slants[here] * slants[here])
+        if sine < FLAT:
+            continue
+        blunt_mm = (0.5 * spacing - deep * abs(slants[here])) / sine
+        sharp = -1 if slants[here] > 0.0 else 1
+        beside, free = (after[here], gap[here]) if sharp > 0 else (before[here], gap[before[here]])
+        faced = slants[beside] * sharp > 0.0 and sense[beside] != -sharp
+        left = 0.0
+        if sense[here] != sharp and _piece_mm(pieces, here) > 3.0 * BEND * spacing:
+            left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
+        round_corner, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
+        if sense[here] == 0 and round_corner == here ^ 1 and (here % 2 == 1 or sense[here ^ 1] != 0):
+            if WEDGE * (free - 2.0 * blunt_mm) > max(left, CORNER * spacing):
+                left, sharp = WEDGE * (free - 2.0 * blunt_mm), -sharp
+        wedges[here] = sharp * min(left, MOST_WEDGE * spacing) if left > LEAST_WEDGE * spacing else 0.0
+    return wedges
+
+
+@helper
+def _slant(pieces: Pieces, edges: Floats, end: int) -> float:
+    """Cosine of the angle between the border's way and a straight piece that begins at its end."""
+    k, side = end // 2, end % 2
+    first, last, e = pieces.starts[k], pieces.starts[k + 1] - 1, pieces.ends[k, side]
+    near, far = (last, first) if side else (first, last)
+    x, y = pieces.points[far, 0] - pieces.points[near, 0], pieces.points[far, 1] - pieces.points[near, 1]
+    u, v = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
+    size = np.hypot(x, y) * np.hypot(u, v)
+    return (x * u + y * v) / size if size > 0.0 else 1.0
+
+
+@helper
+def _piece_mm(pieces: Pieces, end: int) -> float:
+    """Length of the straight piece of an end."""
+    first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
+    return np.hypot(pieces.points[last, 0] - pieces.points[first, 0], pieces.points[last, 1] - pieces.points[first, 1])
+
+
+@no_nrt
+def _bend(out: Floats, end: int, before: int, wedge_mm: float, spacing_mm: float) -> None:
+    """Takes the end of a line back from the border where it turns into a wedge."""
+    if wedge_mm != 0.0:
+        step = out[before, 0] - out[end, 0], out[before, 1] - out[end, 1]
+        share = BEND * spacing_mm / np.hypot(step[0], step[1])
+        out[end, 0] += share * step[0]
+        out[end, 1] += share * step[1]
+
+
+@no_nrt
+def _append_tip(out: Floats, n: int, since: tuple[int, float], length: float, border: EdgeIndex, way: Floats) -> int:
+    """Appends only the last point of a run; returns the new n."""
+    last = _append_run(out, n, since, length, border, way) - 1
+    out[n, 0], out[n, 1] = out[last, 0], out[last, 1]
+    return n + 1
 
 
 @no_nrt

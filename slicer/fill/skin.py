@@ -16,20 +16,21 @@ from mdp.mesh import Floats, Indices
 from profiles.process import Process
 from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
-from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines
+from slicer.fill.lines import MARGIN_MM, OPEN, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines, join_groups
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons, islands, offset
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
-from slicer.walls.walls import gaps, uncovered_area
+from slicer.walls.walls import FEW, gaps, uncovered_area
 
 JOIN = 12.0  # spacings along the border: line ends nearer than this are joined
-EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
+EDGE = 0.27  # spacings that the outermost lines keep from the extreme points: in a corner a shorter line would be a mere dot
 RANK = 2  # behind gaps (slicer.walls.walls), before infill
 TOUCHING = 0.01  # of the spacing: neighbouring lines overlap by this at least, however little flow a skin asks for
 MOST_FLOW = 1.15  # only specks whose lines hardly fit ask for more
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
+FEW_HIDDEN = 1.0  # of the line width squared: a smaller place beside lines that nobody sees stays open
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
 
 
@@ -38,7 +39,8 @@ class SolidLines:
     """How an area is filled completely: direction, width and height of the lines, and how they meet what is around.
 
     overlap: their reach into the walls around, share of a line width. pattern: monotonic, every line on the same side of its
-    neighbour; rectilinear, in any order; or concentric, without a direction.
+    neighbour; rectilinear, in any order; or concentric, without a direction. seen: from above or below, so that lines reach into
+    what stays open beside them, and small places are filled, too.
     """
 
     angle_deg: float
@@ -46,11 +48,22 @@ class SolidLines:
     height_mm: float
     overlap: float = 0.0
     pattern: SkinPattern = "rectilinear"
+    seen: bool = False
 
     @property
     def spacing_mm(self) -> float:
         """Distance of neighbouring lines."""
         return spacing_mm(self.width_mm, self.height_mm)
+
+    @property
+    def reach_mm(self) -> float:
+        """How far inside the area the lines end."""
+        return 0.5 * self.spacing_mm - self.overlap * self.width_mm
+
+    @property
+    def border_mm(self) -> tuple[float, float]:
+        """The spacing and how far inside the area lines end that reach into what stays open beside them."""
+        return (self.spacing_mm, self.reach_mm) if self.seen else OPEN
 
 
 def lines_angle_deg(process: Process, layer: int) -> float:
@@ -85,8 +98,8 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
 
 def _filled(island: Polygons, solid: SolidLines) -> tuple[list[Floats], Polygons, float]:
     """The lines of a connected piece, the places that they leave, and the flow that fills the rest; 0 without lines."""
-    lines = _lines(offset(island, -(0.5 * solid.spacing_mm - solid.overlap * solid.width_mm)), solid)
-    rest = uncovered_area(island, lines, solid.width_mm)
+    lines = _lines(offset(island, -solid.reach_mm), solid)
+    rest = uncovered_area(island, lines, solid.width_mm, FEW if solid.seen else FEW_HIDDEN)
     total = sum(length_mm(line) for line in lines)
     return lines, rest, (island.area() - rest.area()) / (total * solid.spacing_mm) if lines else 0.0
 
@@ -101,9 +114,9 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
     joint_mm = JOIN * solid.spacing_mm
     if solid.pattern == "monotonic":
-        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm)
+        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm, solid.border_mm)
     else:
-        lines = anchor_lines(pieces, border, joint_mm)
+        lines = anchor_lines(pieces, border, joint_mm, solid_mm=solid.border_mm)
     return [line for line in lines if length_mm(line) > 0.5 * solid.width_mm]
 
 
@@ -119,18 +132,27 @@ def _even(spacing: float) -> Draw:
     return draw
 
 
-def monotonic_lines(pieces: Pieces, border: EdgeIndex, angle_deg: float, spacing_mm: float, most_mm: float) -> list[Floats]:
-    """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart."""
+def monotonic_lines(
+    pieces: Pieces,
+    border: EdgeIndex,
+    angle_deg: float,
+    spacing_mm: float,
+    most_mm: float,
+    solid_mm: tuple[float, float] = OPEN,
+) -> list[Floats]:
+    """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart.
+
+    solid_mm: as anchor_lines.
+    """
     if not len(pieces.ends):
         return []
     cell, before = _cells(pieces, angle_deg, spacing_mm)
-    lines = anchor_lines(pieces, border, most_mm, group=cell)
+    lines, of = join_groups(pieces, border, cell, (most_mm, 0.0, 0.0), solid_mm)
     if len(lines) < 2:
         return lines
-    piece = {(x, y): k // 2 for k, (x, y) in enumerate(pieces.points.tolist())}
     by_cell: list[list[Floats]] = [[] for _ in before]
-    for line in lines:
-        by_cell[cell[piece[line[0, 0], line[0, 1]]]].append(line)
+    for line, own in zip(lines, of.tolist(), strict=True):
+        by_cell[own].append(line)
     return _order_lines(by_cell, before, rotation_2d(angle_deg))
 
 

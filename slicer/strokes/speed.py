@@ -21,7 +21,7 @@ KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_m
 BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
-LEAST_GAIN_S = 0.1  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
+LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
 FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
 
 

@@ -28,6 +28,7 @@ Buffers = tuple[Floats, Indices, Indices, Mask]
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
 SHORTEST_HANGING = 2.0  # line widths: no stretch is split off for less, the speed would flicker
+SHORTEST_FURTHER = 6.0  # line widths: nor within what hangs, for hanging farther
 MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
 SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
 MOST_SPREAD_MM, LEAST_MM = 0.03, 0.045  # but for one where they change by that much, which is no shorter than this
@@ -248,7 +249,8 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
         if hanging.area() < shortest_mm * NOISE_MM:
             break
         kinds = HANGING if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
-        strokes, within = split(strokes, hanging, strokes.is_of(*kinds), shortest_mm)
+        further = shortest_mm if hanging is beyond else SHORTEST_FURTHER * width_mm
+        strokes, within = split(strokes, hanging, strokes.is_of(*kinds), further)
         kind, overhang = strokes.kind, np.where(within, sum(step >= share for step in STEPS), strokes.overhang)
         if share <= process.overhang_share:
             kind = np.where(within, NUMBER[Kind.OVERHANG], kind)

@@ -40,10 +40,8 @@ MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie be
 LEAST_TOP = 3.0  # line widths: narrower tops keep their walls, as in OrcaSlicer
 ROUNDS = 50  # beads round a place at most: as many as walls
 SHORTEST = 0.25  # of the line width: what is shorter is no bead
+FEW = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
 MOST_WIDER = 1.3  # times as wide as its place is a bead, at most, to make up for the tips of the place that it does not reach
-
-
-FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +179,11 @@ def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> 
     return beads
 
 
-def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> Polygons:
-    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it."""
-    few_mm2 = FEW_MM2 * width_mm**2
+def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float, few: float = FEW) -> Polygons:
+    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it.
+
+    few: of the width squared; smaller places are left out.
+    """
+    few_mm2 = few * width_mm**2
     rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
     return larger(opening(larger(rest, few_mm2), 0.5 * LEAST_GAP * width_mm), few_mm2)
