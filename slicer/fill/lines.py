@@ -274,9 +274,7 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
 
 
 @helper
-def _wedges(
-    pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, solid_mm: tuple[float, float]
-) -> Floats:
+def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, solid_mm: tuple[float, float]) -> Floats:
     """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward.
 
     Beads half a spacing to both sides of a line and round its end leave open so much of what bounds the area: its length up to
@@ -303,9 +301,10 @@ def _wedges(
         if sense[here] != sharp and _piece_mm(pieces, here) > 3.0 * BEND * spacing:
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
         round_corner, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
-        if sense[here] == 0 and round_corner == here ^ 1 and (here % 2 == 1 or sense[here ^ 1] != 0):
-            if WEDGE * (free - 2.0 * blunt_mm) > max(left, CORNER * spacing):
-                left, sharp = WEDGE * (free - 2.0 * blunt_mm), -sharp
+        wedge_mm = WEDGE * (free - 2.0 * blunt_mm)
+        alone = sense[here] == 0 and round_corner == here ^ 1 and (here % 2 == 1 or sense[here ^ 1] != 0)
+        if alone and wedge_mm > max(left, CORNER * spacing):
+            left, sharp = wedge_mm, -sharp
         wedges[here] = sharp * min(left, MOST_WEDGE * spacing) if left > LEAST_WEDGE * spacing else 0.0
     return wedges
 
@@ -326,7 +325,7 @@ def _slant(pieces: Pieces, edges: Floats, end: int) -> float:
 def _piece_mm(pieces: Pieces, end: int) -> float:
     """Length of the straight piece of an end."""
     first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
-    return np.hypot(pieces.points[last, 0] - pieces.points[first, 0], pieces.points[last, 1] - pieces.points[first, 1])
+    return float(np.hypot(pieces.points[last, 0] - pieces.points[first, 0], pieces.points[last, 1] - pieces.points[first, 1]))
 
 
 @no_nrt

@@ -16,7 +16,18 @@ from mdp.mesh import Floats, Indices
 from profiles.process import Process
 from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
-from slicer.fill.lines import MARGIN_MM, OPEN, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines, join_groups
+from slicer.fill.lines import (
+    MARGIN_MM,
+    OPEN,
+    Box,
+    Draw,
+    Lines,
+    anchor_lines,
+    clip_pattern,
+    concentric_lines,
+    horizontal_lines,
+    join_groups,
+)
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons, islands, offset

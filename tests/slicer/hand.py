@@ -24,7 +24,7 @@ from slicer.sectioning import Sections
 from slicer.strokes.strokes import Strokes
 from tests.shapes import from_manifold
 
-BARE = ("process.skirt_loops=0", "process.small_base_brim_mm=0", "process.support=none")
+BARE = ("process.skirt_loops=0", "process.small_base_brim_mm=0", "process.support=none", "process.elephant_foot_mm=0")
 SOLID = (*BARE, "process.infill_density=1")
 
 

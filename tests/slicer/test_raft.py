@@ -86,7 +86,7 @@ def test_the_first_layer_on_a_raft_is_neither_squeezed_nor_widened_nor_hotter() 
     assert max(np.abs(path.points).max() for path in first.paths) == pytest.approx(10 - 0.225)
     assert first.nozzle_add_c == 0.0
     assert set(first.speed_mm_s.tolist()) == {30.0}
-    plain = slice_part(whole(box(20, 20, 2)), profile(*BARE, "process.elephant_foot_mm=0")).layers[0]
+    plain = slice_part(whole(box(20, 20, 2)), profile(*BARE)).layers[0]
     assert first.volumes_mm3.sum() == pytest.approx(plain.volumes_mm3.sum(), rel=1e-3)
 
 

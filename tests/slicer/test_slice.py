@@ -126,14 +126,14 @@ def test_material_flow_multiplies_all_plastic() -> None:
 
 
 def test_the_skirt_runs_once_around_the_first_layer_only() -> None:
-    sliced = slice_part(whole(box(10, 10, 2)), profile())
+    sliced = slice_part(whole(box(10, 10, 2)), profile("process.elephant_foot_mm=0"))
     (skirt,) = of_kind(sliced, Kind.SKIRT)
     assert sliced.layers[0].paths[0].kind is Kind.SKIRT
     assert np.abs(skirt.points).max() == pytest.approx(5 + 4 + 0.225)
 
 
 def test_a_brim_replaces_the_skirt_and_touches_the_part() -> None:
-    sliced = slice_part(whole(box(10, 10, 2)), profile("process.brim_mm=4"))
+    sliced = slice_part(whole(box(10, 10, 2)), profile("process.brim_mm=4", "process.elephant_foot_mm=0"))
     sides = sorted(np.abs(p.points).max() for p in of_kind(sliced, Kind.SKIRT))
     spacing = 0.45 - 0.2 * (1 - np.pi / 4)
     assert sides == pytest.approx([5 + (k + 0.5) * spacing for k in range(10)])

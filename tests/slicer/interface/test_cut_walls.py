@@ -20,7 +20,7 @@ from tests.slicer.hand import BARE, cut, of_kind, profile
 
 SIDE, HEIGHT = 24.0, 30.0
 STRAIGHT, TILTED, STEEP = (0.0, 0.0, 1.0), (0.0, 0.5, 0.8), (0.9, 0.1, 0.3)
-PLAIN = (*BARE, "process.elephant_foot_mm=0", "process.interface_walls=1", "process.interface_top_layers=2")
+PLAIN = (*BARE, "process.interface_walls=1", "process.interface_top_layers=2")
 # Three walls of 0.45 mm stand 1.24 mm deep, four layers lie 0.8 mm deep: on a slope where both are as near, they leave less.
 SHELL_MM = 0.6
 
@@ -88,7 +88,8 @@ def test_all_of_a_layer_is_covered_by_beads_but_for_the_infill(shape: str, norma
                 covered = covered + strips([path.points], 0.5 * path.width_mm)
             section = layers.sections.own[at]
             bare = section - covered - layers.layers[at].region.sparse
-            assert offset(bare, -0.12).area() < 0.002 * section.area()
+            # a stroke of skin beside a line of infill that would lie on nothing is left out
+            assert offset(bare, -0.12).area() < 0.0025 * section.area()
 
 
 @pytest.mark.parametrize(("shape", "normal"), CASES)

@@ -16,7 +16,7 @@ from tests.shapes import standing
 from tests.slicer.hand import BARE, cut, profile, whole
 from tests.slicer.strokes.test_seam import distance_mm, outer_seams
 
-SETTINGS = profile(*BARE, "process.elephant_foot_mm=0")
+SETTINGS = profile(*BARE)
 NO_EDGES = np.zeros((0, 6))
 GROOVED = m3.Manifold.cube((20, 20, 16), True) - m3.Manifold.cube((6, 4, 16), True).translate((10, 0, 0))
 

@@ -223,7 +223,7 @@ def test_a_comb_gets_its_volume_within_its_walls_the_same_every_time() -> None:
     comb = m3.Manifold.cube((25, 3, 2))
     for k in range(10):
         comb += m3.Manifold.cube((0.3 + 0.1 * k, 8, 2)).translate((1 + 2.3 * k, 2.5, 0))
-    part, chosen = whole(from_manifold(comb)), profile(*SOLID, "process.elephant_foot_mm=0")
+    part, chosen = whole(from_manifold(comb)), profile(*SOLID)
     sliced = slice_part(part, chosen)
     assert volume_mm3(sliced, *Kind) == pytest.approx(comb.volume(), rel=0.02)
     assert volume_mm3(sliced, Kind.GAP) < 0.01 * comb.volume()
