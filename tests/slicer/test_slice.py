@@ -144,7 +144,7 @@ def test_a_part_lower_than_a_layer_is_printed_as_one() -> None:
     sliced = slice_part(whole(box(10, 10, 0.12)), profile(*SOLID))
     assert [layer.z_mm for layer in sliced.layers] == pytest.approx([0.12])
     assert [layer.height_mm for layer in sliced.layers] == pytest.approx([0.12])
-    assert sliced.volume_mm3 == pytest.approx(12.0, rel=0.02)
+    assert sliced.volume_mm3 == pytest.approx(12.0, rel=0.035)  # lines that reach into the corners of a skin overlap there
 
 
 @pytest.mark.parametrize("walls", [0, 1, 50])
