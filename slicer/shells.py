@@ -358,7 +358,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
             # where infill beside it would be narrower than a cell it goes on to the walls
             area += union(strips_beside(area, region.sparse, widest_cell_mm(shells.fillings, process, layer)))
-            across = replace(lines, angle_deg=bridge.angle_deg, seen=True)
+            across = replace(lines, angle_deg=bridge.angle_deg)
             if process.thick_bridges:
                 beads += thread_beads(area, across, sqrt(process.bridge_flow) * shells.sections.profile.machine.head.nozzle_mm)
             else:

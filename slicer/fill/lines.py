@@ -97,7 +97,7 @@ def join_groups(
     """Lines and the group of each; only pieces of one group (k,) are joined. limits_mm: the lengths that anchor_lines has."""
     if not len(pieces.ends):
         return [], group
-    out = np.empty((len(pieces.points) + 2 * len(border.edges) + 8 * len(pieces.ends) + 8, 2))
+    out = np.empty((len(pieces.points) + 3 * len(border.edges) + 8 * len(pieces.ends) + 8, 2))
     starts, of = np.empty((2, len(pieces.ends)), np.int64)
     n, count = _lay_lines(pieces, border, group, limits_mm, solid_mm, (out, starts, of))
     return np.split(out[:n].copy(), starts[1:count]), of[:count]
@@ -121,6 +121,7 @@ def _lay_lines(
     partner, sense = _join_ends(after, gap, group, most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, hook_mm, apart_mm))
     wedges = _wedges(pieces, border.edges, sense, after, gap, solid_mm)
+    _follow_border(wedges, runs, partner, solid_mm[0])
     done = flags(len(pieces.ends))
     n = count = 0
     for seed in range(len(pieces.ends)):
@@ -132,35 +133,29 @@ def _lay_lines(
         starts[count], of[count] = n, group[seed]
         count += 1
         since = (pieces.ends[end // 2, end % 2], along_border[end])
-        beyond = runs[end] if runs[end] != 0.0 else wedges[end] if abs(wedges[end]) > solid_mm[0] else 0.0
-        if beyond != 0.0:
-            first, n = n, _append_run(out, n, since, beyond, border, way)
+        if runs[end] != 0.0:
+            first, n = n, _append_run(out, n, since, runs[end], border, way)
             _reverse(out, first, n)
         elif wedges[end] != 0.0:
             n = _append_tip(out, n, since, wedges[end], border, way)
         while True:
             done[end // 2] = True
             first, n = n, _append_piece(out, n, pieces, end)
-            if beyond == 0.0:
-                _bend(out, first, first + 1, wedges[end], solid_mm[0])
+            _bend(out, first, first + 1, wedges[end], solid_mm[0])
             end ^= 1
             since = (pieces.ends[end // 2, end % 2], along_border[end])
-            if partner[end] < 0:
-                beyond = runs[end] if runs[end] != 0.0 else wedges[end] if abs(wedges[end]) > solid_mm[0] else 0.0
-                if beyond != 0.0:
-                    n = _append_run(out, n, since, beyond, border, way)
-                elif wedges[end] != 0.0:
-                    _bend(out, n - 1, n - 2, wedges[end], solid_mm[0])
-                    n = _append_tip(out, n, since, wedges[end], border, way)
-                break
             if wedges[end] != 0.0:
                 meets = out[n - 1, 0], out[n - 1, 1]
                 _bend(out, n - 1, n - 2, wedges[end], solid_mm[0])
                 n = _append_tip(out, n, since, wedges[end], border, way)
-                out[n, 0], out[n, 1] = meets
-                n += 1
-            n = _append_run(out, n, since, runs[end], border, way)
-            end, beyond = partner[end], 0.0
+                if partner[end] >= 0:
+                    out[n, 0], out[n, 1] = meets
+                    n += 1
+            if runs[end] != 0.0:
+                n = _append_run(out, n, since, runs[end], border, way)
+            if partner[end] < 0:
+                break
+            end = partner[end]
             if wedges[end] != 0.0:
                 since = (pieces.ends[end // 2, end % 2], along_border[end])
                 n = _append_tip(out, n, since, wedges[end], border, way)
@@ -274,9 +269,7 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
 
 
 @helper
-def _wedges(
-    pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, solid_mm: tuple[float, float]
-) -> Floats:
+def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, solid_mm: tuple[float, float]) -> Floats:
     """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward.
 
     Beads half a spacing to both sides of a line and round its end leave open so much of what bounds the area: its length up to
@@ -302,12 +295,20 @@ def _wedges(
         left = 0.0
         if sense[here] != sharp and _piece_mm(pieces, here) > 3.0 * BEND * spacing:
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
-        round_corner, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
-        if sense[here] == 0 and round_corner == here ^ 1 and (here % 2 == 1 or sense[here ^ 1] != 0):
-            if WEDGE * (free - 2.0 * blunt_mm) > max(left, CORNER * spacing):
-                left, sharp = WEDGE * (free - 2.0 * blunt_mm), -sharp
+        beyond, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
+        beyond_mm, alone = WEDGE * (free - 2.0 * blunt_mm), here % 2 == 1 or sense[here ^ 1] != 0
+        if sense[here] == 0 and beyond == here ^ 1 and alone and beyond_mm > max(left, CORNER * spacing):
+            left, sharp = beyond_mm, -sharp
         wedges[here] = sharp * min(left, MOST_WEDGE * spacing) if left > LEAST_WEDGE * spacing else 0.0
     return wedges
+
+
+@helper
+def _follow_border(wedges: Floats, runs: Floats, partner: Indices, spacing_mm: float) -> None:
+    """Makes runs along the border of the wedges longer than a spacing at ends that are left alone."""
+    for end in range(len(wedges)):
+        if partner[end] < 0 and abs(wedges[end]) > spacing_mm:
+            runs[end], wedges[end] = wedges[end], 0.0
 
 
 @helper
@@ -319,14 +320,14 @@ def _slant(pieces: Pieces, edges: Floats, end: int) -> float:
     x, y = pieces.points[far, 0] - pieces.points[near, 0], pieces.points[far, 1] - pieces.points[near, 1]
     u, v = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
     size = np.hypot(x, y) * np.hypot(u, v)
-    return (x * u + y * v) / size if size > 0.0 else 1.0
+    return float((x * u + y * v) / size) if size > 0.0 else 1.0
 
 
 @helper
 def _piece_mm(pieces: Pieces, end: int) -> float:
     """Length of the straight piece of an end."""
     first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
-    return np.hypot(pieces.points[last, 0] - pieces.points[first, 0], pieces.points[last, 1] - pieces.points[first, 1])
+    return float(np.hypot(pieces.points[last, 0] - pieces.points[first, 0], pieces.points[last, 1] - pieces.points[first, 1]))
 
 
 @no_nrt

@@ -15,7 +15,18 @@ import numpy as np
 from mdp.mesh import Floats, Indices
 from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
-from slicer.fill.lines import MARGIN_MM, OPEN, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines, join_groups
+from slicer.fill.lines import (
+    MARGIN_MM,
+    OPEN,
+    Box,
+    Draw,
+    Lines,
+    anchor_lines,
+    clip_pattern,
+    concentric_lines,
+    horizontal_lines,
+    join_groups,
+)
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons, islands, offset
@@ -24,7 +35,8 @@ from slicer.paths import Kind
 from slicer.walls.walls import FEW, gaps, uncovered_area
 
 JOIN = 12.0  # spacings along the border: line ends nearer than this are joined
-EDGE = 0.27  # spacings that the outermost lines keep from the extreme points: in a corner a shorter line would be a mere dot
+EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
+TIP = 0.27  # and from a corner, where it would be a mere dot
 RANK = 2  # behind gaps (slicer.walls.walls), before infill
 TOUCHING = 0.01  # of the spacing: neighbouring lines overlap by this at least, however little flow a skin asks for
 MOST_FLOW = 1.15  # only specks whose lines hardly fit ask for more
@@ -105,7 +117,10 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     if solid.pattern == "concentric":
         return concentric_lines(inner, solid.spacing_mm)
     border = index_edges(inner)
-    pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm))
+    pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm, (EDGE, EDGE)))
+    edges = _edges(pieces, solid)
+    if max(edges) > EDGE:
+        pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm, edges))
     joint_mm = JOIN * solid.spacing_mm
     if solid.pattern == "monotonic":
         lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm, solid.border_mm)
@@ -114,13 +129,24 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
     return [line for line in lines if length_mm(line) > 0.5 * solid.width_mm]
 
 
-def _even(spacing: float) -> Draw:
-    """Lines spread evenly over the whole extent, at most a spacing apart."""
+def _edges(pieces: Pieces, solid: SolidLines) -> tuple[float, float]:
+    """Spacings that the lowest and the highest line should keep from the extreme points: more where they are dots in a corner."""
+    if not len(pieces.ends):
+        return EDGE, EDGE
+    ends = pieces.points.reshape(-1, 2, 2) @ rotation_2d(solid.angle_deg)
+    long, height = np.abs(ends[:, 1, 0] - ends[:, 0, 0]), ends[:, 0, 1]
+    rows = height < height.min() + LEVEL * solid.spacing_mm, height > height.max() - LEVEL * solid.spacing_mm
+    low, high = (TIP if long[row].max() < 0.5 * solid.width_mm else EDGE for row in rows)
+    return low, high
+
+
+def _even(spacing: float, edges: tuple[float, float]) -> Draw:
+    """Lines spread evenly over the whole extent, at most a spacing apart; edges: spacings from its ends."""
 
     def draw(box: Box) -> Lines:
-        low, high, edge = box[1] + MARGIN_MM, box[3] - MARGIN_MM, EDGE * spacing
-        between = ceil((high - low - 2.0 * edge) / spacing - 0.01)
-        ends = (low + edge, high - edge) if between > 0 else (0.5 * (low + high),) * 2
+        low, high = box[1] + MARGIN_MM + edges[0] * spacing, box[3] - MARGIN_MM - edges[1] * spacing
+        between = ceil((high - low) / spacing - 0.01)
+        ends = (low, high) if between > 0 else (0.5 * (low + high),) * 2
         return horizontal_lines(np.linspace(*ends, max(between, 0) + 1, dtype=np.float64), box)
 
     return draw

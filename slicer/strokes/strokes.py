@@ -28,7 +28,7 @@ Buffers = tuple[Floats, Indices, Indices, Mask]
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
 SHORTEST_HANGING = 2.0  # line widths: no stretch is split off for less, the speed would flicker
-SHORTEST_FURTHER = 6.0  # line widths: nor within what hangs, for hanging farther
+SHORTEST_FARTHER = 6.0  # line widths: nor within what hangs for less, because it hangs farther
 MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
 SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
 MOST_SPREAD_MM, LEAST_MM = 0.03, 0.045  # but for one where they change by that much, which is no shorter than this
@@ -150,16 +150,16 @@ def _widths_at(places: Floats, course: Floats) -> Floats:
     return out
 
 
-def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float) -> tuple[Strokes, Mask]:
+def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float, within_mm: float = 0.0) -> tuple[Strokes, Mask]:
     """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area.
 
-    No piece is shorter than shortest_mm.
+    No piece is shorter than shortest_mm, none within the area between two outside shorter than within_mm.
     """
     index = index_edges(area)
     count, room = -1, 2 * len(strokes.points) + 64
     while count < 0:
         out = np.empty((room, 3)), np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.bool_)
-        count = _split(strokes.points, strokes.starts, wanted, index, shortest_mm, out)
+        count = _split(strokes.points, strokes.starts, wanted, index, (shortest_mm, max(shortest_mm, within_mm)), out)
         room *= 4
     points, starts, source, within = out
     pieces = strokes.refined(points[: starts[count]].copy(), starts[: count + 1].copy(), source[:count])
@@ -168,7 +168,7 @@ def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float) ->
 
 
 @kernel
-def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, shortest_mm: float, out: Buffers) -> int:
+def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, shortest_mm: tuple[float, float], out: Buffers) -> int:
     """Fills in the pieces and returns how many there are, -1 where there is no room for them.
 
     out: points (n, 3), (k + 1,) where each piece begins, (k,) the stroke of each and whether it lies within the area.
@@ -212,10 +212,11 @@ def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, short
 
 
 @helper
-def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None:
+def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, float]) -> None:
     """Runs of steps shorter than that take after their neighbours, those within last so that none is overlooked for a gap.
 
-    points: of which `size` count; within: of as many steps less one. A line that is a single run has no neighbours.
+    shortest_mm: of runs outside and within; points: of which `size` count; within: of as many steps less one. A line that is a
+    single run has no neighbours.
     """
     for inner in range(2):
         a = 0
@@ -226,7 +227,7 @@ def _steady(points: Floats, within: Mask, size: int, shortest_mm: float) -> None
                 b += 1
             if a == 0 and b == size - 1:
                 return
-            if within[a] == (inner > 0) and length_mm < shortest_mm:
+            if within[a] == (inner > 0) and length_mm < shortest_mm[inner]:
                 for step in range(a, b):
                     within[step] = inner == 0
             a = b
@@ -249,8 +250,8 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
         if hanging.area() < shortest_mm * NOISE_MM:
             break
         kinds = HANGING if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
-        further = shortest_mm if hanging is beyond else SHORTEST_FURTHER * width_mm
-        strokes, within = split(strokes, hanging, strokes.is_of(*kinds), further)
+        within_mm = 0.0 if hanging is beyond else SHORTEST_FARTHER * width_mm
+        strokes, within = split(strokes, hanging, strokes.is_of(*kinds), shortest_mm, within_mm)
         kind, overhang = strokes.kind, np.where(within, sum(step >= share for step in STEPS), strokes.overhang)
         if share <= process.overhang_share:
             kind = np.where(within, NUMBER[Kind.OVERHANG], kind)

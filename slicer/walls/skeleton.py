@@ -421,13 +421,15 @@ def _roots(across: Ints, skeleton: Skeleton) -> Indices:
             if across[h] >= 0 and root[beyond] >= 0 and (root[t] == t or radii[beyond] > falling[t]):
                 root[t], falling[t] = root[beyond], radii[beyond]
     for t in range(len(radii)):
-        if root[t] != t or _on_axis(skeleton, t):
+        first = root[t]
+        if _on_axis(skeleton, first) or radii[t] < radii[first] - SAME_MM:
             continue
         for h in range(3 * t, 3 * t + 3):  # of nodes as good as equal one comes first, and need not be the one that leads up
             beyond = across[h] // 3
-            alike = radii[beyond] > radii[t] - SAME_MM or (_on_axis(skeleton, beyond) and radii[t] < ALIKE * radii[beyond])
-            if across[h] >= 0 and root[beyond] != t and alike:
-                hop[t] = root[beyond]
+            if across[h] < 0 or root[beyond] == first or (hop[first] >= 0 and not _on_axis(skeleton, root[beyond])):
+                continue
+            if radii[beyond] > radii[t] - SAME_MM or (_on_axis(skeleton, beyond) and radii[t] < ALIKE * radii[beyond]):
+                hop[first] = root[beyond]
     for t in range(len(radii)):
         for _ in range(MOST_HOPS):
             if hop[root[t]] >= 0:

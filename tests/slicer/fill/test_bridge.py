@@ -182,7 +182,7 @@ def test_the_first_skin_over_sparse_infill_is_a_bridge_with_speed_fan_and_flow_o
     assert layer == 20 - 4
     assert {(path.speed_mm_s, path.fan) for path in paths} == {(33.0, 0.8)}
     assert max(path.flow for path in paths) == pytest.approx(1.1, abs=0.05)
-    assert sum(path.length_mm for path in paths) * 0.407 == pytest.approx((24 - 2 * 1.24) ** 2, rel=0.05)
+    assert 1.0 < sum(path.length_mm for path in paths) * 0.407 / (24 - 2 * 1.24) ** 2 < 1.06  # the joints lie beside the lines
 
 
 def test_bridges_over_sparse_lines_run_across_them() -> None:

@@ -10,10 +10,12 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.fill.skin import SolidLines, skin_beads
+from profiles.settings.shell import SkinPattern
+from slicer.fill.skin import FEW_HIDDEN, SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, offset
 from slicer.paths import Kind
 from slicer.slice import slice_part
+from slicer.walls.walls import uncovered_area
 from tests.shapes import box
 from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, ring, square, strip
 from tests.slicer.hand import SOLID, as_shapely, distances_mm, profile, whole
@@ -35,6 +37,36 @@ def test_a_skin_covers_its_area_everywhere() -> None:
         for b in skin_beads(ring(), Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, OVERLAP))
     ]
     assert as_shapely(ring()).difference(shapely.union_all(lines)).area < 0.01 * ring().area()
+
+
+def open_mm2(area: Polygons, solid: SolidLines) -> float:
+    """What neither the lines of a skin nor the walls around it, which reach half a gap over its border, lie on."""
+    lines = [shapely.LineString(b.points).buffer(b.width_mm / 2) for b in skin_beads(area, Kind.TOP_SKIN, solid)]
+    return float(as_shapely(area).buffer(0.5 * (solid.spacing_mm - WIDTH)).difference(shapely.union_all(lines)).area)
+
+
+@pytest.mark.parametrize("pattern", ["monotonic", "rectilinear"])
+@pytest.mark.parametrize("angle", [30.0, 45.0, 60.0])
+def test_skins_that_are_seen_leave_less_than_half_as_much_open_beside_the_walls(angle: float, pattern: SkinPattern) -> None:
+    slot = Polygons.square((40.0, 4.0))
+    seen, hidden = (open_mm2(slot, SolidLines(angle, WIDTH, HEIGHT, OVERLAP, pattern, seen)) for seen in (True, False))
+    assert 0.0 < seen < 0.5 * hidden
+    assert skin_beads(slot, Kind.TOP_SKIN, SolidLines(90.0, WIDTH, HEIGHT, OVERLAP, pattern, True))  # nothing open to reach into
+
+
+def test_no_line_is_a_dot_in_a_corner() -> None:
+    (bead,) = skin_beads(Polygons.square((12.0, 12.0)), Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, OVERLAP))
+    assert np.hypot(*np.diff(bead.points, axis=0).T).min() > 0.2
+
+
+def test_specks_beside_lines_are_filled_where_they_are_seen_only() -> None:
+    speck = Polygons.square((0.4 * WIDTH, 2.0 * WIDTH))  # 0.8 of the width squared
+    area, line = (
+        Polygons.square((10.0, WIDTH)) + speck.translate((4.0, WIDTH)),
+        np.array([[0.0, 0.5 * WIDTH], [10.0, 0.5 * WIDTH]]),
+    )
+    assert uncovered_area(area, [line], WIDTH).area() == pytest.approx(0.8 * WIDTH**2, rel=0.05)
+    assert uncovered_area(area, [line], WIDTH, FEW_HIDDEN).is_empty()
 
 
 @pytest.mark.parametrize("area", [square, ring, strip])

@@ -98,8 +98,8 @@ def test_support_is_accelerated_as_infill_and_overhanging_walls_as_bridges() -> 
 
 
 def test_a_short_stretch_between_slower_ones_is_no_faster_than_the_faster_of_them() -> None:
-    assert steady(np.array([30.0, 60.0, 40.0]), np.array([9.0, 5.0, 9.0])).tolist() == [30.0, 40.0, 40.0]
-    assert steady(np.array([30.0, 60.0, 40.0]), np.array([9.0, 50.0, 9.0])).tolist() == [30.0, 60.0, 40.0]
+    assert steady(np.array([30.0, 60.0, 40.0]), np.array([90.0, 5.0, 90.0])).tolist() == [30.0, 40.0, 40.0]
+    assert steady(np.array([30.0, 60.0, 40.0]), np.array([90.0, 50.0, 90.0])).tolist() == [30.0, 60.0, 40.0]
 
 
 @given(st.lists(st.tuples(st.sampled_from([15.0, 25.0, 40.0, 60.0, 80.0]), st.floats(0.05, 60.0)), min_size=1, max_size=40))

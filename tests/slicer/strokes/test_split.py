@@ -64,6 +64,13 @@ def test_the_pieces_of_a_line_are_the_line_and_none_is_shorter_than_allowed(seed
     assert [(piece.retract, len(piece.approach)) for piece in pieces] == [(True, 1)] + [(False, 0)] * (len(pieces) - 1)
 
 
+@pytest.mark.parametrize(("reach_mm", "lengths_mm"), [(1.5, [20.0]), (2.5, [10.0, 2.5, 7.5])])
+def test_a_line_is_not_parted_for_less_than_asked_for_within(reach_mm: float, lengths_mm: list[float]) -> None:
+    area, line = Polygons.square((reach_mm, 2.0)).translate((10.0, -1.0)), placed(np.array([[0.0, 0.0], [20.0, 0.0]]))
+    pieces, _ = split(line, area, line.is_of(Kind.OUTER_WALL), 1.0, 2.0)
+    assert [length_mm(piece.points) for piece in rows_of(pieces)] == pytest.approx(lengths_mm)
+
+
 @settings(max_examples=40)
 @given(seeds)
 def test_every_step_of_a_cut_line_lies_within_or_without_as_its_middle_does(seed: int) -> None:

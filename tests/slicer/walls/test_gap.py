@@ -7,7 +7,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import Bead
@@ -63,6 +63,7 @@ def test_what_is_narrower_than_the_least_gap_stays_empty() -> None:
 
 
 @settings(max_examples=25, deadline=None)
+@example(3.0, 0.5, 0.5, 0.0)  # all middles of the triangles at an end fall together
 @given(st.floats(3.0, 15.0), st.floats(0.15, 0.55), st.floats(0.15, 0.55), st.floats(0.0, 180.0))
 def test_the_line_in_a_wedge_runs_in_its_middle_and_is_as_wide_as_it(
     length: float, start: float, end: float, turn: float
