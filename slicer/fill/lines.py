@@ -27,7 +27,6 @@ OPEN = (0.0, 0.0)  # for lines that do not fill an area
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
 WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: farther in it is too narrow for a bead
 LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a wedge that is smaller stays as it is
-CORNER = 0.75  # spacings that a path at least goes on into an open corner
 FLAT = 0.05  # sine of the angle between a line and the border: they hardly part
 BEND = 0.6  # spacings before the border at which a line turns into its wedge
 TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
@@ -285,7 +284,7 @@ def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: 
         slants[here] = _slant(pieces, edges, here)
     round_mm = np.sqrt(max(0.25 * spacing * spacing - deep * deep, 0.0))
     for here in range(len(sense)):
-        sine = np.sqrt(1.0 - slants[here] * slants[here])
+        sine = np.sqrt(max(1.0 - slants[here] * slants[here], 0.0))
         if sine < FLAT:
             continue
         blunt_mm = (0.5 * spacing - deep * abs(slants[here])) / sine
@@ -297,7 +296,7 @@ def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: 
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
         beyond, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
         beyond_mm, alone = WEDGE * (free - 2.0 * blunt_mm), here % 2 == 1 or sense[here ^ 1] != 0
-        if sense[here] == 0 and beyond == here ^ 1 and alone and beyond_mm > max(left, CORNER * spacing):
+        if sense[here] == 0 and beyond == here ^ 1 and alone and beyond_mm > max(left, spacing):
             left, sharp = beyond_mm, -sharp
         wedges[here] = sharp * min(left, MOST_WEDGE * spacing) if left > LEAST_WEDGE * spacing else 0.0
     return wedges
