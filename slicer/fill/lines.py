@@ -27,7 +27,6 @@ OPEN = (0.0, 0.0)  # for lines that do not fill an area
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
 WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: farther in it is too narrow for a bead
 LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a wedge that is smaller stays as it is
-CORNER = 0.75  # spacings that a path at least goes on into an open corner
 FLAT = 0.05  # sine of the angle between a line and the border: they hardly part
 BEND = 0.6  # spacings before the border at which a line turns into its wedge
 TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
@@ -97,7 +96,7 @@ def join_groups(
     """Lines and the group of each; only pieces of one group (k,) are joined. limits_mm: the lengths that anchor_lines has."""
     if not len(pieces.ends):
         return [], group
-    out = np.empty((len(pieces.points) + 2 * len(border.edges) + 8 * len(pieces.ends) + 8, 2))
+    out = np.empty((len(pieces.points) + 3 * len(border.edges) + 8 * len(pieces.ends) + 8, 2))
     starts, of = np.empty((2, len(pieces.ends)), np.int64)
     n, count = _lay_lines(pieces, border, group, limits_mm, solid_mm, (out, starts, of))
     return np.split(out[:n].copy(), starts[1:count]), of[:count]
@@ -121,6 +120,7 @@ def _lay_lines(
     partner, sense = _join_ends(after, gap, group, most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, hook_mm, apart_mm))
     wedges = _wedges(pieces, border.edges, sense, after, gap, solid_mm)
+    _follow_border(wedges, runs, partner, solid_mm[0])
     done = flags(len(pieces.ends))
     n = count = 0
     for seed in range(len(pieces.ends)):
@@ -132,35 +132,29 @@ def _lay_lines(
         starts[count], of[count] = n, group[seed]
         count += 1
         since = (pieces.ends[end // 2, end % 2], along_border[end])
-        beyond = runs[end] if runs[end] != 0.0 else wedges[end] if abs(wedges[end]) > solid_mm[0] else 0.0
-        if beyond != 0.0:
-            first, n = n, _append_run(out, n, since, beyond, border, way)
+        if runs[end] != 0.0:
+            first, n = n, _append_run(out, n, since, runs[end], border, way)
             _reverse(out, first, n)
         elif wedges[end] != 0.0:
             n = _append_tip(out, n, since, wedges[end], border, way)
         while True:
             done[end // 2] = True
             first, n = n, _append_piece(out, n, pieces, end)
-            if beyond == 0.0:
-                _bend(out, first, first + 1, wedges[end], solid_mm[0])
+            _bend(out, first, first + 1, wedges[end], solid_mm[0])
             end ^= 1
             since = (pieces.ends[end // 2, end % 2], along_border[end])
-            if partner[end] < 0:
-                beyond = runs[end] if runs[end] != 0.0 else wedges[end] if abs(wedges[end]) > solid_mm[0] else 0.0
-                if beyond != 0.0:
-                    n = _append_run(out, n, since, beyond, border, way)
-                elif wedges[end] != 0.0:
-                    _bend(out, n - 1, n - 2, wedges[end], solid_mm[0])
-                    n = _append_tip(out, n, since, wedges[end], border, way)
-                break
             if wedges[end] != 0.0:
                 meets = out[n - 1, 0], out[n - 1, 1]
                 _bend(out, n - 1, n - 2, wedges[end], solid_mm[0])
                 n = _append_tip(out, n, since, wedges[end], border, way)
-                out[n, 0], out[n, 1] = meets
-                n += 1
-            n = _append_run(out, n, since, runs[end], border, way)
-            end, beyond = partner[end], 0.0
+                if partner[end] >= 0:
+                    out[n, 0], out[n, 1] = meets
+                    n += 1
+            if runs[end] != 0.0:
+                n = _append_run(out, n, since, runs[end], border, way)
+            if partner[end] < 0:
+                break
+            end = partner[end]
             if wedges[end] != 0.0:
                 since = (pieces.ends[end // 2, end % 2], along_border[end])
                 n = _append_tip(out, n, since, wedges[end], border, way)
@@ -290,7 +284,7 @@ def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: 
         slants[here] = _slant(pieces, edges, here)
     round_mm = np.sqrt(max(0.25 * spacing * spacing - deep * deep, 0.0))
     for here in range(len(sense)):
-        sine = np.sqrt(1.0 - slants[here] * slants[here])
+        sine = np.sqrt(max(1.0 - slants[here] * slants[here], 0.0))
         if sine < FLAT:
             continue
         blunt_mm = (0.5 * spacing - deep * abs(slants[here])) / sine
@@ -300,13 +294,20 @@ def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: 
         left = 0.0
         if sense[here] != sharp and _piece_mm(pieces, here) > 3.0 * BEND * spacing:
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
-        round_corner, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
-        wedge_mm = WEDGE * (free - 2.0 * blunt_mm)
-        alone = sense[here] == 0 and round_corner == here ^ 1 and (here % 2 == 1 or sense[here ^ 1] != 0)
-        if alone and wedge_mm > max(left, CORNER * spacing):
-            left, sharp = wedge_mm, -sharp
+        beyond, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
+        beyond_mm, alone = WEDGE * (free - 2.0 * blunt_mm), here % 2 == 1 or sense[here ^ 1] != 0
+        if sense[here] == 0 and beyond == here ^ 1 and alone and beyond_mm > max(left, spacing):
+            left, sharp = beyond_mm, -sharp
         wedges[here] = sharp * min(left, MOST_WEDGE * spacing) if left > LEAST_WEDGE * spacing else 0.0
     return wedges
+
+
+@helper
+def _follow_border(wedges: Floats, runs: Floats, partner: Indices, spacing_mm: float) -> None:
+    """Makes runs along the border of the wedges longer than a spacing at ends that are left alone."""
+    for end in range(len(wedges)):
+        if partner[end] < 0 and abs(wedges[end]) > spacing_mm:
+            runs[end], wedges[end] = wedges[end], 0.0
 
 
 @helper
@@ -318,7 +319,7 @@ def _slant(pieces: Pieces, edges: Floats, end: int) -> float:
     x, y = pieces.points[far, 0] - pieces.points[near, 0], pieces.points[far, 1] - pieces.points[near, 1]
     u, v = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
     size = np.hypot(x, y) * np.hypot(u, v)
-    return (x * u + y * v) / size if size > 0.0 else 1.0
+    return float((x * u + y * v) / size) if size > 0.0 else 1.0
 
 
 @helper
