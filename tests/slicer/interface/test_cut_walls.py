@@ -88,7 +88,8 @@ def test_all_of_a_layer_is_covered_by_beads_but_for_the_infill(shape: str, norma
                 covered = covered + strips([path.points], 0.5 * path.width_mm)
             section = layers.sections.own[at]
             bare = section - covered - layers.layers[at].region.sparse
-            assert offset(bare, -0.12).area() < 0.002 * section.area()
+            # a stroke of skin beside a line of infill that would lie on nothing is left out
+            assert offset(bare, -0.12).area() < 0.0025 * section.area()
 
 
 @pytest.mark.parametrize(("shape", "normal"), CASES)
