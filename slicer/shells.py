@@ -347,7 +347,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             beads += bridge_beads(held, above, process.infill_bridge_flow, over_infill=True)
             region = replace(_without(region, area, width), sparse=region.sparse)
     skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))
-    skins = replace(skins, seen=layer == 0)
+    skins = replace(skins, seen=layer == 0 and shells.sections.on_platform)
     top = replace(skins, width_mm=process.top_skin_line_width_mm or width, pattern=process.top_skin_pattern, seen=True)
     bottom = replace(skins, pattern=process.bottom_skin_pattern)
     solid, under = region.solid, Polygons()
