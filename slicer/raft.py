@@ -41,7 +41,7 @@ def reach_mm(process: Process) -> float:
 def raft_heights(profile: Profile) -> Heights:
     """The layers of a raft under the base plane of what stands on it, where z is 0."""
     process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
-    others_mm = min(max(process.layer_height_mm, THICK * nozzle_mm), process.highest_layer_mm, nozzle_mm)
+    others_mm = THICK * nozzle_mm  # no setting of a part: all of a print is lifted by the same height
     thick_mm = np.array([process.first_layer_height_mm, *[others_mm] * process.raft_layers][: process.raft_layers])
     tips_mm = np.cumsum(thick_mm) - thick_mm.sum() - process.raft_contact_distance_mm
     return Heights(tips_mm, thick_mm, tips_mm - 0.5 * thick_mm)

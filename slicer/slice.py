@@ -167,7 +167,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     limits = [seam_limits(edges, unwanted, z_mm, process) for unwanted, z_mm in rows]
     aligned = process.seam == "aligned" and process.walls > 0
     planned = plan_seams(sections, limits) if aligned else [NO_SEAMS] * len(limits)
-    layers, raft = list[Layer](), raft_layers(supports)
+    layers, raft = list[Layer](), [layer for layer in raft_layers(supports) if len(layer)]
     below: list[Bead] = []
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = raft[-1].points[-1] if raft else rear, np.zeros((0, 2)), 0, len(sections.outlines)

@@ -33,6 +33,8 @@ def hold_ends(beads: Sequence[Bead], below: Sequence[Bead], section_below: Polyg
     if not skins or not below:
         return list(beads)
     points = [bead.points for bead in below if len(bead.points) > 1]
+    if not points:
+        return list(beads)
     plastic = index_segments(np.concatenate([np.hstack([line[:-1], line[1:]]) for line in points]))
     lines = [line for k in skins for line in (beads[k].points, np.ascontiguousarray(beads[k].points[::-1]))]
     ends = np.array([_first_held(line, plastic, width_mm, width_mm) < 0.0 for line in lines]).reshape(-1, 2)

@@ -119,7 +119,7 @@ def _about_axis(model: Decomposition) -> Decomposition:
 def _brim_mm(models: Sequence[Decomposition], profile: Profile) -> float:
     """Width of the brim around all models: that of a small base as soon as one of them would tip over alone."""
     process = profile.process
-    small = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0
+    small = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and not process.raft_layers
     if small and any(_tips_over(model.mesh, profile) for model in dict.fromkeys(models)):
         return process.small_base_brim_mm
     return process.brim_mm
