@@ -368,8 +368,10 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         below = shells.layers[layer - 1]
         area = infill_bridges(region, open_area(below.region.sparse, shells.fillings, below.process, layer - 1), width)
         if not area.is_empty():
-            onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width  # so that lines end over the walls, not beside them
-            held = area + (offset(area, onto_mm) - shell.walls.inside)
+            held = area
+            if process.walls:  # lines end over them, not beside them
+                onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width
+                held += offset(area, onto_mm) - shell.walls.inside
             beads += bridge_beads(held, lines, process.infill_bridge_flow, over_infill=True)
             region = replace(_without(region, area, width), sparse=region.sparse)
     skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))

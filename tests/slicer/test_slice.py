@@ -78,6 +78,16 @@ def test_every_point_lies_inside_the_section(pattern: str) -> None:
         assert distances_mm(allowed, np.concatenate([p.points for p in layer.paths])).min() > 0.0
 
 
+@pytest.mark.parametrize("overlap", [0.0, 0.3])
+def test_without_walls_no_stroke_reaches_farther_out_than_half_of_itself(overlap: float) -> None:
+    bare = profile("process.walls=0", "process.infill_density=0.2", f"process.infill_overlap={overlap}")
+    sliced = slice_part(whole(standing(m3.Manifold.cube((20, 20, 6), True))), bare)
+    assert of_kind(sliced, Kind.BRIDGE)
+    least_mm = 0.5 * (bare.process.line_width_mm - bare.process.layer_height_mm * (1.0 - np.pi / 4.0))
+    points = np.concatenate([path.points for layer in sliced.layers for path in layer.paths if path.kind is not Kind.SKIRT])
+    assert np.abs(points[:, :2]).max() <= 10.0 - least_mm + 1e-3
+
+
 def test_infill_is_as_dense_as_asked() -> None:
     thick = standing(m3.Manifold.cube((60, 60, 4)))
     settings_ = [(*BARE, f"process.infill_density={d}") for d in (0.0, 0.3)]
