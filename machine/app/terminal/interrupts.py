@@ -94,6 +94,7 @@ def calling(act: Callable[[], None]) -> Iterator[None]:
 @contextmanager
 def outside_compiler() -> Iterator[None]:
     """Ctrl-C raises KeyboardInterrupt, but never beneath the compiler, which would lose it or take it for an error of its own.
+    Where it comes while Python clears up, which loses it too, it comes again.
 
     Work that goes on all the same, in native code or waiting for threads, is ended with the process.
     """
@@ -106,21 +107,32 @@ def outside_compiler() -> Iterator[None]:
             yield
         return
 
+    def again() -> None:
+        later = threading.Timer(AGAIN_S, signal.pthread_kill, (main.ident, signal.SIGINT))
+        later.daemon = True
+        later.start()
+
     def handle(number: int, frame: FrameType | None) -> None:
+        del number
         while frame is not None:
             if any(folder in frame.f_code.co_filename for folder in COMPILER):
-                later = threading.Timer(AGAIN_S, signal.pthread_kill, (main.ident, number))
-                later.daemon = True
-                later.start()
-                return
+                return again()
             frame = frame.f_back
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGINT, handle)
+    def unraisable(lost: "sys.UnraisableHookArgs") -> None:
+        if lost.exc_type is KeyboardInterrupt:
+            again()
+        else:
+            tell_unraisable(lost)
+
+    before, tell_unraisable = signal.signal(signal.SIGINT, handle), sys.unraisablehook
+    sys.unraisablehook = unraisable
     try:
         with _hurried(lambda: signal.getsignal(signal.SIGINT) is handle):
             yield
     finally:
+        sys.unraisablehook = tell_unraisable
         signal.signal(signal.SIGINT, before)
 
 

@@ -388,6 +388,50 @@ def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path, n
     assert "heaters off" in message
 
 
+INTERRUPTED = """
+import os, signal, sys, threading
+import {module} as module
+
+def interrupted(*given, **named):
+    end = os.kill, (os.getpid(), signal.SIGINT)
+    threading.Timer({later_s}, *end).start() if {later_s} else end[0](*end[1])
+    return stage(*given, **named)
+
+stage, module.{stage} = module.{stage}, interrupted
+from machine.app.cli import main
+sys.exit(main())
+"""
+PIPELINE = "machine.app.pipeline.pipeline"
+
+
+@pytest.mark.parametrize(
+    ("module", "stage", "later_s", "written"),
+    [
+        (PIPELINE, "read_mesh", 0.0, []),
+        (PIPELINE, "slice_parts", 0.0, []),
+        (PIPELINE, "slice_parts", 0.2, []),
+        (PIPELINE, "plan", 0.0, []),
+        (PIPELINE, "dry_run", 0.0, []),
+        ("profiles.files", "_umask", 0.0, []),  # between the file's content and its name
+        ("machine.app.commands.export", "write_json", 0.0, ["out.gcode"]),
+    ],
+)
+def test_an_interrupted_export_leaves_no_file_half_written_and_no_process(
+    folder: Path, module: str, stage: str, later_s: float, written: list[str]
+) -> None:
+    script = INTERRUPTED.format(module=module, stage=stage, later_s=later_s)
+    words = ["export", "demo:bracket", "--as-is", "--parts", "1", "-o", "out.gcode", "--json", "out.json"]
+    given = {"PYTHONPATH": str(Path(__file__).parents[3])}
+    with subprocess.Popen(
+        [sys.executable, "-c", script, *words], stderr=subprocess.PIPE, text=True, start_new_session=True, env=os.environ | given
+    ) as process:
+        message = process.communicate(timeout=100)[1]
+    assert (process.returncode, message.splitlines()[-1]) == (130, "tiltprint: interrupted")
+    assert [file.name for file in folder.iterdir() if file.name.startswith((".tiltprint-", "out."))] == written
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
 def _wait_for(process: "subprocess.Popen[str]", word: str) -> None:
     assert process.stderr is not None
     for _ in range(100):

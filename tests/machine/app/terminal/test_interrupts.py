@@ -105,6 +105,23 @@ def test_an_interrupt_beneath_the_compiler_waits_until_it_is_back(folder: str) -
     assert finished == ["compiled"]
 
 
+def test_an_interrupt_that_is_lost_while_python_clears_up_comes_again(capfd: pytest.CaptureFixture[str]) -> None:
+    class Dropped:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGINT)
+
+    def work() -> None:
+        Dropped()
+        cleared.append(True)
+        wait_for_nothing()
+
+    before, cleared = signal.signal(signal.SIGINT, signal.default_int_handler), list[bool]()
+    with pytest.raises(KeyboardInterrupt), outside_compiler():
+        work()
+    signal.signal(signal.SIGINT, before)
+    assert (cleared, capfd.readouterr().err) == ([True], "")
+
+
 NATIVE = """
 import hashlib
 from machine.app.terminal.interrupts import outside_compiler
