@@ -13,6 +13,7 @@ from mdp.save import stl
 from mdp.search.by_plan import cut_by_plan
 from profiles.profile import load
 from tests.machine.browser import Browser
+from tests.machine.test_workbench_place import pixels
 from tests.machine.workbench import QUICK, Running
 from tests.mdp.search.test_neck import hourglass
 from tests.shapes import tee
@@ -187,6 +188,31 @@ def test_a_model_on_a_pedestal_is_drawn_on_it_and_has_the_figures_of_the_search(
 
 def box_mm(zone: dict[str, Any]) -> list[float]:
     return [high - low for low, high in zip(zone["min_mm"], zone["max_mm"], strict=True)]
+
+
+MODIFIED = """version = 1
+[[modifier]]
+z_mm = [10, 20]
+process = {infill_density = 1.0}
+"""
+
+
+def test_a_plan_s_modifiers_are_listed_and_drawn(browser: Browser, bench: Running, folder: Path) -> None:
+    Path("modified.toml").write_text(MODIFIED)
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        looked_at(browser, bench, "tee.stl")
+        Path("bare.toml").write_text(MODIFIED.partition("[[modifier]]")[0] + "[[part]]")
+        bench.send(Path("bare.toml"))
+        page.until(lambda state: state["parts"] == 1)
+        browser.wait(FREE)
+        bare = pixels(browser)
+        bench.send(Path("modified.toml"))
+        page.until(lambda state: state["modifiers"])
+        browser.wait("document.querySelectorAll('#marks tr').length === 1")
+        assert browser.value("$('marks').textContent") == "modifierinfill_density = 1.0"
+        browser.wait("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+        assert (pixels(browser) != bare).any(axis=2).mean() > 0.005
 
 
 def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Browser, bench: Running, folder: Path) -> None:

@@ -17,7 +17,7 @@ from machine.view.scene import machine_bodies
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.plans.plan_file import ZONE_KINDS
 from mdp.save import plane_values
-from mdp.zone import Zone
+from mdp.zone import Modifier, Zone
 
 MOST_FACES = 2_000_000  # that a page draws
 # The keys of the state that hold sentences.
@@ -68,6 +68,7 @@ def _state(session: Session) -> dict[str, Any]:
         "locked": [part in bench.locked for part in bench.cuts or ()],
         "trial": _trial(session),
         "zones": _zones(bench),
+        "modifiers": [_modifier(modifier) for modifier in bench.zones.modifiers],
         "marks": marks_key(bench),
         "refused": _refused(session),
         "units": _units(session),
@@ -108,6 +109,15 @@ def marks_key(bench: Bench) -> str:
 def _zones(bench: Bench) -> list[dict[str, Any]]:
     kinds = ((kind, enumerate(getattr(bench.zones, kind), start=1)) for kind in ZONE_KINDS)
     return [{"kind": kind, "number": number, **asdict(zone)} for kind, zones in kinds for number, zone in zones]
+
+
+def _modifier(modifier: Modifier) -> dict[str, Any]:
+    """The box of a modifier, that around one that is a mesh, and its settings in words."""
+    volume, told = modifier.volume, ", ".join(f"{key} = {value}" for key, value in modifier.process.items())
+    if isinstance(volume, Zone):
+        return {"min_mm": volume.min_mm, "max_mm": volume.max_mm, "axes": volume.axes, "told": told}
+    low, high = volume.mesh.bounds_mm.tolist()
+    return {"min_mm": low, "max_mm": high, "axes": None, "told": f"{volume.file.name}: {told}"}
 
 
 def _model(model: Model, names: tuple[str, ...]) -> dict[str, Any]:

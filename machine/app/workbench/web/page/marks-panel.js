@@ -14,8 +14,10 @@ const MARK_KINDS = {
   keep: { word: "no cut", colour: [118, 66, 214] }, no_seam: { word: "no seam", colour: [0, 128, 122] }, no_support: { word: "no support", colour: [196, 24, 126] },
   support: { word: "support", colour: [196, 128, 0] },
 };
+const MODIFIER = { word: "modifier", colour: [84, 92, 104] }; // told by a plan: it is shown, not changed
 const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a face's byte
 const BOX_SIDES = [0, 1, 2].flatMap((axis) => [{ axis, end: "min_mm", name: `least ${"xyz"[axis]}` }, { axis, end: "max_mm", name: `greatest ${"xyz"[axis]}` }]);
+const BEYOND_MM = 3; // of the model's box, to which modifiers without sides are drawn
 const PAINT = 0.6; // faces are painted in darker colours, which no part has
 const AROUND_MM = 1; // of the corners that are clicked, so that a box reaches through the surface
 const THINNEST_MM = 0.2, STEP_MM = 0.5;
@@ -41,6 +43,13 @@ export const markWord = () => MARK_KINDS[kindNow()].word;
 const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
 
 const boxes = () => store.state.zones.filter((zone) => zone.min_mm).map((zone) => (sameMark(store.zoneHand, zone) ? store.zoneHand : zone));
+/** The boxes of modifiers as far as the model reaches. */
+function modifiers() {
+  const size = sizeOf(store.state), far = Math.hypot(...size) + BEYOND_MM;
+  const reach = (axes, axis) => (axes || axis === 2 ? far : size[axis] / 2 + BEYOND_MM);
+  const within = (corner, axes) => corner.map((x, axis) => Math.max(-reach(axes, axis), Math.min(reach(axes, axis), x)));
+  return store.state.modifiers.map((own) => ({ ...own, min_mm: within(own.min_mm, own.axes), max_mm: within(own.max_mm, own.axes) }));
+}
 const boxNow = () => boxes().find((zone) => sameMark(zone, store.zone)) || null;
 const facesNow = () => store.state.zones.find((zone) => sameMark(zone, store.zone) && zone.point_mm);
 
@@ -112,14 +121,15 @@ export function marksPanel(picture) {
     const zone = boxNow();
     $("mark-numbers").hidden = !zone;
     if (zone) BOX_SIDES.forEach(({ axis, end }, k) => fill(numbers[k], zone[end][axis].toFixed(2)));
-    putTable($("marks"), [now.state.zones, now.zone], [], () => now.state.zones.map((mark) => markRow(mark, sameMark(mark, now.zone))));
+    const { zones, modifiers } = now.state;
+    putTable($("marks"), [zones, modifiers, now.zone], [], () => [...zones.map((mark) => markRow(mark, sameMark(mark, now.zone))), ...modifiers.map(modifierRow)]);
     if (picture && now.triangles) showMarks(picture);
   });
 }
 
 /** Boxes and marked faces in the picture, where parts are looked at. */
 function showMarks(picture) {
-  const { tab, state, zone: chosen, faceMarks } = store, seen = tab === "parts" && state.model ? boxes() : [];
+  const { tab, state, zone: chosen, faceMarks } = store, seen = tab === "parts" && state.model ? [...modifiers(), ...boxes()] : [];
   picture.extra("marks", JSON.stringify([seen, chosen]), () => seen.flatMap((zone) => boxDrawn(zone, sameMark(zone, chosen))));
   picture.marks(tab === "parts" ? faceMarks : null);
 }
@@ -153,10 +163,12 @@ function numberOf(side) {
 
 /** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */
 function boxDrawn(zone, chosen) {
-  const { kind, min_mm: least, max_mm: most } = zone, seen = (corners) => corners.map((place) => fromBox(zone, place));
-  const sides = trianglesOf([{ corners: seen(boxCorners(least, most)), colour: [...MARK_KINDS[kind].colour, 200] }]);
-  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: [...MARK_KINDS[kind].colour, 255] }]), over: chosen }];
+  const { kind, min_mm: least, max_mm: most } = zone, { colour } = MARK_KINDS[kind] || MODIFIER, seen = (corners) => corners.map((place) => fromBox(zone, place));
+  const sides = trianglesOf([{ corners: seen(boxCorners(least, most)), colour: [...colour, 200] }]);
+  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: [...colour, 255] }]), over: chosen }];
 }
+
+const modifierRow = ({ told }) => made("tr", {}, made("td", {}, swatch(`rgb(${MODIFIER.colour})`), MODIFIER.word), made("td", { text: told, colSpan: 2 }));
 
 function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
