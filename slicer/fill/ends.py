@@ -19,15 +19,15 @@ from slicer.geometry.polyline import length_mm
 from slicer.paths import SKINS
 
 STEP = 0.125  # line widths between the places of a stroke under which plastic is looked for
-CARRIES = 0.45  # line widths from the middle of a line that it carries what lies on it: nearly as far as its rim
+CARRIES = 0.35  # line widths from the middle of a line that it carries the middle of what lies on it
 ONWARD = 1.0  # line widths that a stroke may go on to plastic
 HOLD = 0.5  # line widths that a stroke which ends on plastic reaches over it or beyond it
 
 
 def hold_ends(beads: Sequence[Bead], below: Sequence[Bead], section_below: Polygons, width_mm: float) -> list[Bead]:
-    """The beads of a layer, skins among them on the plastic below wherever the model is there.
+    """The beads of a layer; those of skin end on the plastic of the layer below wherever the model is there.
 
-    below, section_below: the beads of the layer below, and its outline.
+    below, section_below: the beads of the layer below, and the model's section there.
     """
     skins = [k for k, bead in enumerate(beads) if bead.kind in SKINS and not bead.closed]
     if not skins or not below:
@@ -42,11 +42,11 @@ def hold_ends(beads: Sequence[Bead], below: Sequence[Bead], section_below: Polyg
         return list(beads)
     inside = index_edges(section_below)
     ends &= lie_within(inside, np.concatenate([beads[k].points[[0, -1]] for k in skins])).reshape(-1, 2)
-    return _left([*beads], dict(zip(skins, ends.tolist(), strict=True)), plastic, width_mm)
+    return _held_beads(beads, dict(zip(skins, ends.tolist(), strict=True)), plastic, width_mm)
 
 
-def _left(beads: list[Bead], loose: dict[int, list[bool]], plastic: EdgeIndex, width_mm: float) -> list[Bead]:
-    """The beads with those ends held that are loose, by the number of the bead."""
+def _held_beads(beads: Sequence[Bead], loose: dict[int, list[bool]], plastic: EdgeIndex, width_mm: float) -> list[Bead]:
+    """The beads with their loose ends held; loose: by the number of a bead, whether its beginning and its end are."""
     out, cut = list[Bead](), False  # cut: the bead that the next one would follow is left out
     for k, bead in enumerate(beads):
         points = bead.points

@@ -34,8 +34,8 @@ def reach(skin: list[Bead]) -> tuple[float, float]:
     ("begin", "end", "held"),
     [
         (0.0, 3.0, (0.0, 3.0)),  # on both rails
-        (0.15, 2.85, (0.15, 2.85)),  # some of the last width lies on them
-        (0.5, 2.5, (0.0, 3.0)),  # goes on to what is near
+        (0.1, 2.9, (0.1, 2.9)),  # some of the last width lies on them
+        (0.4, 2.6, (0.0, 3.0)),  # goes on to what is near
         (-2.0, 3.0, (-0.4, 3.0)),  # ends where there is plastic: no farther beyond than half a line and the rail
         (-2.0, 5.0, (-0.4, 3.4)),
     ],
