@@ -28,7 +28,7 @@ HOLDS = 0.75  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
 KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid
-MOST_ROUNDS = 4  # newly solid places may themselves end over a void
+MOST_ROUNDS = 2  # newly solid places may themselves end over a void; what ends there still is held in slicer.fill.ends
 SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
 
 Indices = NDArray[np.int64]
