@@ -1,9 +1,9 @@
 """Raft: what is printed first under a model and its support, so that both stick to the plate, and is peeled off.
 
-Its first layer is sparse enough to come off the plate and reaches farthest, the next ones carry, and the upper half are dense
-as those of support under a part. The model begins a small gap above it and holds on here and there. The model's layers are
-those that it has on the plate; only the first one, which spans the gap, is printed as any other would be, neither wider nor
-squeezed. Support begins on the raft itself, with layers that fill the gap, too.
+Its first layer is sparse enough to come off the plate and reaches farthest, the layers above it are sparse, and the upper half
+of the raft, but never the first layer, is as dense as the interface of support. The model begins a small gap above the raft. Its
+layers are the same as on the plate, except that the first one is printed like any other, neither wider nor squeezed. Support
+begins on the raft itself, with layers that fill the gap.
 """
 
 from collections.abc import Sequence
@@ -48,7 +48,7 @@ def raft_heights(profile: Profile) -> Heights:
 
 
 def raft_layers(supports: Supports) -> list[Layer]:
-    """The raft of a part on the platform, and what of its support fills the gap and the part's first layer; [] without one."""
+    """Layers of a part's raft, then the support that fills the gap and the part's first layer; [] where there is no raft."""
     sections = supports.sections
     if not sections.on_raft:
         return []
@@ -64,7 +64,7 @@ def raft_layers(supports: Supports) -> list[Layer]:
 
 
 def raft_areas(supports: Supports) -> list[Polygons]:
-    """What each layer of the raft covers: what stands there and hangs so low that it would sag onto the plate, and beyond."""
+    """Area that each layer of the raft covers: the base, outlines so low that they would sag onto the plate, and a margin."""
     sections = supports.sections
     process, bottom_mm = sections.process, sections.heights.bottom_mm
     low = sections.outlines[: int(np.searchsorted(bottom_mm, ON_PLATE_MM))]
@@ -82,8 +82,10 @@ def _process_of_layer(process: Process, layer: int) -> Process:
 
 
 def _raft_beads(area: Polygons, below_top: int, process: Process, height_mm: float, *, first: bool) -> list[Bead]:
-    """The beads of a layer that has so many others above it. Dense layers cross each other and what lies below them; sparse ones
-    stand on each other."""
+    """Beads of one layer. Dense layers cross each other and the layer below them; sparse layers stack line on line.
+
+    below_top: the number of raft layers above this one.
+    """
     dense = (process.raft_layers + 1) // 2
     quarter_turns = dense + 1 if first else min(below_top, dense)
     is_dense = below_top < dense and not first

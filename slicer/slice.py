@@ -179,7 +179,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
             bare.append(i)
         around = Surroundings(rear, seams, tip, limits[i], i, planned[i])
         beads, seams = place_seams([*own, *auxiliary], process, around)
-        beads = hold_ends(beads, below, sections.own[i - 1], process.line_width_mm) if i else beads
+        beads = hold_ends(beads, below, sections.own[i], sections.own[i - 1], process.line_width_mm) if i else beads
         below = [*beads, *shells.layers[i].ending]
         if i and process.fuzzy_skin != "none":
             beads = fuzzy_walls(beads, process, _joints_near(sections, i), (sections.part.index, i))

@@ -84,7 +84,7 @@ KEYS = {
     "hole_xy_offset": "xy_hole_compensation",
     "machine_nozzle_size": "nozzle_diameter",
 }
-RAFT_LAYERS = {"raft_base_layers": "1", "raft_interface_layers": "1", "raft_surface_layers": "2"}  # with Cura's own numbers
+RAFT_LAYERS = {"raft_base_layers": 1, "raft_interface_layers": 1, "raft_surface_layers": 2}  # with Cura's own numbers
 WORDS = {
     "fill_pattern": {
         "lines": "rectilinear",
@@ -105,11 +105,9 @@ def read_profile(file: Path) -> Config:
     values, name = _values(file)
     entries, formulas = dict[str, Entry](), list[str]()
     for own, text in values.items():
-        if own in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
-            continue
         if text.startswith("="):
             formulas.append(own)
-        else:
+        elif own not in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
             key = KEYS.get(own, own)
             entries[key] = Entry(own, _said(key, text))
     if NUMBER.fullmatch(values.get("support_angle", "")):  # Cura's is from the vertical
@@ -121,16 +119,22 @@ def read_profile(file: Path) -> Config:
 
 
 def _raft(values: Mapping[str, str]) -> dict[str, Entry]:
-    """The layers of a raft, Cura's own where the file tells none, and the gap over it less what the first layer takes of it."""
-    kind, told = values.get("adhesion_type", ""), dict[str, Entry]()
-    if kind:
-        layers = [values.get(own, usual) for own, usual in RAFT_LAYERS.items()]
-        known = kind == "raft" and all(NUMBER.fullmatch(text) for text in layers)
-        told["raft_layers"] = Entry("adhesion_type", f"{sum(map(float, layers)):g}" if known else "0")
-    gap, into = values.get("raft_airgap", ""), values.get("layer_0_z_overlap", "0")
-    if NUMBER.fullmatch(gap) and NUMBER.fullmatch(into):
-        told["raft_contact_distance"] = Entry("raft_airgap", f"{max(float(gap) - float(into), 0.0):g}")
-    return told
+    """The number of raft layers and the gap above the raft, less what the first layer sinks into it.
+
+    A value that the file does not give as a number is Cura's default: the sinking is half of the gap.
+    """
+    entries = dict[str, Entry]()
+    if (kind := values.get("adhesion_type", "")) and not kind.startswith("="):
+        layers = sum(_number(values.get(own, ""), usual) for own, usual in RAFT_LAYERS.items())
+        entries["raft_layers"] = Entry("adhesion_type", f"{layers:g}" if kind == "raft" else "0")
+    if NUMBER.fullmatch(gap := values.get("raft_airgap", "")):
+        into_mm = _number(values.get("layer_0_z_overlap", ""), 0.5 * float(gap))
+        entries["raft_contact_distance"] = Entry("raft_airgap", f"{max(float(gap) - into_mm, 0.0):g}")
+    return entries
+
+
+def _number(text: str, usual: float) -> float:
+    return float(text) if NUMBER.fullmatch(text) else usual
 
 
 def _values(file: Path) -> tuple[Mapping[str, str], str]:

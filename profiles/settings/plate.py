@@ -53,7 +53,7 @@ class Plate(Frozen):
         ge=0,
         le=50,
         description="layers of a raft, which carries a model and the support that stands on the plate and is peeled off: one "
-        "that sticks, sparse ones, and half of all dense; 0: none",
+        "that sticks, sparse ones, and dense ones in the upper half; 0: none",
     )
     raft_contact_distance_mm: float = Field(
         0.1, ge=0, le=0.4, description="gap between a raft and the model on it, so that it comes off, mm; 0: it welds"
@@ -65,7 +65,7 @@ class Plate(Frozen):
         0.9, ge=0.1, le=1, description="share of a raft's first layer that is filled: less is easier to take off the plate"
     )
     raft_first_layer_expansion_mm: float = Field(
-        3.0, ge=0, le=50, description="a raft's first layer reaches so much farther than the others, so that it sticks, mm"
+        3.0, ge=0, le=50, description="how much farther a raft's first layer reaches than the others, so that it sticks, mm"
     )
     pedestal_gap_mm: float = Field(
         0.1, ge=0, le=1, description="gap between a pedestal and the model on it, so that it breaks away, mm"

@@ -1,8 +1,9 @@
 """Ends: strokes of skin end on the plastic of the layer below.
 
 Skins over sparse infill have grown to what holds them (slicer.fill.over_infill), but lines lie beside the rows by which they
-grew, turns leave wedges along the border of a skin, and lines of infill end before it. Where nothing lies under the last width
-of a stroke it goes on to plastic that is near, or else ends where there is some; one that meets none is left out.
+grew, turns leave wedges along the border of a skin, and lines of infill end before it. A stroke whose last line width lies on
+nothing is extended to plastic nearby if that keeps it inside the outline of its own layer. Otherwise, where the model continues
+below, it is cut back to the last place that has plastic below, and left out if there is none; a bridge over open air stays.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ import numpy as np
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from slicer.bead import Bead
-from slicer.geometry.edge_index import EdgeIndex, index_edges, index_segments, lie_within, nearest
+from slicer.geometry.edge_index import EdgeIndex, depths, index_edges, index_segments, nearest
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import length_mm
 from slicer.paths import SKINS
@@ -22,39 +23,49 @@ STEP = 0.125  # line widths between the places of a stroke under which plastic i
 CARRIES = 0.35  # line widths from the middle of a line that it carries the middle of what lies on it
 ONWARD = 1.0  # line widths that a stroke may go on to plastic
 HOLD = 0.5  # line widths that a stroke which ends on plastic reaches over it or beyond it
+HELD, EXTEND, CUT = range(3)  # an end on plastic, one that may be extended to it, and one that may also be cut back
+
+Plastic = tuple[EdgeIndex, Floats]  # the middle lines of beads, and for each segment how far from it a bead carries, mm
 
 
-def hold_ends(beads: Sequence[Bead], below: Sequence[Bead], section_below: Polygons, width_mm: float) -> list[Bead]:
-    """The beads of a layer; those of skin end on the plastic of the layer below wherever the model is there.
+def hold_ends(
+    beads: Sequence[Bead], below: Sequence[Bead], section: Polygons, section_below: Polygons, width_mm: float
+) -> list[Bead]:
+    """Returns the beads of a layer; skin strokes end on the plastic of the layer below where the model is there or near.
 
-    below, section_below: the beads of the layer below, and the model's section there.
+    below: the beads of the layer below; section, section_below: the model's sections in this layer and in the one below.
     """
     skins = [k for k, bead in enumerate(beads) if bead.kind in SKINS and not bead.closed]
     if not skins or not below:
         return list(beads)
-    points = [bead.points for bead in below if len(bead.points) > 1]
-    if not points:
+    lying = [bead for bead in below if len(bead.points) > 1]
+    if not lying:
         return list(beads)
-    plastic = index_segments(np.concatenate([np.hstack([line[:-1], line[1:]]) for line in points]))
+    carries_mm = np.repeat([CARRIES * bead.width_mm for bead in lying], [len(bead.points) - 1 for bead in lying])
+    plastic = index_segments(np.concatenate([np.hstack([bead.points[:-1], bead.points[1:]]) for bead in lying])), carries_mm
     lines = [line for k in skins for line in (beads[k].points, np.ascontiguousarray(beads[k].points[::-1]))]
     ends = np.array([_first_held(line, plastic, width_mm, width_mm) < 0.0 for line in lines]).reshape(-1, 2)
     if not ends.any():
         return list(beads)
-    inside = index_edges(section_below)
-    ends &= lie_within(inside, np.concatenate([beads[k].points[[0, -1]] for k in skins])).reshape(-1, 2)
-    return _held_beads(beads, dict(zip(skins, ends.tolist(), strict=True)), plastic, width_mm)
+    inside_mm = depths(np.concatenate([beads[k].points[[0, -1]] for k in skins]), index_edges(section_below)).reshape(-1, 2)
+    loose = np.where(ends & (inside_mm > 0.0), CUT, np.where(ends & (inside_mm > -width_mm), EXTEND, HELD))
+    return _held_beads(beads, dict(zip(skins, loose.tolist(), strict=True)), plastic, index_edges(section), width_mm)
 
 
-def _held_beads(beads: Sequence[Bead], loose: dict[int, list[bool]], plastic: EdgeIndex, width_mm: float) -> list[Bead]:
-    """The beads with their loose ends held; loose: by the number of a bead, whether its beginning and its end are."""
+def _held_beads(
+    beads: Sequence[Bead], loose: dict[int, list[int]], plastic: Plastic, outline: EdgeIndex, width_mm: float
+) -> list[Bead]:
+    """Returns the beads with their loose ends held; loose: by the number of a bead, what its beginning and its end need."""
     out, cut = list[Bead](), False  # cut: the bead that the next one would follow is left out
     for k, bead in enumerate(beads):
         points = bead.points
-        first, last = loose.get(k, (False, False))
+        first, last = loose.get(k, (HELD, HELD))
         if first:
-            points = _held(points, plastic, width_mm)
+            points = _held(points, plastic, outline, width_mm, first)
         if last and len(points):
-            points = _held(np.ascontiguousarray(points[::-1]), plastic, width_mm)[::-1]
+            turned = np.ascontiguousarray(points[::-1])
+            held = _held(turned, plastic, outline, width_mm, last)
+            points = points if held is turned else held[::-1]
         if points is not bead.points and length_mm(points) < width_mm:
             cut = cut or not bead.follows
             continue
@@ -64,8 +75,10 @@ def _held_beads(beads: Sequence[Bead], loose: dict[int, list[bool]], plastic: Ed
 
 
 @kernel
-def _first_held(points: Floats, plastic: EdgeIndex, width_mm: float, most_mm: float) -> float:
+def _first_held(points: Floats, plastic: Plastic, width_mm: float, most_mm: float) -> float:
     """The way along a stroke to the first place that has plastic under it; -1.0 where most_mm bring none."""
+    lines, carries_mm = plastic
+    farthest_mm = carries_mm.max()
     since = way = 0.0
     for k in range(len(points) - 1):
         x, y = points[k, 0], points[k, 1]
@@ -73,7 +86,9 @@ def _first_held(points: Floats, plastic: EdgeIndex, width_mm: float, most_mm: fl
         length = np.hypot(dx, dy)
         while way <= min(since + length, most_mm):
             share = (way - since) / length if length > 0.0 else 0.0
-            if nearest(plastic, x + share * dx, y + share * dy, CARRIES * width_mm)[2] >= 0:
+            px, py = x + share * dx, y + share * dy
+            nx, ny, which = nearest(lines, px, py, farthest_mm)
+            if which >= 0 and np.hypot(nx - px, ny - py) <= carries_mm[which]:
                 return way
             way += STEP * width_mm
         since += length
@@ -82,14 +97,17 @@ def _first_held(points: Floats, plastic: EdgeIndex, width_mm: float, most_mm: fl
     return -1.0
 
 
-def _held(points: Floats, plastic: EdgeIndex, width_mm: float) -> Floats:
-    """A stroke (n, 2) whose beginning is loose, begun on plastic; empty where there is none."""
+def _held(points: Floats, plastic: Plastic, outline: EdgeIndex, width_mm: float, need: int) -> Floats:
+    """Begins a stroke (n, 2) on plastic; returns no points where it may be cut and has no plastic below. need: EXTEND or CUT."""
     along = points[0] - points[1]
     onward = along * (ONWARD * width_mm / max(float(np.hypot(*along)), 1e-9))
     way = _first_held(np.stack([points[0], points[0] + onward]), plastic, width_mm, ONWARD * width_mm)
     if way >= 0.0:
         end = points[0] + onward * ((way / width_mm + HOLD) / ONWARD)
-        return np.concatenate([end[None], points[1:]])
+        if depths(end[None], outline)[0] > 0.5 * width_mm:
+            return np.concatenate([end[None], points[1:]])
+    if need == EXTEND:
+        return points
     way = _first_held(points, plastic, width_mm, np.inf) - HOLD * width_mm
     if way < 0.0:
         return points[:0]

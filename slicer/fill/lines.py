@@ -271,9 +271,8 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
 def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, solid_mm: tuple[float, float]) -> Floats:
     """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward.
 
-    Beads half a spacing to both sides of a line and round its end leave open so much of what bounds the area: its length up to
-    the next end, less what lies under them. That is wide at the sharp side of a line, and round a corner with room for a line
-    but without one.
+    Between two ends the border is covered by the beads of their lines, half a spacing to both sides and round the end; the rest
+    of it stays open. That is much at the sharp side of a line, and round a corner with room for a line but without one.
     """
     spacing, deep = solid_mm
     wedges, before, slants = floats(len(sense), 0.0), longs(len(sense), 0), floats(len(sense), 0.0)
@@ -296,7 +295,8 @@ def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: 
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
         beyond, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
         beyond_mm, alone = WEDGE * (free - 2.0 * blunt_mm), here % 2 == 1 or sense[here ^ 1] != 0
-        if sense[here] == 0 and beyond == here ^ 1 and alone and beyond_mm > max(left, spacing):
+        corner = beyond == here ^ 1 and slants[here] * slants[beyond] < 0.0  # one corner lies blunt beyond both ends of the line
+        if sense[here] == 0 and corner and alone and beyond_mm > max(left, spacing):
             left, sharp = beyond_mm, -sharp
         wedges[here] = sharp * min(left, MOST_WEDGE * spacing) if left > LEAST_WEDGE * spacing else 0.0
     return wedges
@@ -334,7 +334,7 @@ def _bend(out: Floats, end: int, before: int, wedge_mm: float, spacing_mm: float
     """Takes the end of a line back from the border where it turns into a wedge."""
     if wedge_mm != 0.0:
         step = out[before, 0] - out[end, 0], out[before, 1] - out[end, 1]
-        share = BEND * spacing_mm / np.hypot(step[0], step[1])
+        share = min(BEND * spacing_mm / max(np.hypot(step[0], step[1]), TIE_MM), 0.5)
         out[end, 0] += share * step[0]
         out[end, 1] += share * step[1]
 

@@ -147,7 +147,10 @@ def test_a_profile_of_cura_is_read_without_its_formulas(tmp_path: Path) -> None:
     [
         ("adhesion_type = raft", 4, None),
         ("adhesion_type = raft\nraft_surface_layers = 3\nraft_airgap = 0.3\nlayer_0_z_overlap = 0.15", 5, 0.15),
+        ("adhesion_type = raft\nraft_surface_layers = =3 if layer_height < 0.2 else 2", 4, None),
+        ("raft_airgap = 0.3", None, 0.15),  # the first layer sinks by half of the gap, as in Cura's definitions
         ("adhesion_type = brim\nraft_surface_layers = 3", 0, None),
+        ("adhesion_type = =extruderValue(0, 'adhesion_type')", None, None),
         ("layer_height = 0.2", None, None),
     ],
 )

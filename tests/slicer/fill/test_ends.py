@@ -1,5 +1,7 @@
 """Strokes of skin end on the plastic of the layer below."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -41,13 +43,13 @@ def reach(skin: list[Bead]) -> tuple[float, float]:
     ],
 )
 def test_a_stroke_ends_on_the_plastic_that_is_nearest(begin: float, end: float, held: tuple[float, float]) -> None:
-    skin = hold_ends([bead(Kind.SKIN, (begin, 0.0), (end, 0.0))], [rail(0.0), rail(3.0)], MODEL, WIDTH)
+    skin = hold_ends([bead(Kind.SKIN, (begin, 0.0), (end, 0.0))], [rail(0.0), rail(3.0)], MODEL, MODEL, WIDTH)
     assert reach(skin) == pytest.approx(held, abs=0.5 * WIDTH)
 
 
 def test_a_stroke_over_nothing_is_left_out_and_what_follows_it_begins_anew() -> None:
     chain = [bead(Kind.TOP_SKIN, (x, -1.0), (x, 1.0), follows=x > 5.0) for x in (5.0, 5.4, 12.0)]
-    left = hold_ends([bead(Kind.SKIN, (0.0, 0.0), (0.0, 3.0)), *chain], [rail(0.0), rail(12.0)], MODEL, WIDTH)
+    left = hold_ends([bead(Kind.SKIN, (0.0, 0.0), (0.0, 3.0)), *chain], [rail(0.0), rail(12.0)], MODEL, MODEL, WIDTH)
     assert [float(one.points[0, 0]) for one in left] == [0.0, 12.0]
     assert not left[1].follows
 
@@ -55,12 +57,34 @@ def test_a_stroke_over_nothing_is_left_out_and_what_follows_it_begins_anew() -> 
 @pytest.mark.parametrize("kind", [Kind.INFILL, Kind.INNER_WALL, Kind.SUPPORT])
 def test_only_skins_are_held(kind: Kind) -> None:
     beads = [bead(kind, (5.0, 0.0), (9.0, 0.0))]
-    assert hold_ends(beads, [rail(0.0)], MODEL, WIDTH) == beads
+    assert hold_ends(beads, [rail(0.0)], MODEL, MODEL, WIDTH) == beads
+
+
+def test_a_bridge_that_ends_just_beyond_the_model_below_reaches_back_to_its_rim() -> None:
+    below = Polygons.square((2.0, 20.0), True)  # from x -1 to 1
+    rim = [rail(-0.8), rail(0.8)]
+    bridge = [bead(Kind.BRIDGE, (6.0, 5.0), (6.0, 0.0), (1.2, 0.0))]
+    assert reach(hold_ends(bridge, rim, MODEL, below, WIDTH))[1] == pytest.approx(0.8, abs=0.5 * WIDTH)
+    turned_away = bead(Kind.BRIDGE, (6.0, 5.0), (1.2, 0.0), (1.2, 0.2))
+    assert hold_ends([turned_away], rim, MODEL, below, WIDTH)[0] is turned_away
 
 
 def test_a_bridge_may_end_where_the_model_has_nothing_below() -> None:
     bridge = [bead(Kind.BRIDGE, (0.0, 0.0), (5.0, 0.0))]
-    assert reach(hold_ends(bridge, [rail(0.0)], Polygons.square((2.0, 20.0), True), WIDTH)) == (0.0, 5.0)
+    assert reach(hold_ends(bridge, [rail(0.0)], MODEL, Polygons.square((2.0, 20.0), True), WIDTH)) == (0.0, 5.0)
+
+
+def test_a_stroke_is_not_extended_out_of_the_outline_of_its_own_layer() -> None:
+    own = Polygons.square((6.0, 20.0), True)  # ends at x 3, above the middle of the last rail
+    skin = hold_ends([bead(Kind.SKIN, (0.0, 0.0), (2.6, 0.0))], [rail(0.0), rail(2.0), rail(3.0)], own, MODEL, WIDTH)
+    assert reach(skin) == pytest.approx((0.0, 2.0), abs=WIDTH)
+
+
+@pytest.mark.parametrize(("rail_mm", "stays"), [(0.8, True), (0.4, False)])
+def test_wide_beads_carry_what_begins_farther_from_their_middle(rail_mm: float, stays: bool) -> None:
+    below = [replace(rail(0.0), width_mm=rail_mm), rail(3.0)]
+    begin, _ = reach(hold_ends([bead(Kind.SKIN, (0.25, 0.0), (3.0, 0.0))], below, MODEL, MODEL, WIDTH))
+    assert (begin == 0.25) is stays
 
 
 @settings(max_examples=100, deadline=None)
@@ -68,7 +92,7 @@ def test_a_bridge_may_end_where_the_model_has_nothing_below() -> None:
 def test_under_the_last_width_of_a_stroke_lies_plastic(points: list[tuple[float, float]], rails: list[float]) -> None:
     below = [rail(x) for x in rails]
     plastic = shapely.union_all([shapely.LineString(one.points).buffer(0.5 * WIDTH, cap_style="flat") for one in below])
-    for held in hold_ends([bead(Kind.SKIN, *points)], below, MODEL, WIDTH):
+    for held in hold_ends([bead(Kind.SKIN, *points)], below, MODEL, MODEL, WIDTH):
         line = shapely.LineString(held.points)
-        for tail in (substring(line, 0.0, WIDTH), substring(line, line.length - WIDTH, line.length)):
+        for tail in (substring(line, 0.0, WIDTH), substring(line, max(line.length - WIDTH, 0.0), line.length)):
             assert tail.intersects(plastic)

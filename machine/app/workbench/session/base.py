@@ -19,8 +19,8 @@ from profiles.errors import UserError
 WAITING = "waiting until the work of other benches is done"
 LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
 LONGEST_ASK = 80  # letters of the name of a command
-MOST_ANSWERS = 20  # the last commands with a name whose outcome the pages are told
-MOST_PROBLEMS = 20  # pages that are each told what could not be done last
+MOST_ANSWERS = 20  # named commands whose outcome is kept and sent to the pages
+MOST_PROBLEMS = 20  # pages for which the last refusal is kept
 asking: ContextVar[str] = ContextVar("asking", default="")  # the page that is obeyed, or worked for; "": it has no name
 
 

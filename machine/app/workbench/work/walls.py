@@ -16,7 +16,9 @@ def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
     in the workpiece frame, in the middle of its height, and its height; all little-endian."""
     kinds = BEHIND if _count(sliced, BEHIND) < most else SEEN
     step = 1 + _count(sliced, kinds) // most
-    own = [layer for layer in sliced.layers if layer.z_mm > 0.0]  # not the raft: the model stands on the plate there
+    own = [
+        layer for layer in sliced.layers if layer.z_mm > 0.5 * layer.height_mm
+    ]  # not the raft: the model stands on the plate there
     rows = [_pieces(layer, kinds, step) for layer in own[step - 1 :: step]]
     flat = np.concatenate([np.zeros((0, 7)), *rows])
     back = part.rotation
