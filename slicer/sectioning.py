@@ -174,9 +174,7 @@ def section_part(
     cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
     outlines, too_thin = _printable(mesh, cuts_mm, profile)
     if on_platform and not pedestal:
-        base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
-        lowest = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM))
-        outlines = lay_on_plate(outlines, lowest, base, process.line_width_mm)
+        outlines = _with_base(outlines, mesh, cuts_mm, process)
     places = modified_places(part, mesh, process, cuts_mm)
     beside, above, beneath = _model_around(part, earlier, later, heights, process, places)
     outlines = compensate(outlines, part, later, beside, cuts_mm, process)
@@ -217,6 +215,13 @@ def section_part(
         pedestal_layers=pedestal,
         too_thin=too_thin,
     )
+
+
+def _with_base(outlines: list[Polygons], mesh: Mesh, cuts_mm: Floats, process: Process) -> list[Polygons]:
+    """Returns the outlines; the lowest layer also holds the area where the mesh touches the plate."""
+    base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
+    lowest = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM))
+    return lay_on_plate(outlines, lowest, base, process.line_width_mm)
 
 
 def _printable(mesh: Mesh, cuts_mm: Floats, profile: Profile) -> tuple[list[Polygons], frozenset[int]]:
