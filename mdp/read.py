@@ -1,18 +1,22 @@
 """Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mdp.directions.turns import turned_by
+from mdp.formats.project import Project, ProjectObject, ProjectVolume
 from mdp.formats.readers import READERS
 from mdp.formats.surface import Surface
-from mdp.mesh import Mesh
+from mdp.mesh import Floats, Mesh
 from mdp.model_file import check_file
 from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.project import marks, printed
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
 from mdp.topology.components import vertex_components
+from mdp.zone import NO_ZONES, Zones
 from profiles.errors import MeshError
 
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
@@ -31,32 +35,52 @@ class SizeError(MeshError):
         self.question, self.units = question, units
 
 
+@dataclass(frozen=True, eq=False)
+class ReadModel:
+    """A model as its file has it: its solid, a short sentence for every repair and for what else a person must know, and the
+    marks that a slicer's project brings along, where they lie on the solid."""
+
+    mesh: Mesh
+    notes: tuple[str, ...] = ()
+    zones: Zones = NO_ZONES
+
+
 def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0)) -> tuple[Mesh, tuple[str, ...]]:
     """The solid of a model file, and a short sentence for every repair that was made.
 
     Scaled, then rotated about x, then y, then z, then moved so that its box rests on z = 0 and is centred in x and y.
     Raises MeshError with one sentence: unreadable, damaged, open, flat, or of a size that no printer makes.
     """
+    model = read_model(path, scale, rotate_deg)
+    return model.mesh, model.notes
+
+
+def read_model(
+    path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0), plate: int | None = None
+) -> ReadModel:
+    """The same with the marks of a project. plate: of its plates; None: the first that holds something. Raises MeshError."""
     with np.errstate(all="ignore"):  # what overflows is no finite number, or too large: both are said in a sentence below
-        surfaces = _read_surfaces(path)
+        project = _read_project(path, plate)
     try:
+        surfaces, taken = printed(project)
         _check_size(surfaces, scale)
         if scale != 1.0:
             surfaces = [Surface(surface.vertices * scale, surface.faces, surface.colours) for surface in surfaces]
-        solid, notes = repair(surfaces)
+        solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
+        mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
+        zones, told = marks(project, path, scale * turn, shift_mm)
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    mesh = _place_on_platform(solid, rotate_deg)
-    return mesh, (*notes, *floating_pieces(mesh), *too_fine(mesh))
+    return ReadModel(mesh, (*project.notes, *taken, *told, *repairs, *floating_pieces(mesh), *too_fine(mesh)), zones)
 
 
 def read_in_place(path: Path) -> Mesh:
     """The solid of a model file where the file has it, in mm. Raises MeshError as read_mesh, but for sizes."""
     try:
-        solid, _ = repair(_read_surfaces(path))
+        solid, _ = repair(printed(_read_project(path))[0])
     except MeshError as error:
         text = str(error)
         raise MeshError(text if text.startswith(str(path)) else f"{path}: {text}") from None
@@ -89,7 +113,8 @@ def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
     return (f"{pieces} {height}, as its file has it, on nothing: only support can hold such, whatever is cut",)
 
 
-def _read_surfaces(path: Path) -> list[Surface]:
+def _read_project(path: Path, plate: int | None = None) -> Project:
+    """What a model file prints; one that is no project is one object."""
     check_file(path)
     try:
         size = path.stat().st_size
@@ -97,7 +122,13 @@ def _read_surfaces(path: Path) -> list[Surface]:
             raise MeshError(f"{path}: is empty")
         if size > MOST_BYTES:
             raise MeshError(f"{path}: has {size} bytes, at most {MOST_BYTES} are read: a model of fewer faces is needed")
-        return READERS[path.suffix.lower()](path)
+        if path.suffix.lower() == ".3mf":
+            from mdp.formats.threemf import read_project
+
+            return read_project(path, plate)
+        if plate is not None:
+            raise MeshError(f"{path}: has no plates: --plate {plate} goes with a project of Bambu Studio or OrcaSlicer (.3mf)")
+        return Project([ProjectObject([ProjectVolume(surface) for surface in READERS[path.suffix.lower()](path)])])
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from None
 
@@ -124,12 +155,13 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
     )
 
 
-def _place_on_platform(solid: Surface, rotate_deg: tuple[float, float, float]) -> Mesh:
-    vertices = solid.vertices
+def _place_on_platform(solid: Surface, rotate_deg: tuple[float, float, float]) -> tuple[Mesh, Floats, Floats]:
+    """The mesh of a solid on the platform, and the rotation and the shift that bring it there."""
+    vertices, turn = solid.vertices, np.eye(3)
     if any(rotate_deg):
-        vertices = vertices @ np.round(turned_by(rotate_deg), 15).T  # rounded so that quarter turns are exact
+        turn = np.round(turned_by(rotate_deg), 15)  # rounded so that quarter turns are exact
+        vertices = vertices @ turn.T
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
-    return Mesh(
-        vertices - middle, solid.faces.astype(np.int32), None if solid.colours is None else solid.colours.astype(np.int32)
-    )
+    colours = None if solid.colours is None else solid.colours.astype(np.int32)
+    return Mesh(vertices - middle, solid.faces.astype(np.int32), colours), turn, -middle

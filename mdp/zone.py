@@ -6,7 +6,7 @@ person's to say: a colour alone marks nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from math import cos, radians
 from pathlib import Path
@@ -138,6 +138,11 @@ class Grown:
     point_mm: Vector
     angle_deg: float
 
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Grown":
+        """The same with its point p at rotation @ p + shift_mm."""
+        x, y, z = (rotation @ np.array(self.point_mm) + shift_mm).tolist()
+        return replace(self, point_mm=(x, y, z))
+
     def faces(self, mesh: Mesh) -> Mask:
         """(m,) which faces of a mesh they are; those without area count where they link others."""
         face = mesh.nearest_face(np.array(self.point_mm))[0]
@@ -154,26 +159,41 @@ class Grown:
         return mesh.nearest_face(np.array(self.point_mm))[1]
 
 
-AnyZone = Zone | Painted | Grown
-
-
-def faces_of(mesh: Mesh, zone: Painted | Grown) -> Mask:
-    """(m,) the faces of a mesh that a zone means."""
-    if isinstance(zone, Grown):
-        return zone.faces(mesh)
-    return np.zeros(len(mesh.faces), dtype=np.bool_) if mesh.colours is None else mesh.colours == zone.colour
-
-
 @dataclass(frozen=True)
 class MeshVolume:
-    """A closed mesh that lies in the workpiece frame, and the file that it is read from."""
+    """A closed mesh that lies in the workpiece frame, and the file that it is read from; room: as of Zone."""
 
     file: Path
     mesh: Mesh = field(compare=False, repr=False)
+    room: Zone | None = None
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "MeshVolume":
         """The volume with every place p of it at rotation @ p + shift_mm."""
-        return replace(self, mesh=self.mesh.transform(rotation, shift_mm))
+        room = None if self.room is None else self.room.transform(rotation, shift_mm)
+        return replace(self, mesh=self.mesh.transform(rotation, shift_mm), room=room)
+
+    @property
+    def box(self) -> Zone:
+        """The box around it."""
+        (x0, y0, z0), (x1, y1, z1) = self.mesh.bounds_mm.tolist()
+        return Zone((x0, y0, z0), (x1, y1, z1), room=self.room)
+
+    def touches(self, mesh: Mesh) -> Mask:
+        """(m,) which faces reach into the box around it."""
+        return self.box.touches(mesh)
+
+
+Volume = Zone | MeshVolume
+AnyZone = Zone | MeshVolume | Painted | Grown
+
+
+def faces_of(mesh: Mesh, zone: MeshVolume | Painted | Grown) -> Mask:
+    """(m,) the faces of a mesh that a zone means."""
+    if isinstance(zone, Grown):
+        return zone.faces(mesh)
+    if isinstance(zone, MeshVolume):
+        return zone.touches(mesh)
+    return np.zeros(len(mesh.faces), dtype=np.bool_) if mesh.colours is None else mesh.colours == zone.colour
 
 
 @dataclass(frozen=True)
@@ -181,7 +201,7 @@ class Modifier:
     """A volume inside which other values of the process hold, by their keys. room: a box around its model, outside of which are
     others that it does not change; None: there are no others."""
 
-    volume: Zone | MeshVolume
+    volume: Volume
     process: dict[str, Any]
     room: Zone | None = None
 
@@ -212,25 +232,42 @@ class Zones:
         no_seam, no_support, support = (Marked.of(mesh, zones) for zones in (self.no_seam, self.no_support, self.support))
         return ZonesOnModel(keep, no_seam, no_support, support, self.modifiers)
 
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Zones":
+        """The zones with every place p at rotation @ p + shift_mm; faces of a colour stay those."""
+
+        def moved(zone: AnyZone) -> AnyZone:
+            return zone if isinstance(zone, Painted) else zone.transform(rotation, shift_mm)
+
+        keep, no_seam, no_support, support = (
+            tuple(map(moved, zones)) for zones in (self.keep, self.no_seam, self.no_support, self.support)
+        )
+        return Zones(
+            keep, no_seam, no_support, support, tuple(modifier.transform(rotation, shift_mm) for modifier in self.modifiers)
+        )
+
+    def beside(self, others: "Zones") -> "Zones":
+        """These zones and others; where modifiers of both meet, the others' settings hold."""
+        return Zones(*(getattr(self, entry.name) + getattr(others, entry.name) for entry in fields(self)))
+
 
 @dataclass(frozen=True, eq=False)
 class Marked:
-    """The marks of one kind: boxes of the workpiece frame, and (m,) faces of a mesh; None: none is named."""
+    """The marks of one kind: volumes of the workpiece frame, and (m,) faces of a mesh; None: none is named."""
 
-    boxes: tuple[Zone, ...] = ()
+    volumes: tuple[Volume, ...] = ()
     faces: Mask | None = None
 
     @classmethod
     def of(cls, mesh: Mesh, zones: Sequence[AnyZone]) -> "Marked":
         """What zones mark of a mesh."""
-        named = [faces_of(mesh, zone) for zone in zones if not isinstance(zone, Zone)]
-        boxes = tuple(zone for zone in zones if isinstance(zone, Zone))
-        return cls(boxes, np.any(named, axis=0) if named else None)
+        named = [faces_of(mesh, zone) for zone in zones if not isinstance(zone, Volume)]
+        volumes = tuple(zone for zone in zones if isinstance(zone, Volume))
+        return cls(volumes, np.any(named, axis=0) if named else None)
 
     @property
     def anywhere(self) -> bool:
         """Whether anything is marked at all."""
-        return bool(self.boxes) or self.faces is not None
+        return bool(self.volumes) or self.faces is not None
 
     def among(self, sources: Ints) -> "Marked":
         """The same for a piece of the mesh. sources: (k,) of which of its faces each of the piece's is one, below 0: of none."""
@@ -241,24 +278,24 @@ class Marked:
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Marked":
         """The same for a mesh with every vertex v at rotation @ v + shift_mm."""
-        return replace(self, boxes=tuple(box.transform(rotation, shift_mm) for box in self.boxes))
+        return replace(self, volumes=tuple(volume.transform(rotation, shift_mm) for volume in self.volumes))
 
     def within(self, room: Zone) -> "Marked":
         """The same, but nothing is marked outside of a box around the mesh."""
-        return replace(self, boxes=tuple(replace(box, room=room) for box in self.boxes))
+        return replace(self, volumes=tuple(replace(volume, room=room) for volume in self.volumes))
 
     @classmethod
     def together(cls, marks: Sequence[tuple["Marked", int]]) -> "Marked":
         """The marks of several meshes that become one; with each the number of its mesh's faces."""
-        boxes = tuple(box for mark, _ in marks for box in mark.boxes)
+        volumes = tuple(volume for mark, _ in marks for volume in mark.volumes)
         if all(mark.faces is None for mark, _ in marks):
-            return cls(boxes)
+            return cls(volumes)
         faces = [np.zeros(count, dtype=np.bool_) if mark.faces is None else mark.faces for mark, count in marks]
-        return cls(boxes, np.concatenate(faces))
+        return cls(volumes, np.concatenate(faces))
 
     def touched(self, mesh: Mesh) -> Mask:
-        """(m,) the faces of the mesh that are marked or reach into a box."""
-        faces = touched(mesh, self.boxes)
+        """(m,) the faces of the mesh that are marked or reach into a volume."""
+        faces = touched(mesh, self.volumes)
         return faces if self.faces is None else faces | self.faces
 
 
@@ -289,7 +326,7 @@ class ZonesOnModel:
 NO_ZONES, NOWHERE, UNMARKED = Zones(), ZonesOnModel(), Marked()
 
 
-def touched(mesh: Mesh, zones: Sequence[Zone]) -> Mask:
+def touched(mesh: Mesh, zones: Sequence[Volume]) -> Mask:
     """(m,) which faces reach into any of the zones."""
     faces = np.zeros(len(mesh.faces), dtype=np.bool_)
     for zone in zones:

@@ -15,7 +15,7 @@ from mdp.cut import convex_hull
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.topology.cross_section import cross_sections
-from mdp.zone import MeshVolume, Modifier, Zone
+from mdp.zone import MeshVolume, Modifier, Volume
 from profiles.errors import SliceError
 from profiles.part_settings import process_of_part
 from profiles.process import Process
@@ -97,19 +97,23 @@ def _areas(part: Part, modifiers: Sequence[Modifier], mesh: Mesh, cuts_mm: Float
     """The sections of volumes in each layer, near the part."""
     (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
     window = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
-    sections = [_sections(part, modifier.volume, cuts_mm) for modifier in modifiers]
-    for k, modifier in enumerate(modifiers):
+    sections = []
+    for modifier in modifiers:
+        sections.append(volume_sections(part, modifier.volume, cuts_mm))
         if modifier.room is not None:
-            rooms = _sections(part, modifier.room, cuts_mm)
-            sections[k] = [area ^ room for area, room in zip(sections[k], rooms, strict=True)]
+            rooms = volume_sections(part, modifier.room, cuts_mm)
+            sections[-1] = [area ^ room for area, room in zip(sections[-1], rooms, strict=True)]
     return [union(layer) ^ window for layer in zip(*sections, strict=True)]
 
 
-def _sections(part: Part, volume: Zone | MeshVolume, cuts_mm: Floats) -> list[Polygons]:
-    """The sections of one volume in each layer of a part."""
+def volume_sections(part: Part, volume: Volume, cuts_mm: Floats) -> list[Polygons]:
+    """The sections of a volume in each layer of a part, within its room."""
     mesh = volume.mesh if isinstance(volume, MeshVolume) else convex_hull(volume.corners)
     in_part = mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
-    return [clean(loops, 0.0) for loops in cross_sections(in_part, cuts_mm)]
+    areas = [clean(loops, 0.0) for loops in cross_sections(in_part, cuts_mm)]
+    if volume.room is None:
+        return areas
+    return [area ^ room for area, room in zip(areas, volume_sections(part, volume.room, cuts_mm), strict=True)]
 
 
 def most_shell_layers(process: Process, places: Sequence[Place]) -> tuple[int, int]:

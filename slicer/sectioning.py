@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 
-from mdp.cut import convex_hull
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Indices, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
@@ -60,7 +59,7 @@ from slicer.interface.interface import (
     plastic_below,
     sections_of,
 )
-from slicer.modifiers import Place, combined, modified_places, most_shell_layers
+from slicer.modifiers import Place, combined, modified_places, most_shell_layers, volume_sections
 from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
@@ -380,7 +379,8 @@ def no_seam_segments(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Floats]:
     part's zones name, and of all faces within their boxes. mesh: the part's, in its frame."""
     marked = part.no_seam
     chords = [_chords(mesh, np.zeros(len(mesh.faces), dtype=np.bool_) if marked.faces is None else marked.faces, cuts_mm)]
-    for box in marked.boxes:
+    for volume in marked.volumes:
+        box = volume if isinstance(volume, Zone) else volume.box
         segments, layer = _chords(mesh, touched(part.mesh, [box]), cuts_mm)
         low, high = _within((segments + np.array([0.0, 0.0, part.base.offset_mm])) @ part.rotation, box)
         inside = low < high
@@ -424,15 +424,15 @@ def _within(segments: Floats, box: Zone) -> tuple[Floats, Floats]:
 
 
 def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
-    """For each layer the sections of the boxes and the shadows of the faces, as they belong to it, that are marked on a part; []
-    where nothing is.
+    """For each layer the sections of the volumes and the shadows of the faces, as they belong to it, that are marked on a part;
+    [] where nothing is.
 
     mesh: the part's, in its frame; cuts_mm: the middles of the layers.
     """
     if not marked.anywhere:
         return []
     named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))
-    sections = [_of_box(box, part, cuts_mm) for box in marked.boxes]
+    sections = [volume_sections(part, volume, cuts_mm) for volume in marked.volumes]
     layers = []
     for k in range(len(cuts_mm)):
         pieces = [areas[k] for areas in sections]
@@ -440,15 +440,6 @@ def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> lis
             pieces.append(offset(Polygons([_upward(face) for face in named[k]]), RIM_MM))
         layers.append(union(pieces))
     return layers
-
-
-def _of_box(box: Zone, part: Part, cuts_mm: Floats) -> list[Polygons]:
-    """The sections of a box in each layer of a part, within its room."""
-    in_part = convex_hull(box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm))
-    areas = [Polygons(loops) for loops in cross_sections(in_part, cuts_mm)]
-    if box.room is None:
-        return areas
-    return [area ^ room for area, room in zip(areas, _of_box(box.room, part, cuts_mm), strict=True)]
 
 
 def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:

@@ -73,7 +73,7 @@ class ModelRequest:
     model down in the cheapest orientation; None: where nothing says how it lies. compare: with the same model in one part. force:
     go on although the dry run found errors. profile_names: of machine, material and process as the user has given them, names or
     files. stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other
-    models there."""
+    models there. plate: of each model's project; None: the first that holds something."""
 
     model: str
     profile: "Profile"
@@ -88,6 +88,7 @@ class ModelRequest:
     stops: "tuple[Stop, ...]" = ()
     copies: int = 1
     beside: tuple[str, ...] = ()
+    plate: int | None = None
 
     @property
     def name(self) -> str:

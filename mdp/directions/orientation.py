@@ -135,6 +135,14 @@ def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
     return turned.transform(np.eye(3), (-middle[0], -middle[1], -low[2]))
 
 
+def motion_between(before: Mesh, after: Mesh) -> tuple[Floats, Floats]:
+    """The rotation (3, 3) and the shift by which a mesh was brought from one place to another (W. Kabsch, 1976)."""
+    first, second = before.vertices.mean(axis=0), after.vertices.mean(axis=0)
+    left, _, right = np.linalg.svd((after.vertices - second).T @ (before.vertices - first))
+    rotation: Floats = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    return rotation, second - rotation @ first
+
+
 def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
     """(k,) risky areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
     return _face_areas(mesh, directions, angle_deg)[:, RISKY]

@@ -1,27 +1,68 @@
-"""3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3), and the
-colours of their triangles (Materials and Properties Extension 1.2)."""
+"""3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3), the colours
+of their triangles (Materials and Properties Extension 1.2), and what a slicer's project says of them (mdp.formats.project)."""
 
 import lzma
+import re
 import struct
 import zipfile
 import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import numpy as np
 
+from mdp.formats.project import (
+    PART,
+    Plate,
+    Project,
+    ProjectObject,
+    ProjectVolume,
+    Role,
+    Told,
+    read_bambu,
+    read_cura,
+    read_heights,
+    read_prusaslicer,
+)
 from mdp.formats.surface import Surface, check_meshes, check_placed, check_surface, parse_floats, parse_integers
 from mdp.mesh import NO_COLOUR, Floats, Indices, parse_colour
 from profiles.errors import MeshError
 
 UNIT_MM = {"micron": 0.001, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
-CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 MATERIAL = "{http://schemas.microsoft.com/3dmanufacturing/material/2015/02}"
 COLOUR_GROUP = (f"{MATERIAL}colorgroup", f"{MATERIAL}color")
-PRODUCTION_PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}path"
+PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+PRODUCTION_PATH = f"{{{PRODUCTION}}}path"
 RELATION = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+EXTENSION = re.compile(r"3dmanufacturing/([a-z]+)/\d{4}")  # its name in its namespace
+EXTENSIONS = {"core", "production", "material", "trianglesets"}  # that change no shape beyond what is read here
+PLAIN = "the program that made the file can export plain triangles"
+NOT_PRINTED = ("support", "solidsupport", "other")  # types of objects
+PRUSASLICER = ("metadata/slic3r_pe_model.config", "metadata/slic3r_model.config", "metadata/superslicer_model.config")
+BAMBU = "metadata/model_settings.config"
+HEIGHTS = ("metadata/prusa_slicer_layer_config_ranges.xml", "metadata/layer_config_ranges.xml")
+NOT_TAKEN = {  # parts of a package, and what they would change
+    **dict.fromkeys(
+        ("metadata/slic3r_pe_layer_heights_profile.txt", "metadata/layer_heights_profile.txt"),
+        "its variable layer heights are not taken: process.adaptive_heights",
+    ),
+    **dict.fromkeys(
+        ("metadata/prusa_slicer_custom_gcode_per_print_z.xml", "metadata/custom_gcode_per_layer.xml"),
+        "its pauses and changes of filament at heights are not taken: --pause, --filament-change",
+    ),
+}
+PAINTED = {  # attributes of triangles, and what they would change
+    "support": ("paint_supports", "slic3rpe:custom_supports"),
+    "seams": ("paint_seam", "slic3rpe:custom_seam"),
+    "filaments": ("paint_color", "slic3rpe:mmu_segmentation"),
+    "fuzzy skin": ("paint_fuzzy_skin", "slic3rpe:fuzzy_skin"),
+}
 DAMAGES: tuple[type[Exception], ...] = (
     LookupError,
     ElementTree.ParseError,
@@ -38,16 +79,18 @@ LARGEST_MODEL_BYTES = 2**30  # a zip of a few kB can unpack to more than any mem
 MOST_MARKS = 12_000_000  # each element takes 80 bytes of memory and more; eight million triangles are below
 DEEPEST = 32  # components within components; a ring of them would never end
 _IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
+_Read = TypeVar("_Read")
 
 
 @dataclass(frozen=True)
 class Model:
     """A model part of the package: its root element, its objects by their numbers, the colours of its groups of colours or of
-    materials, and the surfaces made of them so far."""
+    materials, what its triangles are painted for, and the surfaces made of them so far."""
 
     root: ElementTree.Element
     objects: dict[str, ElementTree.Element]
     palettes: dict[str, list[int]]
+    painted: tuple[str, ...] = ()
     surfaces: dict[str, Surface] = field(default_factory=dict)
 
 
@@ -59,99 +102,289 @@ class Package:
     archive: zipfile.ZipFile
     models: dict[str, Model] = field(default_factory=dict)
 
-    def parse(self, name: str) -> ElementTree.Element:
-        """The root element of a part; raises MeshError when it is missing, too large or malformed."""
+    def entry(self, name: str) -> str | None:
+        """The entry that holds a part, whose names know no case (Open Packaging Conventions, 6.2.2.3); None: there is none."""
+        wanted, entries = unquote(name).lstrip("/"), self.archive.namelist()
+        return wanted if wanted in entries else next((own for own in entries if own.lower() == wanted.lower()), None)
+
+    def content(self, name: str) -> bytes:
+        """The bytes of a part; raises MeshError when it is missing or too large."""
         try:
-            if self.archive.getinfo(name).file_size > LARGEST_MODEL_BYTES:
+            entry = self.entry(name)
+            if entry is None:
+                raise LookupError("there is no such part")
+            if self.archive.getinfo(entry).file_size > LARGEST_MODEL_BYTES:
                 raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
-            content = self.archive.read(name)
-            if content.count(b"<") > MOST_MARKS or content.count(b"=") > 4 * MOST_MARKS:
-                raise MeshError(f"{self.path}: its part {name} has more than {MOST_MARKS} elements or too many attributes")
-            return ElementTree.fromstring(content)
+            content = self.archive.read(entry)
         except DAMAGES as error:
-            raise MeshError(f"{self.path}: its part {name} is missing or malformed ({error})") from None
+            raise self._damaged(name, error) from None
+        if content.count(b"<") > MOST_MARKS or content.count(b"=") > 4 * MOST_MARKS:
+            raise MeshError(f"{self.path}: its part {name} has more than {MOST_MARKS} elements or too many attributes")
+        return content
+
+    def parse(self, name: str, content: bytes) -> ElementTree.Element:
+        """The root element of a part; raises MeshError when it is malformed."""
+        try:
+            return _tree(content)
+        except DAMAGES as error:
+            raise self._damaged(name, error) from None
+
+    def config(self, names: tuple[str, ...], read: Callable[[ElementTree.Element], _Read]) -> _Read | None:
+        """What the first of some parts holds that the package has; None: it has none. Raises MeshError."""
+        name = next((name for name in names if self.entry(name) is not None), None)
+        if name is None:
+            return None
+        root = self.parse(name, self.content(name))
+        try:
+            return read(root)
+        except ValueError as error:
+            raise self._damaged(name, error) from None
 
     def model(self, name: str) -> Model:
-        """A model part, parsed once; raises MeshError."""
+        """A model part, parsed once; raises MeshError, also for what it needs and is not read."""
         name = name.lstrip("/")
         if name not in self.models:
-            root = self.parse(name)
-            objects = {element.get("id", ""): element for element in reversed(root.findall(f"{CORE}resources/{CORE}object"))}
-            self.models[name] = Model(root, objects, _palettes(root))
+            content = self.content(name)
+            root = self.parse(name, content)
+            if root.tag.rpartition("}")[2] != "model":
+                raise MeshError(f"{self.path}: its part {name} is no 3MF model: its first element is {root.tag[:60]!r}")
+            self._check_extensions(root, content)
+            objects = {element.get("id", ""): element for element in reversed(root.findall("{*}resources/{*}object"))}
+            painted = tuple(what for what, names in PAINTED.items() if any(f'{own}="'.encode() in content for own in names))
+            self.models[name] = Model(root, objects, _palettes(root), painted)
         return self.models[name]
+
+    def _check_extensions(self, root: ElementTree.Element, content: bytes) -> None:
+        """Raise MeshError for an extension that a model needs to be understood and that is not read."""
+        for prefix in root.get("requiredextensions", "").split():
+            declared = re.search(rb"xmlns:%s\s*=\s*[\"']([^\"']*)" % re.escape(prefix.encode()), content)
+            namespace = declared[1].decode(errors="replace") if declared else prefix
+            named = EXTENSION.search(namespace)
+            if (named[1] if named else prefix) not in EXTENSIONS and prefix not in ("p", "m"):
+                raise MeshError(
+                    f"{self.path}: needs the 3MF extension {named[1] if named else namespace}, which is not read: {PLAIN}"
+                )
+
+    def _damaged(self, name: str, error: Exception) -> MeshError:
+        return MeshError(f"{self.path}: its part {name} is missing or malformed ({error})")
 
 
 @dataclass(frozen=True)
 class Placement:
-    """An object of a model part that a build item or a component places; a point p lies at [p 1] @ transform."""
+    """An object of a model part that a build item or a component places; a point p lies at [p 1] @ transform. within: the numbers
+    of the objects that it is a component of, the item's own first; role: what these say that it is; None: nothing."""
 
     part: str
     identity: str
     transform: Floats
-    depth: int
+    within: tuple[str, ...] = ()
+    role: Role | None = None
 
 
 def read(path: Path) -> list[Surface]:
-    """One surface for every mesh that the build places, in mm.
+    """One surface for every mesh that the build prints, in mm; see read_project."""
+    return [surface for built in read_project(path).objects for surface in built.surfaces(PART)]
 
-    Raises MeshError for a damaged package, an unknown unit, an object that does not exist and indices out of range.
+
+def read_project(path: Path, plate: int | None = None) -> Project:
+    """The objects that the build prints on one plate; None: the first that holds something.
+
+    Raises MeshError for a damaged package, an unknown unit, an object or a plate that does not exist, indices out of range and
+    extensions that are needed and not read.
     """
     try:
         archive = zipfile.ZipFile(path)
     except (zipfile.BadZipFile, struct.error, ValueError, NotImplementedError):
         raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
-        surfaces = _built_meshes(Package(path, archive))
-    if not surfaces:
-        raise MeshError(f"{path}: its build places no mesh")
-    return surfaces
+        return _Build(Package(path, archive)).project(plate)
 
 
-def _built_meshes(package: Package) -> list[Surface]:
-    """The meshes of all build items and their components, in the order of the file."""
-    start = _start_part(package)
-    items = package.model(start).root.findall(f"{CORE}build/{CORE}item")
-    pending = [_placement(package, item, start, _IDENTITY, 0) for item in reversed(items)]
-    surfaces: list[Surface] = []
-    placed, faces = 0, 0
-    while pending:
-        placement = pending.pop()
-        placed += 1
-        check_placed(package.path, placed)
-        model = package.model(placement.part)
-        element = model.objects.get(placement.identity)
-        if element is None or placement.depth > DEEPEST:
-            why = "it does not exist" if element is None else "its components contain each other"
-            raise MeshError(f"{package.path}: object {placement.identity!r} cannot be placed: {why}")
-        mesh = element.find(f"{CORE}mesh")
-        if mesh is not None:
-            if placement.identity not in model.surfaces:
-                model.surfaces[placement.identity] = _mesh_surface(package.path, mesh, element.get("pid", ""), model.palettes)
-            surface = model.surfaces[placement.identity]
-            surfaces.append(_transformed(package.path, surface, placement.transform, _unit_mm(package.path, model.root)))
-            faces += len(surface.faces)
-            check_meshes(package.path, len(surfaces), faces)
-            continue
-        components = element.findall(f"{CORE}components/{CORE}component")
-        pending += [
-            _placement(package, component, placement.part, placement.transform, placement.depth + 1)
-            for component in reversed(components)
-        ]
-    return surfaces
+class _Build:
+    """The build of a package."""
+
+    def __init__(self, package: Package) -> None:
+        self._package, self._path = package, package.path
+        self._start = _start_part(package)
+        self._told = _told(package)
+        self._notes: list[str] = []
+        self._placed = self._meshes = self._faces = 0
+        objects = package.model(self._start).root.findall("{*}resources/{*}object")
+        with_mesh = [element.get("id", "") for element in objects if element.find("{*}mesh") is not None]
+        self._rank = {number: str(k) for k, number in enumerate(with_mesh, start=1)}
+
+    def project(self, plate: int | None) -> Project:
+        """What is printed on a plate."""
+        package, notes = self._package, self._notes
+        items = self._items(package.model(self._start).root.findall("{*}build/{*}item"), plate)
+        built = [own for item in items if (own := self._object(item)) is not None]
+        if not any(own.surfaces(PART) for own in built):
+            raise MeshError(f"{self._path}: its build places no mesh" + (f" that is printed: it {notes[0]}" if notes else ""))
+        painted = [what for what in PAINTED if any(what in model.painted for model in package.models.values())]
+        if painted:
+            notes.append(f"what is painted on its triangles is not taken ({', '.join(painted)}): marks of a plan do such things")
+        notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
+        return Project(built, tuple(dict.fromkeys(notes)))
+
+    def _items(self, items: list[ElementTree.Element], plate: int | None) -> Iterator[ElementTree.Element]:
+        """The items that are printed on a plate."""
+        counts: Counter[str] = Counter()
+        instances = []
+        for item in items:
+            instances.append((item.get("objectid", ""), counts[item.get("objectid", "")]))
+            counts[item.get("objectid", "")] += 1
+        chosen = self._plate([own for own, item in zip(instances, items, strict=True) if _is_printed(item)], plate)
+        for item, instance in zip(items, instances, strict=True):
+            if not _is_printed(item):
+                self._leave_out(item.get("objectid", ""), "which its project does not print")
+            elif chosen is None or instance in chosen.instances:
+                yield item
+
+    def _plate(self, printed: list[tuple[str, int]], number: int | None) -> Plate | None:
+        """The plate of a number, or the first that holds something that is printed; None: there are no plates."""
+        plates = [plate for plate in self._told.plates if plate.instances.intersection(printed)]
+        if number is None:
+            if len(plates) > 1:
+                others = ", ".join(str(plate.number) for plate in plates[1:])
+                named = f" ({plates[0].name})" if plates[0].name else ""
+                self._notes.append(f"takes plate {plates[0].number}{named} of its project; --plate takes another: {others}")
+            return plates[0] if plates else None
+        if not plates:
+            raise MeshError(f"{self._path}: has no plates: --plate {number} goes with a project of Bambu Studio or OrcaSlicer")
+        for plate in plates:
+            if plate.number == number:
+                return plate
+        known = ", ".join(str(plate.number) for plate in plates)
+        empty = any(plate.number == number for plate in self._told.plates)
+        raise MeshError(f"{self._path}: --plate {number}: its plate is {'empty' if empty else 'not there'}; there are {known}")
+
+    def _object(self, item: ElementTree.Element) -> ProjectObject | None:
+        """What an item places; None: nothing."""
+        volumes: list[ProjectVolume] = []
+        settings: Mapping[str, str] = {}
+        heights: list[tuple[float, float, Mapping[str, str]]] = []
+        pending = [self._placement(item, Placement(self._start, "", _IDENTITY))]
+        while pending:
+            placement = pending.pop()
+            self._placed += 1
+            check_placed(self._path, self._placed)
+            model = self._package.model(placement.part)
+            element = model.objects.get(placement.identity)
+            if element is None or len(placement.within) > DEEPEST:
+                why = "it does not exist" if element is None else "its components contain each other"
+                raise MeshError(f"{self._path}: object {placement.identity!r} cannot be placed: {why}")
+            placement = self._with_role(placement, element)
+            if placement.role is None and element.get("type") in NOT_PRINTED:
+                self._leave_out(placement.identity, f"an object of type {element.get('type')}, which is not printed")
+                continue
+            mesh = element.find("{*}mesh")
+            if mesh is not None:
+                volumes += self._volumes(placement, model, mesh, element.get("pid", ""))
+                owners = [self._told.objects[own] for own in (*placement.within, placement.identity) if own in self._told.objects]
+                settings = {**settings, **{key: text for own in owners for key, text in own.settings.items()}}
+                heights += self._told.heights.get(self._rank.get(placement.identity, ""), ())
+                continue
+            components = element.findall("{*}components/{*}component")
+            self._check_understood(element, bool(components))
+            pending += [self._placement(component, placement) for component in reversed(components)]
+        return ProjectObject(volumes, settings, heights) if volumes else None
+
+    def _with_role(self, placement: Placement, element: ElementTree.Element) -> Placement:
+        """The placement with what the project says of its object."""
+        within, told = placement.within, self._told.parts
+        role = told.get(((*within, placement.identity)[0], placement.identity))
+        own = read_cura(element)
+        if role is None and (own.kind != PART or own.settings):
+            outer = Role() if placement.role is None else placement.role
+            kind = own.kind if outer.kind == PART else outer.kind
+            role = Role(kind, own.name or outer.name, {**outer.settings, **own.settings})
+        return placement if role is None else Placement(placement.part, placement.identity, placement.transform, within, role)
+
+    def _volumes(self, placement: Placement, model: Model, mesh: ElementTree.Element, pid: str) -> Iterator[ProjectVolume]:
+        """The volumes of an object's mesh where a placement has them."""
+        if placement.identity not in model.surfaces:
+            model.surfaces[placement.identity] = _mesh_surface(self._path, mesh, pid, model.palettes)
+        surface = model.surfaces[placement.identity]
+        self._meshes += 1
+        self._faces += len(surface.faces)
+        check_meshes(self._path, self._meshes, self._faces)
+        surface = _transformed(self._path, surface, placement.transform, _unit_mm(self._path, model.root))
+        triangles = self._told.triangles.get(placement.identity, ()) if placement.part == self._start else ()
+        if placement.role is not None or not triangles:
+            yield ProjectVolume(surface, placement.role or Role())
+            return
+        rest = np.ones(len(surface.faces), dtype=np.bool_)
+        for first, last, role in triangles:
+            if not 0 <= first <= last < len(surface.faces):
+                of = f"object {placement.identity}, which has {len(surface.faces)}"
+                raise MeshError(f"{self._path}: volume {role.name!r} has triangles {first} to {last} of {of} (counted from 0)")
+            rest[first : last + 1] = False
+            yield ProjectVolume(_piece(surface, slice(first, last + 1)), role)
+        if rest.any():
+            yield ProjectVolume(_piece(surface, np.flatnonzero(rest)))
+
+    def _check_understood(self, element: ElementTree.Element, has_components: bool) -> None:
+        """Raise MeshError for an object whose shape is told in a way that is not read."""
+        names = [child.tag.rpartition("}")[2] for child in element]
+        others = [name for name in names if name not in ("components", "metadatagroup", "settings")]
+        if others and not has_components:
+            raise MeshError(f"{self._path}: object {element.get('id')!r} is a {others[0][:40]}, which is not read: {PLAIN}")
+
+    def _placement(self, element: ElementTree.Element, outer: Placement) -> Placement:
+        """What an item or a component of a placed object places."""
+        transform = np.column_stack([_transform(self._path, element), [0, 0, 0, 1]]) @ outer.transform
+        within = (*outer.within, outer.identity) if outer.identity else ()
+        return Placement(element.get(PRODUCTION_PATH, outer.part), element.get("objectid", ""), transform, within, outer.role)
+
+    def _leave_out(self, number: str, why: str) -> None:
+        element = self._package.model(self._start).objects.get(number)
+        told = self._told.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
+        self._notes.append(f"leaves out object {told or number}, {why}")
+
+
+def _is_printed(item: ElementTree.Element) -> bool:
+    return item.get("printable", "1").lower() not in ("0", "false")
+
+
+def _told(package: Package) -> Told:
+    """What the package's configs say of its objects. Raises MeshError."""
+    heights = package.config(HEIGHTS, read_heights) or {}
+    if (bambu := package.config((BAMBU,), read_bambu)) is not None:
+        objects, parts, plates = bambu
+        return Told(objects, parts=parts, plates=plates, heights=heights)
+    objects, triangles = package.config(PRUSASLICER, read_prusaslicer) or ({}, {})
+    return Told(objects, triangles, heights=heights)
+
+
+def _tree(content: bytes) -> ElementTree.Element:
+    """The root element of a document, prefixes that it forgets to declare included."""
+    try:
+        return ElementTree.fromstring(content)
+    except ElementTree.ParseError as error:
+        root = re.search(rb"<[A-Za-z_][\w.:-]*(?=[\s/>])", content)
+        if "unbound prefix" not in str(error) or root is None:
+            raise
+    used = {*re.findall(rb"[\s</]([A-Za-z_][\w.-]*):[A-Za-z_]", content)} - {b"xml", b"xmlns"}
+    missing = sorted(used - {*re.findall(rb"xmlns:([\w.-]+)\s*=", content)})
+    meant = {b"p": PRODUCTION.encode(), b"m": MATERIAL.strip("{}").encode()}
+    declared = b"".join(b' xmlns:%s="%s"' % (prefix, meant.get(prefix, prefix)) for prefix in missing)
+    return ElementTree.fromstring(content[: root.end()] + declared + content[root.end() :])
 
 
 def _start_part(package: Package) -> str:
     """Name of the part that the package's relationships call the 3D model."""
-    for relation in package.parse("_rels/.rels").iter(RELATION):
+    name = "_rels/.rels"
+    for relation in package.parse(name, package.content(name)).iter(RELATION):
         if relation.get("Type") == MODEL_TYPE:
-            return relation.get("Target", "")
+            return relation.get("Target", "").lstrip("/")
     raise MeshError(f"{package.path}: its relationships name no 3D model")
 
 
-def _placement(package: Package, element: ElementTree.Element, part: str, outer: Floats, depth: int) -> Placement:
-    """What an item or a component of a part places, within an outer transform."""
-    transform = np.column_stack([_transform(package.path, element), [0, 0, 0, 1]]) @ outer
-    return Placement(element.get(PRODUCTION_PATH, part), element.get("objectid", ""), transform, depth)
+def _piece(surface: Surface, chosen: slice | Indices) -> Surface:
+    """Some faces of a surface, with the vertices that they use."""
+    vertices, faces = np.unique(surface.faces[chosen], return_inverse=True)
+    colours = None if surface.colours is None else surface.colours[chosen]
+    return Surface(surface.vertices[vertices], faces.reshape(-1, 3), colours)
 
 
 def _unit_mm(path: Path, root: ElementTree.Element) -> float:
@@ -164,8 +397,8 @@ def _unit_mm(path: Path, root: ElementTree.Element) -> float:
 def _palettes(root: ElementTree.Element) -> dict[str, list[int]]:
     """The colours of every group of colours or of materials, by its number; NO_COLOUR for one that is not understood."""
     palettes = {}
-    for kind, entry, attribute in ((f"{CORE}basematerials", f"{CORE}base", "displaycolor"), (*COLOUR_GROUP, "color")):
-        for group in root.findall(f"{CORE}resources/{kind}"):
+    for kind, entry, attribute in (("{*}basematerials", "{*}base", "displaycolor"), (*COLOUR_GROUP, "color")):
+        for group in root.findall(f"{{*}}resources/{kind}"):
             colours = (parse_colour(element.get(attribute, "")) for element in group.findall(entry))
             palettes[group.get("id", "")] = [NO_COLOUR if colour is None else colour for colour in colours]
     return palettes
@@ -189,8 +422,10 @@ def _triangle_colours(triangles: list[ElementTree.Element], pid: str, palettes: 
 
 def _mesh_surface(path: Path, mesh: ElementTree.Element, pid: str, palettes: dict[str, list[int]]) -> Surface:
     """The surface of an object's mesh. pid: the object's group of colours, palettes: all groups."""
-    points = [(v.get("x", ""), v.get("y", ""), v.get("z", "")) for v in mesh.iter(f"{CORE}vertex")]
-    triangles = list(mesh.iter(f"{CORE}triangle"))
+    if mesh.find("{*}beamlattice") is not None:
+        raise MeshError(f"{path}: its mesh is a lattice of beams, which is not read: {PLAIN}")
+    points = [(v.get("x", ""), v.get("y", ""), v.get("z", "")) for v in mesh.findall("{*}vertices/{*}vertex")]
+    triangles = mesh.findall("{*}triangles/{*}triangle")
     corners = [(t.get("v1", ""), t.get("v2", ""), t.get("v3", "")) for t in triangles]
     vertices, faces = parse_floats(path, points, "a vertex"), parse_integers(path, corners, "a triangle")
     return check_surface(path, vertices, faces, _triangle_colours(triangles, pid, palettes))

@@ -65,6 +65,7 @@ ZONE_KINDS = ("keep", "no_seam", "no_support", "support")  # as mdp.zone.Zones h
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "modifier", "front")
 PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
 ZONE_KEYS = ("min_mm", "max_mm", "axes", "colour", "point_mm", "angle_deg")
+MESH_ZONES = ("no_support", "support")  # kinds that may be a mesh, too
 MODIFIER_KEYS = ("min_mm", "max_mm", "axes", "z_mm", "mesh", "process")
 MOST_MM = 1e5  # fifty times what any printer makes (mdp.read.MOST_MM)
 ROW_FIGURES = ("support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2")

@@ -13,6 +13,7 @@ from mdp.mesh import parse_colour
 from mdp.plane import unit_direction
 from mdp.plans.plan_file import (
     KEYS,
+    MESH_ZONES,
     MODIFIER_KEYS,
     MOST_MM,
     PART_KEYS,
@@ -127,7 +128,12 @@ class _Reader:
         zones: list[AnyZone] = []
         for number, values in enumerate(self._list(table, key, MOST_ZONES), start=1):
             where = f"{key} {number}: "
-            self._only(values, ZONE_KEYS, where)
+            self._only(values, (*ZONE_KEYS, *(("mesh",) if key in MESH_ZONES else ())), where)
+            if "mesh" in values:
+                if len(values) > 1:
+                    raise self._error(f"{where}has a mesh and {', '.join(values.keys() - {'mesh'})}: one of them is allowed")
+                zones.append(self._solid(values, where))
+                continue
             if "colour" in values:
                 zones.append(self._painted(values, where))
                 continue

@@ -29,7 +29,7 @@ def plan_text(plan: PlanFile, folder: Path | None = None) -> str:
     for kind in ZONE_KINDS:
         zones: Sequence[AnyZone] = getattr(plan.zones, kind)
         if zones:
-            document[kind] = _tables([_table(_zone_values(zone)) for zone in zones])
+            document[kind] = _tables([_table(_zone_values(zone, folder)) for zone in zones])
     if plan.zones.modifiers:
         document["modifier"] = _tables([_modifier_table(modifier, folder) for modifier in plan.zones.modifiers])
     if plan.front:
@@ -37,23 +37,22 @@ def plan_text(plan: PlanFile, folder: Path | None = None) -> str:
     return tomlkit.dumps(document)
 
 
-def _zone_values(zone: AnyZone) -> dict[str, Any]:
+def _zone_values(zone: AnyZone, folder: Path | None) -> dict[str, Any]:
     if isinstance(zone, Painted):
         return {"colour": colour_text(zone.colour)}
     if isinstance(zone, Grown):
         return {"point_mm": list(zone.point_mm), "angle_deg": zone.angle_deg}
+    if isinstance(zone, MeshVolume):
+        return {"mesh": _path_from(folder, zone.file)}
     leaning = {} if zone.axes is None else {"axes": [list(axis) for axis in zone.axes]}
     return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm), **leaning}
 
 
 def _modifier_table(modifier: Modifier, folder: Path | None) -> tomlkit.items.Table:
     volume = modifier.volume
-    if isinstance(volume, MeshVolume):
-        values: dict[str, Any] = {"mesh": _path_from(folder, volume.file)}
-    elif _is_height_range(volume):
+    values = _zone_values(volume, folder)
+    if isinstance(volume, Zone) and _is_height_range(volume):
         values = {"z_mm": [volume.min_mm[2], volume.max_mm[2]]}
-    else:
-        values = _zone_values(volume)
     return _table({**values, "process": _inline(modifier.process)})
 
 

@@ -181,6 +181,13 @@ def _union(bodies: list[Surface]) -> Surface | None:
     return surface_of(union)
 
 
+def subtract(surface: Surface, others: list[Surface]) -> Surface:
+    """What other closed surfaces leave of one, without faces where that is nothing."""
+    import manifold3d as m3
+
+    return surface_of(m3.Manifold.batch_boolean([solid_of(surface), *map(solid_of, others)], m3.OpType.Subtract))
+
+
 def surface_of(solid: "m3.Manifold") -> Surface:
     """The triangles of a manifold3d solid."""
     mesh = solid.to_mesh64()

@@ -18,7 +18,7 @@ from mdp.search.parts import Outcome, Taken, made_of, make_parts, notes_of_searc
 from mdp.search.polish import settle
 from mdp.search.problem import Problem
 from mdp.sweep.deviation import distances_mm
-from mdp.zone import Zone, Zones
+from mdp.zone import Volume, Zones
 from profiles.profile import Profile
 
 WORTH = 0.7  # share of the faces above which a copy saves too little
@@ -32,7 +32,7 @@ def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
     the mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
     search, layer_mm = profile.search.effective, profile.process.layer_height_mm
     fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
-    marked = any(not isinstance(zone, Zone) for zone in (*zones.keep, *zones.no_seam, *zones.no_support, *zones.support))
+    marked = any(not isinstance(zone, Volume) for zone in (*zones.keep, *zones.no_seam, *zones.no_support, *zones.support))
     if not fine or marked:
         return None
     for tolerance, off in (COARSEST, *FINER):

@@ -5,14 +5,16 @@ work out (Cura, plugins/CuraProfileReader). Names: Cura, resources/definitions/f
 """
 
 import configparser
+import re
 from collections.abc import Mapping
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
+from zipfile import BadZipFile, ZipFile, ZipInfo
 
 from profiles.errors import ProfileError, reason
 from profiles.foreign.config import NUMBER, Config, Entry
 
 PROGRAM = "Cura"
+PROJECT = re.compile(r"Cura/.*\.inst\.cfg$")  # members of a project that have a person's settings
 MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
 PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
 KEYS = {
@@ -102,7 +104,11 @@ WORDS = {
 
 def read_profile(file: Path) -> Config:
     """What a .curaprofile says. Raises ProfileError."""
-    values, name = _values(file)
+    return of_values(*read_values(file))
+
+
+def of_values(values: Mapping[str, str], name: str = "") -> Config:
+    """Settings under Cura's names."""
     entries, formulas = dict[str, Entry](), list[str]()
     for own, text in values.items():
         if text.startswith("="):
@@ -137,13 +143,14 @@ def _number(text: str, usual: float) -> float:
     return float(text) if NUMBER.fullmatch(text) else usual
 
 
-def _values(file: Path) -> tuple[Mapping[str, str], str]:
-    """The settings of all ini files of a profile, an extruder's over the print's, and its name."""
+def read_values(file: Path) -> tuple[Mapping[str, str], str]:
+    """The settings of all ini files of a profile, or of those that a project keeps, an extruder's over the print's and a person's
+    own over all others, and its name. Raises ProfileError."""
     values, name = dict[str, str](), file.stem
     try:
         with ZipFile(file) as archive:
-            members = sorted(archive.infolist(), key=lambda member: "extruder" in member.filename)
-            for member in members:
+            members = [member for member in archive.infolist() if file.suffix.lower() != ".3mf" or PROJECT.match(member.filename)]
+            for member in sorted(members, key=_precedence):
                 if member.file_size > MOST_BYTES:
                     raise ProfileError(
                         f"profile {file}: {member.filename} has {member.file_size} bytes, {MOST_BYTES} are allowed"
@@ -159,6 +166,11 @@ def _values(file: Path) -> tuple[Mapping[str, str], str]:
     except (BadZipFile, configparser.Error, UnicodeDecodeError, NotImplementedError, RuntimeError) as error:
         raise ProfileError(f"profile {file}: is no profile of Cura ({str(error).splitlines()[0]})") from None
     return values, name
+
+
+def _precedence(member: ZipInfo) -> tuple[bool, bool]:
+    """Later ones hold over earlier ones."""
+    return "_user." in member.filename, "extruder" in member.filename
 
 
 def _said(key: str, text: str) -> str:

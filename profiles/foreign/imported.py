@@ -1,17 +1,20 @@
 """Imported: a configuration of another slicer as settings of our material and process, row by row, with what was left and why."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from profiles.errors import ProfileError
 from profiles.foreign import material_rules, process_rules
 from profiles.foreign.config import Config
 from profiles.foreign.conversion import Convert, Left, Value
-from profiles.process import WIDTHS
+from profiles.part_settings import problems_of_place
+from profiles.process import WIDTHS, Process
 from profiles.profile import load_one
-from profiles.toml_text import value_text
+from profiles.toml_text import read_value, value_text
 
 PROCESS_BASE = "standard"
+NOZZLE_MM = 0.4  # of the shipped machines, whose profile decides in the end
 KINDS = ("process", "material")
 RULES = {"process": process_rules.RULES, "material": material_rules.RULES}
 CONDITIONS = frozenset(  # read beside others, and told with them
@@ -103,10 +106,13 @@ def stay(profile: Imported) -> list[str]:
     return [key for key, _ in keys(type(model), f"{profile.kind}.") if key not in taken and not key.endswith(".name")]
 
 
-def _rows(config: Config, kind: str, base: str) -> Iterator[Row]:
-    """One row a rule whose setting the file has; of several for one key the first that gives a value is taken."""
+def _rows(config: Config, kind: str, base: str, sources: Collection[str] | None = None) -> Iterator[Row]:
+    """One row a rule whose setting the file has; of several for one key the first that gives a value is taken. sources: the
+    settings to look at; None: all."""
     done: set[str] = set()
     for key, source, convert in _present(config, kind):
+        if sources is not None and source not in sources:
+            continue
         entry = config.entries[source]
         converted = Left(f"{key} has another's") if key in done else convert(config, source)
         if isinstance(converted, Value):
@@ -123,6 +129,21 @@ def _rows(config: Config, kind: str, base: str) -> Iterator[Row]:
 
 def _present(config: Config, kind: str) -> Iterable[tuple[str, str, Convert]]:
     return (rule for rule in RULES[kind] if config.text(rule[1]) is not None)
+
+
+def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str, Any], list[str]]:
+    """What some settings of a configuration, by their names there, become where they hold in a volume of a print: values by keys
+    of a process, and the names of those that are left."""
+    process = load_one(PROCESS_BASE, kind="process")["process"]
+    assert isinstance(process, Process)
+    sources = {key for key, entry in config.entries.items() if entry.name in names}
+    settings, left = dict[str, Any](), set(names)
+    for row in _rows(config, "process", PROCESS_BASE, sources):
+        key = row.key.removeprefix("process.")
+        if row.taken and not [*problems_of_place(process, {key: read_value(row.value)}, NOZZLE_MM)]:
+            settings[key] = read_value(row.value)
+            left.discard(row.name)
+    return settings, sorted(left)
 
 
 def _text(value: float | bool | str | None, base: str, kind: str, key: str) -> str:

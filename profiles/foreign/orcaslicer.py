@@ -138,6 +138,11 @@ def of_values(values: Mapping[str, str], process: str = "", material: str = "") 
     return Config(PROGRAM, entries, (), process or values.get("print_settings_id", ""), material or _own(values))
 
 
+def values_of(document: Mapping[str, Any]) -> dict[str, str]:
+    """The settings of a preset or a project as texts."""
+    return {key: _text(value) for key, value in document.items() if key not in ABOUT}
+
+
 def _own(values: Mapping[str, str]) -> str:
     return values.get("filament_settings_id", "").split(";")[0].strip('"')
 
@@ -151,7 +156,7 @@ def _said(key: str, name: str, text: str, values: Mapping[str, str]) -> str:
 
 def _inherited(file: Path, document: Mapping[str, Any], below: tuple[Path, ...]) -> tuple[dict[str, str], str]:
     """All settings of a preset, and the name of a parent that no file beside it has (its settings are then unknown)."""
-    own = {key: _text(value) for key, value in document.items() if key not in ABOUT}
+    own = values_of(document)
     parent = str(document.get("inherits", "") or "")
     if not parent:
         return own, ""

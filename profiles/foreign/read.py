@@ -7,6 +7,7 @@ from zipfile import is_zipfile
 from profiles.errors import ProfileError, reason
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
+from profiles.foreign.project import is_project, read_project_settings
 
 MOST_BYTES = 256 << 20  # of a G-code file; settings stand in its last MiB, OrcaSlicer's in its first as well
 END_BYTES = 1 << 20
@@ -21,6 +22,8 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     no slicer known here, or whose presets are not named.
     """
     try:
+        if is_project(file):
+            return _of_project(file)
         if is_zipfile(file):
             return cura.read_profile(file)
         content = _ends(file)
@@ -38,9 +41,17 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     if not PRUSA_KEYS & config.entries.keys():
         raise ProfileError(
             f"profile {file}: holds no settings; a config.ini, a bundle or a G-code file of PrusaSlicer or SuperSlicer, a JSON "
-            "preset of OrcaSlicer or Bambu Studio, or a .curaprofile is expected"
+            "preset of OrcaSlicer or Bambu Studio, a .curaprofile, or a project of these (.3mf) is expected"
         )
     return config
+
+
+def _of_project(file: Path) -> Config:
+    """The settings inside a project. Raises ProfileError where it keeps none."""
+    settings = read_project_settings(file)
+    if not settings.values:
+        raise ProfileError(f"profile {file}: keeps no print settings; a project that a slicer has saved with them is expected")
+    return settings.config
 
 
 def _ends(file: Path) -> bytes:

@@ -67,7 +67,7 @@ def test_boxes_that_share_a_leaning_part_share_its_walls(axes: tuple[Vector, Vec
         """Length of no_seam segments in every layer, all of it in the zone's box, if it has one."""
         segments = no_seam_segments(replace(leaning, no_seam=zone), leaning.in_part_frame(), cuts_mm)
         layers = [chords.reshape(-1, 2, 3) for chords in segments]
-        for within in zone.boxes:
+        for within in zone.volumes:
             spots = (np.concatenate(layers) + np.array([0.0, 0.0, leaning.base.offset_mm])) @ leaning.rotation
             assert (within.along(spots) >= np.array(within.min_mm) - 1e-9).all()
             assert (within.along(spots) <= np.array(within.max_mm) + 1e-9).all()

@@ -37,10 +37,10 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     mesh = None if program.decomposition is None else program.decomposition.mesh
     if reference is not None:
         from machine.planning.fit import mesh_at_place
-        from mdp.read import read_mesh
+        from mdp.read import read_model
 
-        mesh, _ = read_mesh(locate(reference), profile.process.scale, profile.process.rotate_deg)
-        mesh = mesh_at_place(mesh, profile)
+        model = read_model(locate(reference), profile.process.scale, profile.process.rotate_deg, request.plate)
+        mesh = mesh_at_place(model.mesh, profile)
     agreed = None
     if mesh is not None:
         from machine.dryrun.conformity.agreement import agreement

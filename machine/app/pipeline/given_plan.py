@@ -1,5 +1,6 @@
 """Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from mdp.model_file import plan_beside
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.search.search import check_part_count
+from mdp.zone import Modifier
 from profiles.errors import PlanError, ProfileError
 from profiles.part_settings import problems_of_place
 from profiles.profile import Profile, with_part_settings
@@ -98,10 +100,7 @@ def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
     that no modifier may have."""
     if given is None:
         return profile
-    for number, modifier in enumerate(given.zones.modifiers, start=1):
-        problems = list(problems_of_place(profile.process, modifier.process, profile.machine.head.nozzle_mm))
-        if problems:
-            raise PlanError(f"plan {given.name}: " + "; ".join(f"modifier {number}: {problem}" for problem in problems))
+    check_modifiers(profile, given.zones.modifiers, f"plan {given.name}")
     if not given.settings:
         return profile
     try:
@@ -109,6 +108,14 @@ def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
     except ProfileError as error:
         raise PlanError(f"plan {given.name}: {error}") from None
     return with_part_settings(profile, given.settings)
+
+
+def check_modifiers(profile: Profile, modifiers: Sequence[Modifier], where: str) -> None:
+    """Raise PlanError for settings that no modifier may have with a profile. where: the name of what has them."""
+    for number, modifier in enumerate(modifiers, start=1):
+        problems = list(problems_of_place(profile.process, modifier.process, profile.machine.head.nozzle_mm))
+        if problems:
+            raise PlanError(f"{where}: " + "; ".join(f"modifier {number}: {problem}" for problem in problems))
 
 
 def check_parts_named(profile: Profile, parts: int) -> None:

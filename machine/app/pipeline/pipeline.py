@@ -14,6 +14,7 @@ from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import (
     as_turned,
+    check_modifiers,
     check_number,
     check_parts_named,
     lays_down,
@@ -38,12 +39,12 @@ from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
 from machine.program import Program
 from mdp.decomposition import Decomposition, Part
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import motion_between, standing_still
 from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
-from mdp.read import read_mesh
+from mdp.read import ReadModel, read_model
 from mdp.search.by_plan import cut_by_plan
 from mdp.search.front import Worth
 from mdp.search.orient import orient_and_decompose
@@ -100,10 +101,11 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     if to_build:
         check_blocks(profile)
     began = perf_counter()
-    mesh, repairs = read_mesh(locate(request.model), profile.process.scale, profile.process.rotate_deg)
-    read_s = perf_counter() - began
-    for repair in repairs:
-        say(f"{request.name}: {repair}")
+    model = read_model(locate(request.model), profile.process.scale, profile.process.rotate_deg, request.plate)
+    mesh, read_s = model.mesh, perf_counter() - began
+    for note in model.notes:
+        say(f"{request.name}: {note}")
+    check_modifiers(profile, model.zones.modifiers, request.name)
     compilers.begin((*compilers.JUDGE, *compilers.SEARCH, *(compilers.bundles_to_build(profile) if to_build else ())))
     compilers.wait_for(compilers.JUDGE)
     orientation = None if given is None or given.orientation is None else np.array(given.orientation)
@@ -113,7 +115,7 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     if to_build and not laying:
         check_standing(mesh, profile)  # a search may take minutes
     with reporting() as report:
-        asked = _Search(request, given, to_build and not laying, report)
+        asked = _Search(request, given, model, to_build and not laying, report)
         if laying:
             oriented = orient_and_decompose(mesh, profile, pricing, asked.search)
             decomposition, notes = oriented.decomposition, orientation_in_words(oriented, "--as-is keeps it as it stands")
@@ -132,8 +134,10 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
 class _Search:
     """The search of one request, for a mesh that lies one way or another, or the plan that takes its place."""
 
-    def __init__(self, request: ModelRequest, given: PlanFile | None, prices_unused: bool, report: Report) -> None:
-        self._request, self._given, self._report = request, given, report
+    def __init__(
+        self, request: ModelRequest, given: PlanFile | None, model: ReadModel, prices_unused: bool, report: Report
+    ) -> None:
+        self._request, self._given, self._model, self._report = request, given, model, report
         cuts, profile = request.cuts, request.profile.of_all_parts
         free = cuts.plan is not None or cuts.parts is not None or not Worth.of(profile)
         self._price = None if prices_unused and free else pricing(profile)
@@ -141,7 +145,7 @@ class _Search:
 
     def search(self, mesh: Mesh) -> Decomposition:
         """The parts of a mesh."""
-        request, given, cuts = self._request, self._given, self._request.cuts
+        request, given, cuts = self._request, self._with_marks(mesh), self._request.cuts
         asked: dict[str, Any] = {"ranker": request.ranker, "parts": cuts.parts, "price": self._price}
         if given is not None and cuts.plan is not None:
             return cut_by_plan(mesh, request.name, request.profile, given, **asked)
@@ -158,6 +162,17 @@ class _Search:
         )
         self._records.append((decomposition, record))
         return decomposition
+
+    def _with_marks(self, mesh: Mesh) -> PlanFile | None:
+        """The plan with the marks that the model's file has, on the model as it lies now; None: there are neither."""
+        model = self._model
+        if model.zones == NO_ZONES:
+            return self._given
+        given = PlanFile(self._request.name) if self._given is None else self._given
+        rotation, shift_mm = (np.eye(3), np.zeros(3)) if mesh is model.mesh else motion_between(model.mesh, mesh)
+        lift_mm = np.array([0.0, 0.0, self._request.profile.search.pedestal_mm])
+        zones = model.zones.transform(rotation, shift_mm + lift_mm)
+        return replace(given, zones=zones.beside(given.zones))
 
     def record_of(self, decomposition: Decomposition) -> bytes:
         """What was recorded of the search that ended with a decomposition."""

@@ -98,6 +98,16 @@ class SearchOptions:
         list[str] | None,
         typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
     ] = None
+    plate: Annotated[
+        int | None,
+        typer.Option(
+            "--plate", metavar="N", help="plate of a project (.3mf) that has several; else the first that holds something"
+        ),
+    ] = None
+    settings_of_file: Annotated[
+        bool,
+        typer.Option("--settings-of-file", help="print by the settings inside a slicer's project (.3mf); see profiles import"),
+    ] = False
 
     @property
     def settings(self) -> list[str]:
@@ -144,8 +154,9 @@ class ProfileOptions:
         named = {kind for kind in ("machine", "material", "process") if getattr(self, kind) is not None}
         return frozenset(named | {setting.partition(".")[0] for setting in self.settings or ()})
 
-    def profile(self, search: SearchOptions | None = None) -> "Profile":
-        """The profile, with what the options of a search set in it. Raises ProfileError."""
+    def profile(self, search: SearchOptions | None = None, project: str | None = None) -> "Profile":
+        """The profile, with what the options of a search set in it. project: a model's file whose own settings hold beneath those
+        of the options; None: there is none. Raises ProfileError."""
         from profiles.part_settings import parse_part_settings
         from profiles.profile import DEFAULTS, load, with_part_settings
 
@@ -153,7 +164,12 @@ class ProfileOptions:
         names = {
             kind: default if name is None else name for (kind, default), name in zip(DEFAULTS.items(), self.names, strict=True)
         }
-        profile = load(**names, settings=(*(self.settings or ()), *search.settings))
+        of_file: list[str] = []
+        if project is not None:
+            from machine.app.project_file import settings_of
+
+            names, of_file = settings_of(project, names)
+        profile = load(**names, settings=(*of_file, *(self.settings or ()), *search.settings))
         return with_part_settings(profile, map(parse_part_settings, search.part or ()))
 
 
@@ -190,8 +206,9 @@ def check_model(model: str) -> None:
 
 def model_request(model: str, search: SearchOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
     """What is asked for of a model; further: other fields of the request. Raises ProfileError."""
-    profile = given.profile(search)
-    return ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names, **further)
+    profile = given.profile(search, model if search.settings_of_file else None)
+    asked = {"profile_names": given.names, "plate": search.plate, **further}
+    return ModelRequest(model, profile, given.sections, search.ranker, search.orient, **asked)
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
@@ -200,6 +217,9 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
 
     stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(tuple(program.plan or ()), program.parts)
     first, *others = named_models(models)
+    if program.settings_of_file and len({first, *others}) > 1:
+        several = ", ".join(dict.fromkeys((first, *others)))
+        raise PlanError(f"--settings-of-file goes with one model, and several are given: {several}")
     plate = {"copies": program.copies, "beside": tuple(others)}
     return model_request(first, program, given, cuts=cuts, stops=stops, **plate, **further)
 

@@ -8,7 +8,7 @@ import numpy as np
 from machine.app.workbench.bench.values import vector_of
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import MOST_MM, ZONE_KINDS, PlannedPart
-from mdp.zone import AnyZone, Grown, Modifier, Zone, Zones
+from mdp.zone import AnyZone, Grown, MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 
@@ -76,13 +76,19 @@ def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:
     if isinstance(zone, Grown):
         point_mm = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
         return replace(zone, point_mm=vector_of(np.round(point_mm, POINT_DIGITS)))
+    if isinstance(zone, MeshVolume):
+        raise PlanError(_immovable(zone, label))
     return zone
 
 
 def _moved_modifier(modifier: Modifier, move: Placing, label: str) -> Modifier:
     if isinstance(modifier.volume, Zone):
         return replace(modifier, volume=_moved_box(modifier.volume, move, label))
-    raise PlanError(f"{label}: its mesh lies where {modifier.volume.file.name} has it and cannot be moved with the model")
+    raise PlanError(_immovable(modifier.volume, label))
+
+
+def _immovable(volume: MeshVolume, label: str) -> str:
+    return f"{label}: its mesh lies where {volume.file.name} has it and cannot be moved with the model"
 
 
 def _moved_box(box: Zone, move: Placing, label: str) -> Zone:

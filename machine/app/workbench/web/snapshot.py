@@ -17,7 +17,7 @@ from machine.view.scene import machine_bodies
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.plans.plan_file import ZONE_KINDS
 from mdp.save import plane_values
-from mdp.zone import Modifier, Zone
+from mdp.zone import AnyZone, MeshVolume, Modifier, Zone
 
 MOST_FACES = 2_000_000  # that a page draws
 # The keys of the state that hold sentences.
@@ -108,7 +108,12 @@ def marks_key(bench: Bench) -> str:
 
 def _zones(bench: Bench) -> list[dict[str, Any]]:
     kinds = ((kind, enumerate(getattr(bench.zones, kind), start=1)) for kind in ZONE_KINDS)
-    return [{"kind": kind, "number": number, **asdict(zone)} for kind, zones in kinds for number, zone in zones]
+    return [{"kind": kind, "number": number, **asdict(_shown(zone))} for kind, zones in kinds for number, zone in zones]
+
+
+def _shown(zone: AnyZone) -> AnyZone:
+    """A zone as the page shows it: a mesh by the box around it."""
+    return zone.box if isinstance(zone, MeshVolume) else zone
 
 
 def _modifier(modifier: Modifier) -> dict[str, Any]:

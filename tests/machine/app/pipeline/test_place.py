@@ -65,7 +65,7 @@ def test_planes_and_marks_are_moved_with_their_parts() -> None:
     marked = tuple(replace(part, no_seam=Marked.of(part.mesh, (zone,))) for part in decomposition.parts)
     arm = standing_at(replace(decomposition, parts=marked), (20.0, -10.0)).parts[1]
     assert arm.base.offset_mm == 28.0
-    assert arm.no_seam.boxes[0].min_mm == (24.0, -19.0, 29.0)
+    assert arm.no_seam.volumes[0].min_mm == (24.0, -19.0, 29.0)
 
 
 def test_a_plane_that_the_machine_does_not_reach_at_a_place_is_refused() -> None:

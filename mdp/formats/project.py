@@ -1,0 +1,171 @@
+"""Project: what a slicer's project file says of the objects in it: which volumes are printed, taken out of others or only marks.
+
+PrusaSlicer keeps all volumes of an object in one mesh and names their triangles in Slic3r_PE_model.config; Bambu Studio and
+OrcaSlicer have a component for each and say in model_settings.config what it is; Cura says it in the metadata of objects.
+(PrusaSlicer, src/libslic3r/Format/3mf.cpp; BambuStudio, src/libslic3r/Format/bbs_3mf.cpp; libSavitar, SceneNode.cpp.)
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
+
+from mdp.formats.surface import Surface
+
+PART, NEGATIVE, MODIFIER, SUPPORT, NO_SUPPORT = "part", "negative volume", "modifier", "support enforcer", "support blocker"
+VOLUME_TYPES = {  # PrusaSlicer's, then those of Bambu Studio and OrcaSlicer
+    "ModelPart": PART,
+    "NegativeVolume": NEGATIVE,
+    "ParameterModifier": MODIFIER,
+    "SupportEnforcer": SUPPORT,
+    "SupportBlocker": NO_SUPPORT,
+    "normal_part": PART,
+    "negative_part": NEGATIVE,
+    "modifier_part": MODIFIER,
+    "support_enforcer": SUPPORT,
+    "support_blocker": NO_SUPPORT,
+}
+CURA = "cura:"  # how the names of its settings begin in metadata
+CURA_MESHES = {
+    "anti_overhang_mesh": NO_SUPPORT,
+    "support_mesh": SUPPORT,
+    "infill_mesh": MODIFIER,
+    "cutting_mesh": MODIFIER,
+}
+ON = ("1", "true", "yes")
+# Keys beside the settings of an object or a volume, which say where it came from.
+ABOUT = frozenset({"name", "matrix", "modifier", "volume_type", "part_type", "extruder_nr", "print_order", "drop_to_buildplate"})
+ABOUT_PREFIXES = ("source_", "thumbnail_", "cut_", "text_")
+ONE_EXTRUDER = {"extruder": ("0", "1")}  # which say nothing where there is one
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a volume of an object is, and its own settings under its program's names."""
+
+    kind: str = PART
+    name: str = ""
+    settings: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A build plate of a project: objects by their numbers, each with the number of its instance."""
+
+    number: int
+    name: str
+    instances: frozenset[tuple[str, int]]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a project says beside its model. objects: by their numbers; triangles: of an object's mesh, the first and the last of
+    each volume; parts: by the numbers of an object and its component; heights: settings between two heights above an object's
+    lowest point, mm, by the place of its mesh among all meshes, from 1."""
+
+    objects: Mapping[str, Role] = field(default_factory=dict)
+    triangles: Mapping[str, Sequence[tuple[int, int, Role]]] = field(default_factory=dict)
+    parts: Mapping[tuple[str, str], Role] = field(default_factory=dict)
+    heights: Mapping[str, Sequence[tuple[float, float, Mapping[str, str]]]] = field(default_factory=dict)
+    plates: Sequence[Plate] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectVolume:
+    """A volume where the project has it, in mm, and what it is."""
+
+    surface: Surface
+    role: Role = Role()
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectObject:
+    """An object on the plate: its volumes, the settings of them all, and those between two heights above its lowest point."""
+
+    volumes: Sequence[ProjectVolume]
+    settings: Mapping[str, str] = field(default_factory=dict)
+    heights: Sequence[tuple[float, float, Mapping[str, str]]] = ()
+
+    def surfaces(self, kind: str) -> list[Surface]:
+        """The surfaces of a kind of volume."""
+        return [volume.surface for volume in self.volumes if volume.role.kind == kind]
+
+
+@dataclass(frozen=True, eq=False)
+class Project:
+    """What a file prints, and sentences about what it holds and is not taken."""
+
+    objects: Sequence[ProjectObject]
+    notes: Sequence[str] = ()
+
+
+def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[tuple[int, int, Role]]]]:
+    """The objects and the triangles of Told. Raises ValueError for a triangle that is no number."""
+    objects, triangles = dict[str, Role](), dict[str, list[tuple[int, int, Role]]]()
+    for element in config.iter("object"):
+        number = element.get("id", "")
+        objects[number] = _role(element)
+        triangles[number] = [
+            (int(volume.get("firstid", "")), int(volume.get("lastid", "")), _role(volume)) for volume in element.findall("volume")
+        ]
+    return objects, triangles
+
+
+def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], Role], list[Plate]]:
+    """The objects, the parts and the plates of Told. Raises ValueError for a number that is none."""
+    objects, parts = dict[str, Role](), dict[tuple[str, str], Role]()
+    for element in config.findall("object"):
+        number = element.get("id", "")
+        objects[number] = _role(element)
+        for part in element.findall("part"):
+            parts[number, part.get("id", "")] = _role(part)
+    plates = []
+    for place, element in enumerate(config.findall("plate"), start=1):
+        values = _values(element)
+        instances = [_values(instance) for instance in element.findall("model_instance")]
+        standing = frozenset((own.get("object_id", ""), int(own.get("instance_id", "0"))) for own in instances)
+        plates.append(Plate(int(values.get("plater_id", place)), values.get("plater_name", ""), standing))
+    return objects, parts, plates
+
+
+def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[str, str]]]]:
+    """The heights of Told, of PrusaSlicer and those after it. Raises ValueError for a height that is no number."""
+    heights: dict[str, list[tuple[float, float, Mapping[str, str]]]] = {}
+    for element in config.iter("object"):
+        for between in element.findall("range"):
+            settings = {option.get("opt_key", ""): (option.text or "").strip() for option in between.findall("option")}
+            low, high = float(between.get("min_z", "")), float(between.get("max_z", ""))
+            heights.setdefault(element.get("id", ""), []).append((low, high, _settings(settings)))
+    return heights
+
+
+def read_cura(element: Element) -> Role:
+    """What Cura says of an object of the model, by its metadata or, in older files, its settings."""
+    values = {child.get("setting_key", ""): child.text or "" for child in element.findall("{*}settings/{*}setting")}
+    for child in element.findall("{*}metadatagroup/{*}metadata"):
+        name = child.get("name", "")
+        if name.startswith(CURA):
+            values[name.removeprefix(CURA)] = child.text or ""
+    values = {key: text.strip() for key, text in values.items()}
+    kind = next((kind for key, kind in CURA_MESHES.items() if values.get(key, "").lower() in ON), PART)
+    settings = {key: text for key, text in _settings(values).items() if key not in CURA_MESHES}
+    return Role(kind, element.get("name", ""), settings)
+
+
+def _values(element: Element) -> dict[str, str]:
+    return {entry.get("key", ""): entry.get("value", "") for entry in element.findall("metadata")}
+
+
+def _role(element: Element) -> Role:
+    """What an object, a volume or a part of a config is."""
+    values = _values(element)
+    told = element.get("subtype") or values.get("volume_type") or values.get("part_type", "")
+    kind = VOLUME_TYPES.get(told) or (MODIFIER if values.get("modifier") == "1" else PART)
+    return Role(kind, values.get("name", ""), _settings(values))
+
+
+def _settings(values: Mapping[str, str]) -> dict[str, str]:
+    return {
+        key: text
+        for key, text in values.items()
+        if key and key not in ABOUT and not key.startswith(ABOUT_PREFIXES) and text not in ONE_EXTRUDER.get(key, ())
+    }

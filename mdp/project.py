@@ -1,0 +1,169 @@
+"""Project: what a slicer's project prints, negative volumes taken out, and the marks that its other volumes are."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from math import isclose
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mdp.formats.project import MODIFIER, NEGATIVE, NO_SUPPORT, PART, SUPPORT, Project, ProjectObject, ProjectVolume, Role
+from mdp.formats.surface import Surface, concatenate
+from mdp.head import corners
+from mdp.mesh import Floats, Mesh
+from mdp.repair.repair import repair
+from mdp.repair.shells import subtract
+from mdp.zone import MeshVolume, Modifier, Volume, Zone, Zones
+from profiles.errors import MeshError
+
+TAKEN_AS = {MODIFIER: "[[modifier]]", SUPPORT: "[[support]]", NO_SUPPORT: "[[no_support]]"}
+SAME = 1e-6  # cosine of a right angle, and share of a box's size by which its corners may lie off
+MOST_TOLD = 8  # settings in a sentence
+BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
+
+
+def printed(project: Project) -> tuple[list[Surface], list[str]]:
+    """The surfaces that a project prints, and a sentence for each object that negative volumes were taken out of.
+
+    Raises MeshError where nothing is left, and for a negative volume that is no solid."""
+    surfaces, notes = list[Surface](), list[str]()
+    for own in project.objects:
+        parts, negatives = own.surfaces(PART), [volume for volume in own.volumes if volume.role.kind == NEGATIVE]
+        if not parts or not negatives:
+            surfaces += parts
+            continue
+        solid, repairs = repair(parts)
+        left = subtract(solid, [_solid(volume) for volume in negatives])
+        count = f"{len(negatives)} negative volume{'s' * (len(negatives) > 1)}"
+        notes += [*repairs, f"took {count} out of it" + ("" if len(left.faces) else ": nothing is left of an object")]
+        surfaces += [left] if len(left.faces) else []
+    if not surfaces:
+        raise MeshError("nothing is left where its negative volumes are taken out")
+    return surfaces, notes
+
+
+def marks(project: Project, path: Path, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
+    """The modifiers and marks of a project's volumes with each place p of its file at linear @ p + shift_mm, and a sentence for
+    each; a volume that is no solid is left out."""
+    return _Marks(project, path, linear, shift_mm).zones()
+
+
+def _solid(volume: ProjectVolume) -> Surface:
+    """A volume as a closed solid. Raises MeshError, which names it."""
+    try:
+        return repair([volume.surface])[0]
+    except MeshError as error:
+        raise MeshError(f"its {volume.role.kind} {volume.role.name!r} {error}") from None
+
+
+class _Marks:
+    """The marks of a project that is moved as its model is."""
+
+    def __init__(self, project: Project, path: Path, linear: Floats, shift_mm: Floats) -> None:
+        self._objects = [own for own in project.objects if own.surfaces(PART)]
+        self._path, self._linear, self._shift_mm = path, linear, shift_mm
+        self._notes: list[str] = []
+
+    def zones(self) -> tuple[Zones, list[str]]:
+        """All marks and a sentence for each."""
+        modifiers, support, no_support = list[Modifier](), list[Volume](), list[Volume]()
+        for own in self._objects:
+            modifiers += self._of_object(own)
+            for volume in own.volumes:
+                role = volume.role
+                if role.kind == MODIFIER or (role.kind == PART and role.settings):
+                    process = self._process(_named(role), role.settings)
+                    place = self._place(volume, own) if process else None
+                    modifiers += [] if place is None else [Modifier(place, process)]
+                elif role.kind in (SUPPORT, NO_SUPPORT) and (place := self._place(volume, own)) is not None:
+                    (support if role.kind == SUPPORT else no_support).append(place)
+                    self._notes.append(f"{_named(role)} is taken as {TAKEN_AS[role.kind]}")
+        return Zones(no_support=tuple(no_support), support=tuple(support), modifiers=tuple(modifiers)), self._notes
+
+    def _of_object(self, own: ProjectObject) -> Iterator[Modifier]:
+        """The settings of an object and those between two heights of it."""
+        low, high = _bounds(own) + np.array([[-BESIDE_MM], [BESIDE_MM]])
+        if own.settings and (process := self._process("the object", own.settings)):
+            yield Modifier(self._box(low, high), process)
+        for least, most, settings in own.heights:
+            process = self._process(f"the height range {least:g} to {most:g} mm", settings)
+            if process and least < most:
+                base = low[2] + BESIDE_MM
+                yield Modifier(self._box([*low[:2], base + least], [*high[:2], base + most]), process)
+
+    def _process(self, what: str, settings: Mapping[str, str]) -> dict[str, Any]:
+        """What settings become, which a sentence tells."""
+        from profiles.foreign.project import read_project_settings  # most models have none
+
+        process, left = read_project_settings(self._path).of_place(settings)
+        told = ", ".join(f"{key} = {value}" for key, value in process.items())
+        rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
+        self._notes.append(f"{what} " + (f"is taken as {TAKEN_AS[MODIFIER]}: {told}" if told else "changes nothing here") + rest)
+        return process
+
+    def _place(self, volume: ProjectVolume, own: ProjectObject) -> Volume | None:
+        """Where a volume lies, within the box of its object where there are others; None: it is no solid, which is told."""
+        try:
+            solid = _solid(volume)
+        except MeshError as error:
+            self._notes.append(f"{error}: it is left out")
+            return None
+        mesh = Mesh(self._moved(solid.vertices), solid.faces.astype(np.int32))
+        room = self._box(*_bounds(own)) if len(self._objects) > 1 else None
+        box = _box_at(mesh.vertices)
+        if box is None or not isclose(float(np.prod(np.subtract(box.max_mm, box.min_mm))), mesh.volume_mm3, rel_tol=SAME):
+            return MeshVolume(self._path, mesh, room)
+        return replace(box, room=room)
+
+    def _box(self, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Zone:
+        """A box of the file where it lies now."""
+        points = np.array([[*low], [*high]])
+        box = _box_at(self._moved(corners(*map(tuple, points.tolist()))))
+        assert box is not None  # a rotation and a scale leave it one
+        return box
+
+    def _moved(self, places: Floats) -> Floats:
+        moved: Floats = places @ self._linear.T + self._shift_mm
+        return moved
+
+
+def _named(role: Role) -> str:
+    return f"{role.kind} {role.name!r}" if role.name else f"a {role.kind}"
+
+
+def _bounds(own: ProjectObject) -> Floats:
+    """(2, 3) least and greatest coordinates of what is printed of an object."""
+    surface = concatenate(own.surfaces(PART))
+    used = surface.vertices[surface.faces.ravel()]
+    return np.stack([used.min(axis=0), used.max(axis=0)])
+
+
+def _box_at(points: Floats) -> Zone | None:
+    """The box with these (8, 3) corners; None where they are those of none."""
+    if len(points) != 8:
+        return None
+    sides = points[1:] - points[0]
+    sides = sides[np.argsort(np.linalg.norm(sides, axis=1), kind="stable")]
+    lengths = np.linalg.norm(sides, axis=1)
+    if lengths[0] == 0.0:
+        return None
+    directions, edges = sides / lengths[:, None], [0]
+    for k in range(1, 7):  # the shortest is an edge, and so is the next one square to those before it
+        if len(edges) < 3 and np.abs(directions[edges] @ directions[k]).max() < SAME:
+            edges.append(k)
+    if len(edges) < 3:
+        return None
+    axes = directions[edges]
+    axes = axes[np.argsort([int(np.argmax(np.abs(axis))) for axis in axes], kind="stable")]
+    axes *= np.sign(axes[np.arange(3), np.argmax(np.abs(axes), axis=1)])[:, None]
+    axes[2] *= np.sign(np.linalg.det(axes))
+    level = np.allclose(axes, np.eye(3), rtol=0.0, atol=SAME)
+    own = points if level else points @ axes.T
+    low, high = own.min(axis=0), own.max(axis=0)
+    near = np.minimum(np.abs(own - low), np.abs(own - high)).max()
+    if near > SAME * lengths[-1] or len(np.unique(own > 0.5 * (low + high), axis=0)) < 8:
+        return None
+    (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
+    rows = [(x, y, z) for x, y, z in axes.tolist()]
+    return Zone((x0, y0, z0), (x1, y1, z1), None if level else (rows[0], rows[1], rows[2]))
