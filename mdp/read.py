@@ -12,7 +12,8 @@ from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import check_file
 from mdp.overhang import PLATFORM_TOLERANCE_MM
-from mdp.project import marks, printed
+from mdp.projects.marks import marks
+from mdp.projects.printed import printed
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
 from mdp.topology.components import vertex_components

@@ -361,7 +361,7 @@ def _tree(content: bytes) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
-        root = re.search(rb"<[A-Za-z_][\w.:-]*(?=[\s/>])", content)
+        root = re.match(rb"(?:\s|\xef\xbb\xbf|<!--.*?-->|<\?.*?\?>)*<[A-Za-z_][\w.:-]*", content, re.DOTALL)
         if "unbound prefix" not in str(error) or root is None:
             raise
     used = {*re.findall(rb"[\s</]([A-Za-z_][\w.-]*):[A-Za-z_]", content)} - {b"xml", b"xmlns"}

@@ -166,7 +166,7 @@ class ProfileOptions:
         }
         of_file: list[str] = []
         if project is not None:
-            from machine.app.project_file import settings_of
+            from machine.app.terminal.project_file import settings_of
 
             names, of_file = settings_of(project, names)
         profile = load(**names, settings=(*of_file, *(self.settings or ()), *search.settings))

@@ -1,5 +1,6 @@
 """3MF packages: units, transforms, components and parts."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -101,3 +102,51 @@ def test_triangles_of_a_3mf_have_the_colours_that_they_name(tmp_path: Path) -> N
 def test_the_colour_of_a_whole_object_of_a_3mf_marks_none_of_its_triangles(tmp_path: Path) -> None:
     assert _painted(tmp_path / "a.3mf", GROUP, {}, 'pid="5" pindex="0"') is None
     assert _painted(tmp_path / "b.3mf", GROUP, {3: 'p1="1"'}, 'pid="5" pindex="0"') == [-1] * 3 + [0x00FF00] + [-1] * 8
+
+
+def _rewritten(path: Path, changes: dict[str, str], names: dict[str, str] | None = None) -> Path:
+    """A package of a box with texts of its model changed, and with other names of its parts."""
+    files.threemf(path, {1: files.threemf_mesh(files.placed(10, 20, 30))}, '<item objectid="1"/>')
+    with zipfile.ZipFile(path) as archive:
+        texts = {name: archive.read(name).decode() for name in archive.namelist()}
+    for old, new in changes.items():
+        assert old in texts["3D/a.model"]
+        texts["3D/a.model"] = texts["3D/a.model"].replace(old, new)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in texts.items():
+            archive.writestr((names or {}).get(name, name), text)
+    return path
+
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+SLICE = 'xmlns:s="http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"'
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({}, {"3D/a.model": "3d/A.Model", "_rels/.rels": "_Rels/.rels"}),
+        ({CORE: "http://schemas.microsoft.com/3dmanufacturing/2013/01"}, {}),
+        ({f' xmlns="{CORE}"': ""}, {}),
+        ({"<triangle ": '<triangle slic3rpe:custom_seam="" ', "<model ": '<!-- <a --><model acme:at="1" '}, {}),
+        ({"<model ": f'<model {SLICE} recommendedextensions="s" '}, {}),
+        ({"<model ": '<model requiredextensions="p" '}, {}),
+    ],
+)
+def test_what_programs_write_otherwise_is_read_the_same(tmp_path: Path, changes: dict[str, str], names: dict[str, str]) -> None:
+    mesh, notes = read_mesh(_rewritten(tmp_path / "a.3mf", changes, names))
+    assert (mesh.volume_mm3, notes) == (pytest.approx(6000), ())
+    assert np.ptp(mesh.bounds_mm, axis=0).tolist() == [10, 20, 30]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"<model ": f'<model {SLICE} requiredextensions="p s" '}, "needs the 3MF extension slice, which is not read"),
+        ({"<model ": '<model requiredextensions="acme" '}, "needs the 3MF extension acme, which is not read"),
+        ({"<model ": "<html ", "</model>": "</html>"}, "its part 3D/a.model is no 3MF model"),
+        ({"</model>": ""}, "its part 3D/a.model is missing or malformed"),
+    ],
+)
+def test_what_changes_the_shape_and_is_not_read_is_refused_by_name(tmp_path: Path, changes: dict[str, str], words: str) -> None:
+    assert words in refusal(_rewritten(tmp_path / "a.3mf", changes))

@@ -1,4 +1,4 @@
-"""Project: what a slicer's project prints, negative volumes taken out, and the marks that its other volumes are."""
+"""Marks: what the volumes of a slicer's project mean that are not printed: modifiers, places with and without support."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mdp.formats.project import MODIFIER, NEGATIVE, NO_SUPPORT, PART, SUPPORT, Project, ProjectObject, ProjectVolume, Role
-from mdp.formats.surface import Surface, concatenate
+from mdp.formats.project import MODIFIER, NO_SUPPORT, PART, SUPPORT, Project, ProjectObject, ProjectVolume, Role
+from mdp.formats.surface import concatenate
 from mdp.head import corners
 from mdp.mesh import Floats, Mesh
-from mdp.repair.repair import repair
-from mdp.repair.shells import subtract
+from mdp.projects.printed import solid_of_volume
 from mdp.zone import MeshVolume, Modifier, Volume, Zone, Zones
 from profiles.errors import MeshError
 
@@ -23,45 +22,17 @@ MOST_TOLD = 8  # settings in a sentence
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
 
-def printed(project: Project) -> tuple[list[Surface], list[str]]:
-    """The surfaces that a project prints, and a sentence for each object that negative volumes were taken out of.
-
-    Raises MeshError where nothing is left, and for a negative volume that is no solid."""
-    surfaces, notes = list[Surface](), list[str]()
-    for own in project.objects:
-        parts, negatives = own.surfaces(PART), [volume for volume in own.volumes if volume.role.kind == NEGATIVE]
-        if not parts or not negatives:
-            surfaces += parts
-            continue
-        solid, repairs = repair(parts)
-        left = subtract(solid, [_solid(volume) for volume in negatives])
-        count = f"{len(negatives)} negative volume{'s' * (len(negatives) > 1)}"
-        notes += [*repairs, f"took {count} out of it" + ("" if len(left.faces) else ": nothing is left of an object")]
-        surfaces += [left] if len(left.faces) else []
-    if not surfaces:
-        raise MeshError("nothing is left where its negative volumes are taken out")
-    return surfaces, notes
-
-
 def marks(project: Project, path: Path, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
     """The modifiers and marks of a project's volumes with each place p of its file at linear @ p + shift_mm, and a sentence for
     each; a volume that is no solid is left out."""
     return _Marks(project, path, linear, shift_mm).zones()
 
 
-def _solid(volume: ProjectVolume) -> Surface:
-    """A volume as a closed solid. Raises MeshError, which names it."""
-    try:
-        return repair([volume.surface])[0]
-    except MeshError as error:
-        raise MeshError(f"its {volume.role.kind} {volume.role.name!r} {error}") from None
-
-
 class _Marks:
     """The marks of a project that is moved as its model is."""
 
     def __init__(self, project: Project, path: Path, linear: Floats, shift_mm: Floats) -> None:
-        self._objects = [own for own in project.objects if own.surfaces(PART)]
+        self._objects, self._several = project.objects, sum(bool(own.surfaces(PART)) for own in project.objects) > 1
         self._path, self._linear, self._shift_mm = path, linear, shift_mm
         self._notes: list[str] = []
 
@@ -69,7 +40,7 @@ class _Marks:
         """All marks and a sentence for each."""
         modifiers, support, no_support = list[Modifier](), list[Volume](), list[Volume]()
         for own in self._objects:
-            modifiers += self._of_object(own)
+            modifiers += self._of_object(own) if own.surfaces(PART) else ()
             for volume in own.volumes:
                 role = volume.role
                 if role.kind == MODIFIER or (role.kind == PART and role.settings):
@@ -103,14 +74,15 @@ class _Marks:
         return process
 
     def _place(self, volume: ProjectVolume, own: ProjectObject) -> Volume | None:
-        """Where a volume lies, within the box of its object where there are others; None: it is no solid, which is told."""
+        """Where a volume lies, within the box of its object where there are others; None: it is no solid, which is told. Where an
+        object is nothing but marks, as in Cura, they hold for all."""
         try:
-            solid = _solid(volume)
+            solid = solid_of_volume(volume)
         except MeshError as error:
             self._notes.append(f"{error}: it is left out")
             return None
         mesh = Mesh(self._moved(solid.vertices), solid.faces.astype(np.int32))
-        room = self._box(*_bounds(own)) if len(self._objects) > 1 else None
+        room = self._box(*_bounds(own)) if self._several and own.surfaces(PART) else None
         box = _box_at(mesh.vertices)
         if box is None or not isclose(float(np.prod(np.subtract(box.max_mm, box.min_mm))), mesh.volume_mm3, rel_tol=SAME):
             return MeshVolume(self._path, mesh, room)

@@ -1,0 +1,286 @@
+"""Project files of other slicers: what is printed of them, on which plate, and what their other volumes become."""
+
+import zipfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.mesh import Floats, Mesh
+from mdp.read import read_model
+from mdp.zone import MeshVolume, Zone
+from profiles.errors import MeshError
+from tests.mdp import files
+from tests.mdp.projects import AT_ORIGIN, Made, Object, Placed, affine, bambu, printed, prusaslicer
+from tests.shapes import from_manifold
+
+BLOCK = m3.Manifold.cube((30.0, 30.0, 20.0), True)
+BOX = m3.Manifold.cube((10.0, 8.0, 30.0), True)
+CYLINDER = m3.Manifold.cylinder(40.0, 5.0, circular_segments=24, center=True)
+DIALECTS = ("prusaslicer", "bambu")
+
+
+def written(path: Path, dialect: str, objects: Sequence[Object], seed: int = 0) -> Path:
+    return bambu(path, objects, np.random.default_rng(seed)) if dialect == "bambu" else prusaslicer(path, objects)
+
+
+def check(mesh: Mesh, expected: m3.Manifold) -> None:
+    box = np.array(expected.bounding_box()).reshape(2, 3)
+    assert mesh.volume_mm3 == pytest.approx(expected.volume(), rel=1e-6)
+    np.testing.assert_allclose(np.ptp(mesh.bounds_mm, axis=0), np.ptp(box, axis=0), rtol=1e-6)
+
+
+def drawn(rng: np.random.Generator, plates: int) -> list[Object]:
+    """Objects with parts, negatives and marks that overlap at random, far apart from each other on their plates."""
+    objects = []
+    for k in range(rng.integers(1, 4)):
+        kinds = ["part", *rng.choice(["part", "negative", "modifier", "support", "no_support"], rng.integers(0, 5))]
+        volumes = [Made(BLOCK)]
+        for kind in kinds[1:]:
+            solid = (BOX, CYLINDER, m3.Manifold.sphere(8.0, 16))[rng.integers(3)]
+            volumes.append(Made(solid.translate(rng.uniform(-15.0, 15.0, 3)), str(kind)))
+        instances = []
+        for j in range(rng.integers(1, 3)):
+            transform = affine(rng)
+            transform[3] += (300.0 * k, 300.0 * j, 0.0)
+            instances.append(Placed(transform, int(rng.integers(1, plates + 1)), j == 0 or bool(rng.integers(2))))
+        objects.append(Object(volumes, instances))
+    return objects
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("seed", range(30))
+def test_what_is_read_is_what_the_project_was_made_of(tmp_path: Path, dialect: str, seed: int) -> None:
+    rng = np.random.default_rng([seed, len(dialect)])
+    plates = int(rng.integers(1, 4)) if dialect == "bambu" else 1
+    objects = drawn(rng, plates)
+    path = written(tmp_path / "a.3mf", dialect, objects, seed)
+    held = [plate for plate in range(1, plates + 1) if not printed(objects, plate).is_empty()]
+    for plate in held:
+        asked = None if plate == held[0] else plate
+        check(read_model(path, plate=asked).mesh, printed(objects, plate))
+
+
+def change(path: Path, part: str, old: str, new: str) -> None:
+    """Write a part of a package otherwise."""
+    with zipfile.ZipFile(path) as archive:
+        texts = {name: archive.read(name).decode() for name in archive.namelist()}
+    assert old in texts[part]
+    texts[part] = texts[part].replace(old, new)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in texts.items():
+            archive.writestr(name, text)
+
+
+def moved(solid: m3.Manifold, linear: Floats) -> Mesh:
+    """A solid of the file where it lies after reading, by what brings the block of the same file there."""
+    block = from_manifold(BLOCK)
+    places = block.vertices @ linear.T
+    low, high = places.min(axis=0), places.max(axis=0)
+    return from_manifold(solid).transform(linear, -np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_volumes_that_are_not_printed_become_marks_where_they_lie_in_the_model(tmp_path: Path, dialect: str) -> None:
+    leaning = BOX.rotate((20.0, 30.0, 40.0)).translate((4.0, 5.0, 6.0))
+    volumes = [Made(BLOCK), Made(leaning, "support"), Made(CYLINDER, "no_support"), Made(BOX, "support")]
+    model = read_model(written(tmp_path / "a.3mf", dialect, [Object(volumes, [AT_ORIGIN])]), 2.0, (90.0, 0.0, 0.0))
+    linear = 2.0 * np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    check(model.mesh, BLOCK.scale((2.0, 2.0, 2.0)).rotate((90.0, 0.0, 0.0)))
+    slanted, straight = model.zones.support
+    (round_one,) = model.zones.no_support
+    assert isinstance(slanted, Zone)
+    assert isinstance(straight, Zone)
+    assert isinstance(round_one, MeshVolume)
+    for zone, solid in ((slanted, leaning), (straight, BOX)):
+        wanted = moved(solid, linear).vertices
+        apart = np.linalg.norm(zone.corners[:, None] - wanted[None], axis=2)
+        assert apart.min(axis=1).max() < 1e-9
+        assert apart.min(axis=0).max() < 1e-9
+    assert straight.axes is None
+    wanted = moved(CYLINDER, linear)
+    np.testing.assert_allclose(round_one.mesh.bounds_mm, wanted.bounds_mm, atol=1e-9)
+    assert round_one.mesh.volume_mm3 == pytest.approx(8.0 * CYLINDER.volume())
+    assert [note.split(" is taken")[0] for note in model.notes] == [
+        "support enforcer 'support'",
+        "support blocker 'no_support'",
+        "support enforcer 'support'",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("dialect", "settings"),
+    [
+        ("prusaslicer", {"fill_density": "60%", "perimeters": "4", "layer_height": "0.1", "extruder": "0"}),
+        ("bambu", {"sparse_infill_density": "60%", "wall_loops": "4", "layer_height": "0.1", "extruder": "1"}),
+    ],
+)
+def test_a_modifier_brings_those_of_its_settings_that_may_change_within_a_layer(
+    tmp_path: Path, dialect: str, settings: dict[str, str]
+) -> None:
+    model = read_model(
+        written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK), Made(BOX, "modifier", settings)], [AT_ORIGIN])])
+    )
+    (modifier,) = model.zones.modifiers
+    assert modifier.process == {"walls": 4, "infill_density": 0.6}
+    assert isinstance(modifier.volume, Zone)
+    np.testing.assert_allclose([modifier.volume.min_mm, modifier.volume.max_mm], [(-5, -4, -5), (5, 4, 25)], atol=1e-9)
+    assert model.notes == ("modifier 'modifier' is taken as [[modifier]]: walls = 4, infill_density = 0.6; without layer_height",)
+
+
+def test_settings_of_an_object_hold_in_a_box_around_it_and_those_of_a_part_in_the_part(tmp_path: Path) -> None:
+    volumes = [Made(BLOCK), Made(CYLINDER, "part", {"fill_pattern": "gyroid"})]
+    path = written(tmp_path / "a.3mf", "prusaslicer", [Object(volumes, [AT_ORIGIN], {"perimeters": "5", "brim_width": "3"})])
+    of_object, of_part = read_model(path).zones.modifiers
+    assert of_object.process == {"walls": 5}
+    assert of_object.volume == Zone((-16.0, -16.0, -1.0), (16.0, 16.0, 41.0))
+    assert (of_part.process, type(of_part.volume)) == ({"infill_pattern": "gyroid"}, MeshVolume)
+
+
+def test_settings_between_two_heights_count_from_the_lowest_point_of_their_object(tmp_path: Path) -> None:
+    ranges = (
+        '<objects><object id="2"><range min_z="5" max_z="8"><option opt_key="perimeters">6</option>'
+        '<option opt_key="extruder">0</option></range></object></objects>'
+    )
+    low, high = (Placed(np.vstack([np.eye(3), [x, 0.0, z]])) for x, z in ((0.0, 0.0), (100.0, 7.0)))
+    path = prusaslicer(
+        tmp_path / "a.3mf",
+        [Object([Made(BLOCK)], [low]), Object([Made(BLOCK)], [high])],
+        {"Metadata/Prusa_Slicer_layer_config_ranges.xml": ranges},
+    )
+    (modifier,) = read_model(path).zones.modifiers
+    assert modifier == replace(modifier, volume=Zone((34.0, -16.0, 12.0), (66.0, 16.0, 15.0)), process={"walls": 6})
+
+
+def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
+    beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 0.0]]))
+    wide = m3.Manifold.cube((100.0, 5.0, 5.0), True)
+    objects = [Object([Made(BLOCK), Made(wide, "modifier", {"perimeters": "4"})], [AT_ORIGIN]), Object([Made(BLOCK)], [beside])]
+    (modifier,) = read_model(prusaslicer(tmp_path / "a.3mf", objects)).zones.modifiers
+    assert modifier.volume.room == Zone((-35.0, -15.0, 0.0), (-5.0, 15.0, 20.0))
+
+
+def test_older_projects_name_a_modifier_by_a_key(tmp_path: Path) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "modifier", {"perimeters": "4"})], [AT_ORIGIN])])
+    change(path, "Metadata/Slic3r_PE_model.config", 'key="volume_type" value="ParameterModifier"', 'key="modifier" value="1"')
+    model = read_model(path)
+    check(model.mesh, BLOCK)
+    assert model.zones.modifiers[0].process == {"walls": 4}
+
+
+@pytest.mark.parametrize(
+    ("mesh", "kind"),
+    [
+        ("infill_mesh", "modifiers"),
+        ("cutting_mesh", "modifiers"),
+        ("support_mesh", "support"),
+        ("anti_overhang_mesh", "no_support"),
+    ],
+)
+def test_cura_says_in_an_object_s_metadata_what_it_is(tmp_path: Path, mesh: str, kind: str) -> None:
+    entries = {mesh: "True", "infill_sparse_density": "45", "drop_to_buildplate": "False"}
+    metadata = "".join(
+        f'<metadata name="cura:{key}" preserve="true" type="xs:string">{text}</metadata>' for key, text in entries.items()
+    )
+    group = f"<metadatagroup>{metadata}</metadatagroup>"
+    objects = {1: files.threemf_mesh(from_manifold(BLOCK)), 2: group + files.threemf_mesh(from_manifold(BOX))}
+    model = read_model(files.threemf(tmp_path / "a.3mf", objects, '<item objectid="1"/><item objectid="2"/>'))
+    check(model.mesh, BLOCK)
+    (zone,) = getattr(model.zones, kind)
+    assert (zone.volume if kind == "modifiers" else zone) == Zone((-5.0, -4.0, -5.0), (5.0, 4.0, 25.0))
+    assert kind != "modifiers" or zone.process == {"infill_density": 0.45}
+
+
+def test_a_negative_volume_inside_leaves_a_void(tmp_path: Path) -> None:
+    ball = m3.Manifold.sphere(5.0, 24)
+    mesh = read_model(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(ball, "negative")], [AT_ORIGIN])])).mesh
+    check(mesh, BLOCK - ball)
+    assert mesh.volume_mm3 < BLOCK.volume() - 480.0
+
+
+def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -> None:
+    long = m3.Manifold.cube((200.0, 5.0, 5.0), True)
+    beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 0.0]]))
+    objects = [Object([Made(BLOCK), Made(long, "negative")], [AT_ORIGIN]), Object([Made(BLOCK)], [beside])]
+    assert read_model(prusaslicer(tmp_path / "a.3mf", objects)).mesh.volume_mm3 == pytest.approx(36000.0 - 30.0 * 25.0)
+
+
+def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
+    at = [Placed(np.vstack([np.eye(3), [100.0 * plate, 0.0, 0.0]]), plate, plate != 1) for plate in (1, 2, 3)]
+    objects = [Object([Made(BLOCK)], at[:2]), Object([Made(BOX)], at[2:])]
+    path = bambu(tmp_path / "a.3mf", objects, np.random.default_rng(0))
+    assert read_model(path).notes == (
+        "takes plate 2 of its project; --plate takes another: 3",
+        "leaves out object b, which its project does not print",
+    )
+    check(read_model(path, plate=3).mesh, BOX)
+    with pytest.raises(MeshError, match="--plate 1: its plate is empty; there are 2, 3"):
+        read_model(path, plate=1)
+    with pytest.raises(MeshError, match="--plate 4: its plate is not there; there are 2, 3"):
+        read_model(path, plate=4)
+    for other in (prusaslicer(tmp_path / "b.3mf", objects), files.written(tmp_path / "b.stl", from_manifold(BLOCK))):
+        with pytest.raises(MeshError, match="has no plates: --plate 1 goes with a project of Bambu Studio or OrcaSlicer"):
+            read_model(other, plate=1)
+
+
+@pytest.mark.parametrize("kind", ["support", "solidsupport", "other"])
+def test_objects_that_are_no_models_are_left_out(tmp_path: Path, kind: str) -> None:
+    objects = {1: files.threemf_mesh(from_manifold(BLOCK)), 2: files.threemf_mesh(from_manifold(CYLINDER))}
+    path = files.threemf(tmp_path / "a.3mf", objects, '<item objectid="1"/><item objectid="2"/>')
+    change(path, "3D/a.model", 'id="2" type="model"', f'id="2" name="pole" type="{kind}"')
+    model = read_model(path)
+    check(model.mesh, BLOCK)
+    assert model.notes == (f"leaves out object pole, an object of type {kind}, which is not printed",)
+
+
+def test_a_project_that_prints_nothing_is_refused(tmp_path: Path) -> None:
+    hidden = Placed(AT_ORIGIN.transform, printable=False)
+    assert files.refusal(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [hidden])])) == (
+        "its build places no mesh that is printed: it leaves out object b, which its project does not print"
+    )
+    nothing = Object([Made(BOX), Made(BLOCK.scale((2.0, 2.0, 4.0)), "negative")], [AT_ORIGIN])
+    assert files.refusal(prusaslicer(tmp_path / "b.3mf", [nothing])) == "nothing is left where its negative volumes are taken out"
+
+
+CONFIG = "Metadata/Slic3r_PE_model.config"
+
+
+@pytest.mark.parametrize(
+    ("part", "old", "new", "words"),
+    [
+        (CONFIG, 'lastid="23"', 'lastid="24"', "volume 'negative' has triangles 12 to 24 of object 1, which has 24"),
+        (CONFIG, 'firstid="12"', 'firstid="-1"', "volume 'negative' has triangles -1 to 23 of object 1"),
+        (CONFIG, 'lastid="23"', 'lastid="many"', "its part metadata/slic3r_pe_model.config is missing or malformed"),
+        (CONFIG, "</config>", "", "its part metadata/slic3r_pe_model.config is missing or malformed"),
+        (CONFIG, 'firstid="12"', 'firstid="13"', "is not closed"),
+        ("3D/3dmodel.model", '<triangle v1="1"', '<triangle v1="99"', "face 1 of 24 names vertex [99"),
+        ("3D/3dmodel.model", "<mesh>", '<mesh><beamlattice xmlns="b"/>', "its mesh is a lattice of beams, which is not read"),
+        ("3D/3dmodel.model", "mesh>", "booleanshape>", "object '1' is a booleanshape, which is not read"),
+        ("_rels/.rels", "3dmodel.model", "other.model", "its part 3D/other.model is missing or malformed"),
+    ],
+)
+def test_a_damaged_project_is_refused_with_a_sentence(tmp_path: Path, part: str, old: str, new: str, words: str) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "negative")], [AT_ORIGIN])])
+    change(path, part, old, new)
+    assert words in files.refusal(path)
+
+
+def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "support")], [AT_ORIGIN])])
+    change(path, "3D/3dmodel.model", "</triangles>", '<triangle v1="0" v2="1" v3="2"/></triangles>')
+    change(path, CONFIG, 'firstid="12" lastid="23"', 'firstid="24" lastid="24"')
+    change(path, CONFIG, "</volume></object>", '</volume><volume firstid="12" lastid="23"/></object>')
+    model = read_model(path)
+    assert model.zones.support == ()
+    assert "it is left out" in model.notes[0]
+
+
+def test_what_is_painted_on_triangles_is_told(tmp_path: Path) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [AT_ORIGIN])])
+    change(path, "3D/3dmodel.model", "<triangle ", '<triangle slic3rpe:custom_supports="4" paint_seam="8" ')
+    model = read_model(path)
+    check(model.mesh, BLOCK)
+    assert model.notes == ("what is painted on its triangles is not taken (support, seams): marks of a plan do such things",)
