@@ -58,10 +58,10 @@ NOT_TAKEN = {  # parts of a package, and what they would change
     ),
 }
 PAINTED = {  # attributes of triangles, and what they would change
-    "support": ("paint_supports", "slic3rpe:custom_supports"),
-    "seams": ("paint_seam", "slic3rpe:custom_seam"),
-    "filaments": ("paint_color", "slic3rpe:mmu_segmentation"),
-    "fuzzy skin": ("paint_fuzzy_skin", "slic3rpe:fuzzy_skin"),
+    "support": (b"paint_supports", b"slic3rpe:custom_supports"),
+    "seams": (b"paint_seam", b"slic3rpe:custom_seam"),
+    "filaments": (b"paint_color", b"slic3rpe:mmu_segmentation"),
+    "fuzzy skin": (b"paint_fuzzy_skin", b"slic3rpe:fuzzy_skin"),
 }
 DAMAGES: tuple[type[Exception], ...] = (
     LookupError,
@@ -150,7 +150,9 @@ class Package:
                 raise MeshError(f"{self.path}: its part {name} is no 3MF model: its first element is {root.tag[:60]!r}")
             self._check_extensions(root, content)
             objects = {element.get("id", ""): element for element in reversed(root.findall("{*}resources/{*}object"))}
-            painted = tuple(what for what, names in PAINTED.items() if any(f'{own}="'.encode() in content for own in names))
+            painted = tuple(
+                what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % own, content) for own in names)
+            )
             self.models[name] = Model(root, objects, _palettes(root), painted)
         return self.models[name]
 
