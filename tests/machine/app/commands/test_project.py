@@ -9,6 +9,7 @@ import pytest
 
 from machine.app.cli import main
 from profiles.foreign.read import read_config
+from tests.mdp import files
 from tests.mdp.files import stl
 from tests.mdp.projects import AT_ORIGIN, Made, Object, Placed, bambu, prusaslicer
 from tests.shapes import from_manifold
