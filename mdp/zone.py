@@ -238,12 +238,23 @@ class Zones:
         def moved(zone: AnyZone) -> AnyZone:
             return zone if isinstance(zone, Painted) else zone.transform(rotation, shift_mm)
 
-        keep, no_seam, no_support, support = (
-            tuple(map(moved, zones)) for zones in (self.keep, self.no_seam, self.no_support, self.support)
-        )
-        return Zones(
-            keep, no_seam, no_support, support, tuple(modifier.transform(rotation, shift_mm) for modifier in self.modifiers)
-        )
+        kinds = (self.keep, self.no_seam, self.no_support, self.support)
+        keep, no_seam, no_support, support = (tuple(map(moved, zones)) for zones in kinds)
+        modifiers = tuple(modifier.transform(rotation, shift_mm) for modifier in self.modifiers)
+        return Zones(keep, no_seam, no_support, support, modifiers)
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return sum(len(getattr(self, entry.name)) for entry in fields(self))
+
+    @property
+    def boxes(self) -> "Zones":
+        """Those that are boxes."""
+        kinds = (self.keep, self.no_seam, self.no_support, self.support)
+        keep, no_seam, no_support, support = (tuple(zone for zone in zones if isinstance(zone, Zone)) for zones in kinds)
+        modifiers = tuple(modifier for modifier in self.modifiers if isinstance(modifier.volume, Zone))
+        return Zones(keep, no_seam, no_support, support, modifiers)
 
     def beside(self, others: "Zones") -> "Zones":
         """These zones and others; where modifiers of both meet, the others' settings hold."""

@@ -159,8 +159,9 @@ def emptied(bench: Bench) -> Bench:
 
 
 def with_model(bench: Bench, model: Model) -> Bench:
-    """Another model on the bench, as it is read and uncut."""
-    return replace(emptied(bench), model=model)
+    """Another model on the bench, as it is read and uncut, with what its file marks."""
+    lift_mm = np.array([0.0, 0.0, bench.profile.search.pedestal_mm])
+    return replace(emptied(bench), model=model, zones=model.zones.transform(np.eye(3), lift_mm))
 
 
 def with_model_anew(bench: Bench, model: Model | None) -> Bench:

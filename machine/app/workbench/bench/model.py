@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from machine.app.workbench.bench.values import vector_of
 from mdp.mesh import Mesh
+from mdp.read import ReadModel
+from mdp.zone import NO_ZONES, Zones
 from profiles.frozen import Vector
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
     """A model as it is read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for every repair. key:
-    what tells it from every other reading; a page asks for its triangles by it."""
+    what tells it from every other reading; a page asks for its triangles by it. zones: the boxes that its file marks."""
 
     name: str
     path: Path
@@ -27,14 +29,20 @@ class Model:
     volume_mm3: float
     notes: tuple[str, ...] = ()
     key: str = field(default_factory=lambda: token_hex(8))
+    zones: Zones = NO_ZONES
 
     @classmethod
-    def stored(cls, name: str, path: Path, mesh: Mesh, mesh_file: Path, notes: tuple[str, ...] = ()) -> "Model":
-        """One whose mesh is written to a file first."""
+    def stored(cls, name: str, path: Path, read: ReadModel, mesh_file: Path) -> "Model":
+        """One whose mesh is written to a file first; of its marks boxes alone are kept, which move with it."""
+        mesh, zones = read.mesh, read.zones
         with mesh_file.open("wb") as file:
             file.writelines(mesh_blocks(mesh))
         size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
-        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes)
+        kept, notes = zones.boxes, read.notes
+        if left := zones.count - kept.count:
+            verb, it = ("is", "it") if left == 1 else ("are", "them")
+            notes += (f"{left} of these marks {verb} no box and left out here: the command line has {it}",)
+        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes, zones=kept)
 
     def mesh(self) -> Mesh:
         """Its triangles, read anew."""

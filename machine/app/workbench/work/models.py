@@ -12,7 +12,8 @@ from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.model import Model
 from mdp.directions.orientation import in_words, resting_facets, side_in_words
 from mdp.kernels.workers import Tell
-from mdp.read import SizeError, read_mesh
+from mdp.read import SizeError
+from mdp.read import read_model as read_model_file
 from mdp.search.orient import distinct_orientations
 from profiles.errors import MeshError
 from profiles.profile import Profile
@@ -42,13 +43,13 @@ class Unscaled:
 def read_model(tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path) -> Model | Unscaled:
     """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
     try:
-        mesh, notes = read_mesh(path, profile.process.scale, profile.process.rotate_deg)
+        read = read_model_file(path, profile.process.scale, profile.process.rotate_deg)
     except SizeError as error:
         sentence, question = (text.replace(str(path), name) for text in (str(error), error.question))
         return Unscaled(sentence, question, error.units)
     except MeshError as error:
         raise MeshError(str(error).replace(str(path), name)) from None
-    return Model.stored(name, path, mesh, mesh_file, notes)
+    return Model.stored(name, path, read, mesh_file)
 
 
 def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, ...]:

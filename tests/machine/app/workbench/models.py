@@ -9,6 +9,7 @@ from typing import Any
 from machine.app.workbench.bench.bench import Bench, History
 from machine.app.workbench.bench.model import Model
 from mdp.mesh import Mesh
+from mdp.read import ReadModel
 from tests.shapes import tee
 
 _folder = tempfile.TemporaryDirectory()
@@ -17,7 +18,7 @@ _numbers = count()
 
 def model(name: str = "tee.stl", mesh: Mesh | None = None) -> Model:
     """A model of this name, a tee unless another mesh is given."""
-    return Model.stored(name, Path(name), mesh or tee(), Path(_folder.name) / str(next(_numbers)))
+    return Model.stored(name, Path(name), ReadModel(mesh or tee()), Path(_folder.name) / str(next(_numbers)))
 
 
 def changed(history: History, change: Callable[[Bench, dict[str, Any]], Bench], **asked: Any) -> History:

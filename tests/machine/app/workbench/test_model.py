@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
@@ -21,8 +22,10 @@ from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.mesh import Mesh
 from mdp.save import stl
+from mdp.zone import Modifier, Zone, Zones
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
+from tests.mdp.projects import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import ball, tee
 
 
@@ -105,3 +108,16 @@ def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more
         return undone, file.is_file()
 
     assert read(forget, tmp_path / "tee.stl") == (True, False)
+
+
+def test_the_boxes_that_a_project_marks_lie_on_the_bench_and_meshes_are_left_out_with_a_note(tmp_path: Path) -> None:
+    block, ball = m3.Manifold.cube((20.0, 20.0, 10.0), True), m3.Manifold.sphere(4.0, 16)
+    insert = Made(m3.Manifold.cube((4.0, 6.0, 8.0), True), "modifier", {"perimeters": "4"})
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(block), insert, Made(ball, "support")], [AT_ORIGIN])])
+
+    async def work(session: Session) -> Any:
+        return session.bench, the_model(session).notes
+
+    bench, notes = read(work, path)
+    assert bench.zones == Zones(modifiers=(Modifier(Zone((-2.0, -3.0, 1.0), (2.0, 3.0, 9.0)), {"walls": 4}),))
+    assert notes[-1] == "1 of these marks is no box and left out here: the command line has it"
