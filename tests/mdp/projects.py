@@ -93,9 +93,9 @@ def prusaslicer(path: Path, objects: Sequence[Object], further: Mapping[str, str
                 written[number] = f'<components><component objectid="{first}"/></components>'
             items.append(_item(number, at))
     config_xml = f'<?xml version="1.0"?><config>{"".join(config)}</config>'
-    return _package(
-        path, threemf_model(written, "".join(items)), {"Metadata/Slic3r_PE_model.config": config_xml, **(further or {})}
-    )
+    version = '<metadata name="slic3rpe:Version3mf">1</metadata><resources>'
+    model = threemf_model(written, "".join(items)).replace("<resources>", version)
+    return _package(path, model, {"Metadata/Slic3r_PE_model.config": config_xml, **(further or {})})
 
 
 def bambu(path: Path, objects: Sequence[Object], rng: np.random.Generator, further: Mapping[str, str] | None = None) -> Path:
