@@ -92,10 +92,12 @@ class ProjectObject:
 
 @dataclass(frozen=True, eq=False)
 class Project:
-    """What a file prints, and sentences about what it holds and is not taken."""
+    """What a file prints, and sentences about what it holds and is not taken. on_plate: its z = 0 is the build plate, below which
+    nothing is printed."""
 
     objects: Sequence[ProjectObject]
     notes: Sequence[str] = ()
+    on_plate: bool = False
 
 
 def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[tuple[int, int, Role]]]]:

@@ -226,7 +226,7 @@ class _Build:
         if painted:
             notes.append(f"what is painted on its triangles is not taken ({', '.join(painted)}): marks of a plan do such things")
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
-        return Project(built, tuple(dict.fromkeys(notes)))
+        return Project(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._told.objects))
 
     def _items(self, items: list[ElementTree.Element], plate: int | None) -> Iterator[ElementTree.Element]:
         """The items that are printed on a plate."""

@@ -33,7 +33,7 @@ class _Marks:
 
     def __init__(self, project: Project, path: Path, linear: Floats, shift_mm: Floats) -> None:
         self._objects, self._several = project.objects, sum(bool(own.surfaces(PART)) for own in project.objects) > 1
-        self._path, self._linear, self._shift_mm = path, linear, shift_mm
+        self._path, self._linear, self._shift_mm, self._on_plate = path, linear, shift_mm, project.on_plate
         self._notes: list[str] = []
 
     def zones(self) -> tuple[Zones, list[str]]:
@@ -60,7 +60,7 @@ class _Marks:
         for least, most, settings in own.heights:
             process = self._process(f"the height range {least:g} to {most:g} mm", settings)
             if process and least < most:
-                base = low[2] + BESIDE_MM
+                base = max(low[2] + BESIDE_MM, 0.0) if self._on_plate else low[2] + BESIDE_MM
                 yield Modifier(self._box([*low[:2], base + least], [*high[:2], base + most]), process)
 
     def _process(self, what: str, settings: Mapping[str, str]) -> dict[str, Any]:

@@ -3,27 +3,35 @@
 from mdp.formats.project import NEGATIVE, PART, Project, ProjectVolume
 from mdp.formats.surface import Surface
 from mdp.repair.repair import repair
-from mdp.repair.shells import subtract
+from mdp.repair.shells import above, subtract
 from profiles.errors import MeshError
+
+SINKING_MM = 0.001  # below the plate, by which PrusaSlicer tells an object that sinks from rounding
 
 
 def printed(project: Project) -> tuple[list[Surface], list[str]]:
-    """The surfaces that a project prints, and a sentence for each object that negative volumes were taken out of.
+    """The surfaces that a project prints, and a sentence for each object that negative volumes or the plate take something from.
 
     Raises MeshError where nothing is left, and for a negative volume that is no solid."""
     surfaces, notes = list[Surface](), list[str]()
     for own in project.objects:
         parts, negatives = own.surfaces(PART), [volume for volume in own.volumes if volume.role.kind == NEGATIVE]
-        if not parts or not negatives:
+        deep_mm = -min((float(part.vertices[part.faces.ravel(), 2].min()) for part in parts), default=0.0)
+        sinks = project.on_plate and deep_mm > SINKING_MM
+        if not parts or not (negatives or sinks):
             surfaces += parts
             continue
-        solid, repairs = repair(parts)
-        left = subtract(solid, [solid_of_volume(volume) for volume in negatives])
-        count = f"{len(negatives)} negative volume{'s' * (len(negatives) > 1)}"
-        notes += [*repairs, f"took {count} out of it" + ("" if len(left.faces) else ": nothing is left of an object")]
+        left, repairs = repair(parts)
+        if negatives:
+            left = subtract(left, [solid_of_volume(volume) for volume in negatives])
+            repairs.append(f"took {len(negatives)} negative volume{'s' * (len(negatives) > 1)} out of it")
+        if sinks:
+            left = above(left, 0.0)
+            repairs.append(f"leaves out what lies below the plate in its project, {deep_mm:.3g} mm deep")
+        notes += [*repairs, *([] if len(left.faces) else ["nothing is left of one of its objects"])]
         surfaces += [left] if len(left.faces) else []
     if not surfaces:
-        raise MeshError("nothing is left where its negative volumes are taken out")
+        raise MeshError("nothing is left of it: negative volumes or the plate of its project take all")
     return surfaces, notes
 
 

@@ -188,6 +188,11 @@ def subtract(surface: Surface, others: list[Surface]) -> Surface:
     return surface_of(m3.Manifold.batch_boolean([solid_of(surface), *map(solid_of, others)], m3.OpType.Subtract))
 
 
+def above(surface: Surface, z_mm: float) -> Surface:
+    """What of a closed surface lies above a height, without faces where that is nothing."""
+    return surface_of(solid_of(surface).trim_by_plane((0.0, 0.0, 1.0), z_mm))
+
+
 def surface_of(solid: "m3.Manifold") -> Surface:
     """The triangles of a manifold3d solid."""
     mesh = solid.to_mesh64()

@@ -60,7 +60,7 @@ class Object:
     settings: Mapping[str, str] = field(default_factory=dict)
 
 
-AT_ORIGIN = Placed(np.vstack([np.eye(3), np.zeros(3)]))
+AT_ORIGIN = Placed(np.vstack([np.eye(3), [0.0, 0.0, 10.0]]))
 
 
 def printed(objects: Sequence[Object], plate: int = 1) -> m3.Manifold:

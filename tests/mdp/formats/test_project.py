@@ -45,7 +45,7 @@ def drawn(rng: np.random.Generator, plates: int) -> list[Object]:
         instances = []
         for j in range(rng.integers(1, 3)):
             transform = affine(rng)
-            transform[3] += (300.0 * k, 300.0 * j, 0.0)
+            transform[3] += (300.0 * k, 300.0 * j, 200.0)
             instances.append(Placed(transform, int(rng.integers(1, plates + 1)), j == 0 or bool(rng.integers(2))))
         objects.append(Object(volumes, instances))
     return objects
@@ -132,11 +132,11 @@ def test_a_modifier_brings_those_of_its_settings_that_may_change_within_a_layer(
 
 
 def test_settings_of_an_object_hold_in_a_box_around_it_and_those_of_a_part_in_the_part(tmp_path: Path) -> None:
-    volumes = [Made(BLOCK), Made(CYLINDER, "part", {"fill_pattern": "gyroid"})]
+    volumes = [Made(BLOCK), Made(CYLINDER.translate((0.0, 0.0, 20.0)), "part", {"fill_pattern": "gyroid"})]
     path = written(tmp_path / "a.3mf", "prusaslicer", [Object(volumes, [AT_ORIGIN], {"perimeters": "5", "brim_width": "3"})])
     of_object, of_part = read_model(path).zones.modifiers
     assert of_object.process == {"walls": 5}
-    assert of_object.volume == Zone((-16.0, -16.0, -1.0), (16.0, 16.0, 41.0))
+    assert of_object.volume == Zone((-16.0, -16.0, -1.0), (16.0, 16.0, 51.0))
     assert (of_part.process, type(of_part.volume)) == ({"infill_pattern": "gyroid"}, MeshVolume)
 
 
@@ -145,7 +145,7 @@ def test_settings_between_two_heights_count_from_the_lowest_point_of_their_objec
         '<objects><object id="2"><range min_z="5" max_z="8"><option opt_key="perimeters">6</option>'
         '<option opt_key="extruder">0</option></range></object></objects>'
     )
-    low, high = (Placed(np.vstack([np.eye(3), [x, 0.0, z]])) for x, z in ((0.0, 0.0), (100.0, 7.0)))
+    low, high = (Placed(np.vstack([np.eye(3), [x, 0.0, z]])) for x, z in ((0.0, 10.0), (100.0, 17.0)))
     path = prusaslicer(
         tmp_path / "a.3mf",
         [Object([Made(BLOCK)], [low]), Object([Made(BLOCK)], [high])],
@@ -156,7 +156,7 @@ def test_settings_between_two_heights_count_from_the_lowest_point_of_their_objec
 
 
 def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
-    beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 0.0]]))
+    beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 10.0]]))
     wide = m3.Manifold.cube((100.0, 5.0, 5.0), True)
     objects = [Object([Made(BLOCK), Made(wide, "modifier", {"perimeters": "4"})], [AT_ORIGIN]), Object([Made(BLOCK)], [beside])]
     (modifier,) = read_model(prusaslicer(tmp_path / "a.3mf", objects)).zones.modifiers
@@ -203,13 +203,13 @@ def test_a_negative_volume_inside_leaves_a_void(tmp_path: Path) -> None:
 
 def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -> None:
     long = m3.Manifold.cube((200.0, 5.0, 5.0), True)
-    beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 0.0]]))
+    beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 10.0]]))
     objects = [Object([Made(BLOCK), Made(long, "negative")], [AT_ORIGIN]), Object([Made(BLOCK)], [beside])]
     assert read_model(prusaslicer(tmp_path / "a.3mf", objects)).mesh.volume_mm3 == pytest.approx(36000.0 - 30.0 * 25.0)
 
 
 def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
-    at = [Placed(np.vstack([np.eye(3), [100.0 * plate, 0.0, 0.0]]), plate, plate != 1) for plate in (1, 2, 3)]
+    at = [Placed(np.vstack([np.eye(3), [100.0 * plate, 0.0, 20.0]]), plate, plate != 1) for plate in (1, 2, 3)]
     objects = [Object([Made(BLOCK)], at[:2]), Object([Made(BOX)], at[2:])]
     path = bambu(tmp_path / "a.3mf", objects, np.random.default_rng(0))
     assert read_model(path).notes == (
@@ -224,6 +224,15 @@ def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(t
     for other in (prusaslicer(tmp_path / "b.3mf", objects), files.written(tmp_path / "b.stl", from_manifold(BLOCK))):
         with pytest.raises(MeshError, match="has no plates: --plate 1 goes with a project of Bambu Studio or OrcaSlicer"):
             read_model(other, plate=1)
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_what_lies_below_the_plate_of_a_project_is_not_printed(tmp_path: Path, dialect: str) -> None:
+    sunk = Placed(np.vstack([np.eye(3), [0.0, 0.0, 6.0]]))
+    model = read_model(written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK), Made(BOX, "support")], [sunk])]))
+    check(model.mesh, BLOCK.trim_by_plane((0.0, 0.0, 1.0), -6.0))
+    np.testing.assert_allclose(model.zones.support[0].corners[:, 2].min(), -15.0 + 6.0, atol=1e-9)
+    assert model.notes[0] == "leaves out what lies below the plate in its project, 4 mm deep"
 
 
 @pytest.mark.parametrize("kind", ["support", "solidsupport", "other"])
@@ -242,7 +251,9 @@ def test_a_project_that_prints_nothing_is_refused(tmp_path: Path) -> None:
         "its build places no mesh that is printed: it leaves out object b, which its project does not print"
     )
     nothing = Object([Made(BOX), Made(BLOCK.scale((2.0, 2.0, 4.0)), "negative")], [AT_ORIGIN])
-    assert files.refusal(prusaslicer(tmp_path / "b.3mf", [nothing])) == "nothing is left where its negative volumes are taken out"
+    assert files.refusal(prusaslicer(tmp_path / "b.3mf", [nothing])) == (
+        "nothing is left of it: negative volumes or the plate of its project take all"
+    )
 
 
 CONFIG = "Metadata/Slic3r_PE_model.config"
@@ -275,7 +286,7 @@ def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None
     change(path, CONFIG, "</volume></object>", '</volume><volume firstid="12" lastid="23"/></object>')
     model = read_model(path)
     assert model.zones.support == ()
-    assert "it is left out" in model.notes[0]
+    assert any("it is left out" in note for note in model.notes)
 
 
 def test_what_is_painted_on_triangles_is_told(tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def test_marks_of_a_project_stay_with_a_model_that_its_plan_lays_down() -> None:
     """A tee that lies on its side needs no support at its arms: the modifier in them must be where they are then."""
     side = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     standing = prusaslicer(Path("up.3mf"), [Object([Made(TEE), Made(INSERT, "modifier", {"fill_density": "100%"})], [AT_ORIGIN])])
-    lying = Placed(np.vstack([side, np.zeros(3)]))
+    lying = Placed(np.vstack([side, [0.0, 0.0, 20.0]]))
     prusaslicer(Path("down.3mf"), [Object([Made(TEE), Made(INSERT, "modifier", {"fill_density": "100%"})], [lying])])
     Path("plan.toml").write_text("version = 1\norientation = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]\n[[part]]\n")
     options = [option for option in FAST if option != "--as-is"]

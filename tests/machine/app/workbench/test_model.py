@@ -111,7 +111,7 @@ def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more
 
 
 def test_the_boxes_that_a_project_marks_lie_on_the_bench_and_meshes_are_left_out_with_a_note(tmp_path: Path) -> None:
-    block, ball = m3.Manifold.cube((20.0, 20.0, 10.0), True), m3.Manifold.sphere(4.0, 16)
+    block, ball = m3.Manifold.cube((20.0, 20.0, 20.0), True), m3.Manifold.sphere(4.0, 16)
     insert = Made(m3.Manifold.cube((4.0, 6.0, 8.0), True), "modifier", {"perimeters": "4"})
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(block), insert, Made(ball, "support")], [AT_ORIGIN])])
 
@@ -119,5 +119,5 @@ def test_the_boxes_that_a_project_marks_lie_on_the_bench_and_meshes_are_left_out
         return session.bench, the_model(session).notes
 
     bench, notes = read(work, path)
-    assert bench.zones == Zones(modifiers=(Modifier(Zone((-2.0, -3.0, 1.0), (2.0, 3.0, 9.0)), {"walls": 4}),))
+    assert bench.zones == Zones(modifiers=(Modifier(Zone((-2.0, -3.0, 6.0), (2.0, 3.0, 14.0)), {"walls": 4}),))
     assert notes[-1] == "1 of these marks is no box and left out here: the command line has it"
