@@ -407,7 +407,7 @@ PIPELINE = "machine.app.pipeline.pipeline"
 @pytest.mark.parametrize(
     ("module", "stage", "later_s", "written"),
     [
-        (PIPELINE, "read_mesh", 0.0, []),
+        (PIPELINE, "read_model", 0.0, []),
         (PIPELINE, "slice_parts", 0.0, []),
         (PIPELINE, "slice_parts", 0.2, []),
         (PIPELINE, "plan", 0.0, []),
