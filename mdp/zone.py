@@ -26,6 +26,7 @@ FARTHEST_MM = 1.0  # from a surface that a point may lie to mean a place of it
 MOST_GROWN_DEG = 180.0  # no two normals are farther apart
 ROUNDING_COSINE = 1e-6  # an angle of 0 takes the faces of a flat place
 ROUNDING_MM = 1e-6  # a plane may touch what it must not pass through
+GRID_MM, GRID_SHIFT = 1e-4, 0.3141  # of what tells places apart; shifted, for coordinates lie on whole and half micrometres
 MOST_PRODUCTS = 4_000_000  # of directions and points at a time
 
 
@@ -159,6 +160,26 @@ class Grown:
         return mesh.nearest_face(np.array(self.point_mm))[1]
 
 
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Faces of a model by where their corners lie, (k, 3, 3)."""
+
+    corners: Floats
+
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Triangles":
+        """The same with every corner p at rotation @ p + shift_mm."""
+        return Triangles(self.corners @ rotation.T + shift_mm)
+
+    def faces(self, mesh: Mesh) -> Mask:
+        """(m,) which faces of a mesh they are, by their middles to a tenth of a micrometre."""
+        middles = [corners.mean(axis=1) for corners in (self.corners, mesh.vertices[mesh.faces])]
+        cells = [np.floor(places / GRID_MM + GRID_SHIFT).astype(np.int64) for places in middles]
+        _, cell = np.unique(np.concatenate(cells), axis=0, return_inverse=True)
+        count = len(self.corners)
+        found: Mask = np.isin(cell.ravel()[count:], cell.ravel()[:count])
+        return found
+
+
 @dataclass(frozen=True)
 class MeshVolume:
     """A closed mesh that lies in the workpiece frame, and the file that it is read from; room: as of Zone."""
@@ -184,12 +205,12 @@ class MeshVolume:
 
 
 Volume = Zone | MeshVolume
-AnyZone = Zone | MeshVolume | Painted | Grown
+AnyZone = Zone | MeshVolume | Painted | Grown | Triangles
 
 
-def faces_of(mesh: Mesh, zone: MeshVolume | Painted | Grown) -> Mask:
+def faces_of(mesh: Mesh, zone: MeshVolume | Painted | Grown | Triangles) -> Mask:
     """(m,) the faces of a mesh that a zone means."""
-    if isinstance(zone, Grown):
+    if isinstance(zone, Grown | Triangles):
         return zone.faces(mesh)
     if isinstance(zone, MeshVolume):
         return zone.touches(mesh)

@@ -12,6 +12,10 @@ from xml.etree.ElementTree import Element
 from mdp.formats.surface import Surface
 
 PART, NEGATIVE, MODIFIER, SUPPORT, NO_SUPPORT = "part", "negative volume", "modifier", "support enforcer", "support blocker"
+# Kinds that are triangles of a part, by what they are painted for and the digit of a whole triangle that is painted so: 4
+# enforces, 8 blocks; more digits tell of a triangle that is painted in part (PrusaSlicer, src/libslic3r/TriangleSelector.cpp).
+PAINT_SUPPORT, PAINT_NO_SUPPORT, PAINT_NO_SEAM = "paint for support", "paint against support", "paint against seams"
+PAINTS = {("support", "4"): PAINT_SUPPORT, ("support", "8"): PAINT_NO_SUPPORT, ("seams", "8"): PAINT_NO_SEAM}
 VOLUME_TYPES = {  # PrusaSlicer's, then those of Bambu Studio and OrcaSlicer
     "ModelPart": PART,
     "NegativeVolume": NEGATIVE,

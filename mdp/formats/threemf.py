@@ -7,7 +7,7 @@ import struct
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from mdp.formats.project import (
+    PAINTS,
     PART,
     Plate,
     Project,
@@ -58,10 +59,10 @@ NOT_TAKEN = {  # parts of a package, and what they would change
     ),
 }
 PAINTED = {  # attributes of triangles, and what they would change
-    "support": (b"paint_supports", b"slic3rpe:custom_supports"),
-    "seams": (b"paint_seam", b"slic3rpe:custom_seam"),
-    "filaments": (b"paint_color", b"slic3rpe:mmu_segmentation"),
-    "fuzzy skin": (b"paint_fuzzy_skin", b"slic3rpe:fuzzy_skin"),
+    "support": ("paint_supports", "slic3rpe:custom_supports"),
+    "seams": ("paint_seam", "slic3rpe:custom_seam"),
+    "filaments": ("paint_color", "slic3rpe:mmu_segmentation"),
+    "fuzzy skin": ("paint_fuzzy_skin", "slic3rpe:fuzzy_skin"),
 }
 DAMAGES: tuple[type[Exception], ...] = (
     LookupError,
@@ -151,7 +152,7 @@ class Package:
             self._check_extensions(root, content)
             objects = {element.get("id", ""): element for element in reversed(root.findall("{*}resources/{*}object"))}
             painted = tuple(
-                what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % own, content) for own in names)
+                what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % own.encode(), content) for own in names)
             )
             self.models[name] = Model(root, objects, _palettes(root), painted)
         return self.models[name]
@@ -210,6 +211,7 @@ class _Build:
         self._start = _start_part(package)
         self._told = _told(package)
         self._notes: list[str] = []
+        self._unpainted: Counter[str] = Counter()
         self._placed = self._meshes = self._faces = 0
         objects = package.model(self._start).root.findall("{*}resources/{*}object")
         with_mesh = [element.get("id", "") for element in objects if element.find("{*}mesh") is not None]
@@ -222,9 +224,11 @@ class _Build:
         built = [own for item in items if (own := self._object(item)) is not None]
         if not any(own.surfaces(PART) for own in built):
             raise MeshError(f"{self._path}: its build places no mesh" + (f" that is printed: it {notes[0]}" if notes else ""))
-        painted = [what for what in PAINTED if any(what in model.painted for model in package.models.values())]
-        if painted:
-            notes.append(f"what is painted on its triangles is not taken ({', '.join(painted)}): marks of a plan do such things")
+        notes += [
+            f"{count} triangle{'s' * (count > 1)} painted for {what} {'are' if count > 1 else 'is'} not taken"
+            + (": only whole ones are, for and against support and against seams" if what in ("support", "seams") else "")
+            for what, count in self._unpainted.items()
+        ]
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
         return Project(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._told.objects))
 
@@ -311,6 +315,8 @@ class _Build:
         self._faces += len(surface.faces)
         check_meshes(self._path, self._meshes, self._faces)
         surface = _transformed(self._path, surface, placement.transform, _unit_mm(self._path, model.root))
+        if placement.role is None or placement.role.kind == PART:
+            yield from self._painted(surface, mesh, model.painted)
         triangles = self._told.triangles.get(placement.identity, ()) if placement.part == self._start else ()
         if placement.role is not None or not triangles:
             yield ProjectVolume(surface, placement.role or Role())
@@ -324,6 +330,20 @@ class _Build:
             yield ProjectVolume(_piece(surface, slice(first, last + 1)), role)
         if rest.any():
             yield ProjectVolume(_piece(surface, np.flatnonzero(rest)))
+
+    def _painted(self, surface: Surface, mesh: ElementTree.Element, painted: Sequence[str]) -> Iterator[ProjectVolume]:
+        """The triangles of a mesh that are painted as a whole for something that is known here; others are counted."""
+        triangles = mesh.findall("{*}triangles/{*}triangle") if painted else []
+        for what in painted:
+            chosen: dict[str, list[int]] = {}
+            for number, triangle in enumerate(triangles):
+                if digits := next((text for name in PAINTED[what] if (text := _attribute(triangle, name))), ""):
+                    kind = PAINTS.get((what, digits))
+                    self._unpainted[what] += kind is None
+                    chosen.setdefault(kind or "", []).append(number)
+            for kind, numbers in chosen.items():
+                if kind:
+                    yield ProjectVolume(_piece(surface, np.array(numbers)), Role(kind))
 
     def _check_understood(self, element: ElementTree.Element, has_components: bool) -> None:
         """Raise MeshError for an object whose shape is told in a way that is not read."""
@@ -342,6 +362,14 @@ class _Build:
         element = self._package.model(self._start).objects.get(number)
         told = self._told.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
         self._notes.append(f"leaves out object {told or number}, {why}")
+
+
+def _attribute(element: ElementTree.Element, name: str) -> str:
+    """An attribute whose prefix may stand for any namespace."""
+    prefix, _, bare = name.rpartition(":")
+    if not prefix:
+        return element.get(name, "")
+    return next((text for key, text in element.attrib.items() if key.rpartition("}")[2] == bare), "")
 
 
 def _is_printed(item: ElementTree.Element) -> bool:

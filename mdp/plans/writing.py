@@ -44,6 +44,7 @@ def _zone_values(zone: AnyZone, folder: Path | None) -> dict[str, Any]:
         return {"point_mm": list(zone.point_mm), "angle_deg": zone.angle_deg}
     if isinstance(zone, MeshVolume):
         return {"mesh": _path_from(folder, zone.file)}
+    assert isinstance(zone, Zone)  # triangles are only what a model's own file marks
     leaning = {} if zone.axes is None else {"axes": [list(axis) for axis in zone.axes]}
     return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm), **leaning}
 

@@ -8,15 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from mdp.formats.project import MODIFIER, NO_SUPPORT, PART, SUPPORT, Project, ProjectObject, ProjectVolume, Role
+from mdp.formats.project import (
+    MODIFIER,
+    NO_SUPPORT,
+    PAINT_NO_SEAM,
+    PAINT_NO_SUPPORT,
+    PAINT_SUPPORT,
+    PART,
+    SUPPORT,
+    Project,
+    ProjectObject,
+    ProjectVolume,
+    Role,
+)
 from mdp.formats.surface import concatenate
 from mdp.head import corners
 from mdp.mesh import Floats, Mesh
 from mdp.projects.printed import solid_of_volume
-from mdp.zone import MeshVolume, Modifier, Volume, Zone, Zones
+from mdp.zone import AnyZone, MeshVolume, Modifier, Triangles, Volume, Zone, Zones
 from profiles.errors import MeshError
 
-TAKEN_AS = {MODIFIER: "[[modifier]]", SUPPORT: "[[support]]", NO_SUPPORT: "[[no_support]]"}
+MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
+PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
 SAME = 1e-6  # cosine of a right angle, and share of a box's size by which its corners may lie off
 MOST_TOLD = 8  # settings in a sentence
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
@@ -38,7 +51,7 @@ class _Marks:
 
     def zones(self) -> tuple[Zones, list[str]]:
         """All marks and a sentence for each."""
-        modifiers, support, no_support = list[Modifier](), list[Volume](), list[Volume]()
+        modifiers, kinds = list[Modifier](), {kind: list[AnyZone]() for kind in ("no_seam", "no_support", "support")}
         for own in self._objects:
             modifiers += self._of_object(own) if own.surfaces(PART) else ()
             for volume in own.volumes:
@@ -47,10 +60,14 @@ class _Marks:
                     process = self._process(_named(role), role.settings)
                     place = self._place(volume, own) if process else None
                     modifiers += [] if place is None else [Modifier(place, process)]
-                elif role.kind in (SUPPORT, NO_SUPPORT) and (place := self._place(volume, own)) is not None:
-                    (support if role.kind == SUPPORT else no_support).append(place)
-                    self._notes.append(f"{_named(role)} is taken as {TAKEN_AS[role.kind]}")
-        return Zones(no_support=tuple(no_support), support=tuple(support), modifiers=tuple(modifiers)), self._notes
+                elif role.kind in MARKED and (place := self._place(volume, own)) is not None:
+                    kinds[MARKED[role.kind]].append(place)
+                    self._notes.append(f"{_named(role)} is taken as [[{MARKED[role.kind]}]]")
+                elif role.kind in PAINTED:
+                    corners_mm = volume.surface.vertices[volume.surface.faces]
+                    kinds[PAINTED[role.kind]].append(Triangles(self._moved(corners_mm)))
+                    self._notes.append(f"{role.kind} on {len(corners_mm)} of its triangles is taken as [[{PAINTED[role.kind]}]]")
+        return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), self._notes
 
     def _of_object(self, own: ProjectObject) -> Iterator[Modifier]:
         """The settings of an object and those between two heights of it."""
@@ -70,7 +87,7 @@ class _Marks:
         process, left = read_project_settings(self._path).of_place(settings)
         told = ", ".join(f"{key} = {value}" for key, value in process.items())
         rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
-        self._notes.append(f"{what} " + (f"is taken as {TAKEN_AS[MODIFIER]}: {told}" if told else "changes nothing here") + rest)
+        self._notes.append(f"{what} " + (f"is taken as [[modifier]]: {told}" if told else "changes nothing here") + rest)
         return process
 
     def _place(self, volume: ProjectVolume, own: ProjectObject) -> Volume | None:

@@ -11,7 +11,7 @@ import pytest
 
 from mdp.mesh import Floats, Mesh
 from mdp.read import read_model
-from mdp.zone import MeshVolume, Zone
+from mdp.zone import MeshVolume, Zone, faces_of
 from profiles.errors import MeshError
 from tests.mdp import files
 from tests.mdp.projects import AT_ORIGIN, Made, Object, Placed, affine, bambu, printed, prusaslicer
@@ -289,9 +289,38 @@ def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None
     assert any("it is left out" in note for note in model.notes)
 
 
-def test_what_is_painted_on_triangles_is_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("dialect", "supports", "seams"),
+    [("prusaslicer", "slic3rpe:custom_supports", "slic3rpe:custom_seam"), ("bambu", "paint_supports", "paint_seam")],
+)
+def test_whole_triangles_that_are_painted_are_marked_wherever_the_model_lies(
+    tmp_path: Path, dialect: str, supports: str, seams: str
+) -> None:
+    path = written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK)], [AT_ORIGIN])])
+    part = "3D/3dmodel.model" if dialect == "prusaslicer" else "3D/Objects/object_1.model"
+    with zipfile.ZipFile(path) as archive:
+        pieces = archive.read(part).decode().split("<triangle ")
+    painted = {0: f'{supports}="4"', 1: f'{supports}="8"', 2: f'{seams}="8"', 3: f'{seams}="4"', 4: f'{supports}="41"'}
+    text = "<triangle ".join(pieces[:1] + [f"{painted.get(k, '')} {piece}" for k, piece in enumerate(pieces[1:])])
+    change(path, part, "<triangle ".join(pieces), text)
+    model = read_model(path, 1.7, (30.0, 20.0, 10.0))
+    turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    turned, zones = model.mesh.transform(turn, (1.0, 2.0, 3.0)), model.zones.transform(turn, np.array([1.0, 2.0, 3.0]))
+    for mesh, marks in ((model.mesh, model.zones), (turned, zones)):
+        faces = [faces_of(mesh, zone).nonzero()[0].tolist() for (zone,) in (marks.support, marks.no_support, marks.no_seam)]
+        assert faces == [[0], [1], [2]]
+    assert sorted(model.notes) == [
+        "1 triangle painted for seams is not taken: only whole ones are, for and against support and against seams",
+        "1 triangle painted for support is not taken: only whole ones are, for and against support and against seams",
+        "paint against seams on 1 of its triangles is taken as [[no_seam]]",
+        "paint against support on 1 of its triangles is taken as [[no_support]]",
+        "paint for support on 1 of its triangles is taken as [[support]]",
+    ]
+
+
+def test_colours_painted_on_triangles_are_told(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [AT_ORIGIN])])
-    change(path, "3D/3dmodel.model", "<triangle ", '<triangle slic3rpe:custom_supports="4" paint_seam="8" ')
+    change(path, "3D/3dmodel.model", "<triangle ", '<triangle slic3rpe:mmu_segmentation="4" ')
     model = read_model(path)
     check(model.mesh, BLOCK)
-    assert model.notes == ("what is painted on its triangles is not taken (support, seams): marks of a plan do such things",)
+    assert model.notes == ("12 triangles painted for filaments are not taken",)
