@@ -228,6 +228,7 @@ class _Build:
             f"{count} triangle{'s' * (count > 1)} painted for {what} {'are' if count > 1 else 'is'} not taken"
             + (": only whole ones are, for and against support and against seams" if what in ("support", "seams") else "")
             for what, count in self._unpainted.items()
+            if count
         ]
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
         return Project(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._told.objects))

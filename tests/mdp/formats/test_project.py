@@ -320,7 +320,10 @@ def test_whole_triangles_that_are_painted_are_marked_wherever_the_model_lies(
 
 def test_colours_painted_on_triangles_are_told(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [AT_ORIGIN])])
-    change(path, "3D/3dmodel.model", "<triangle ", '<triangle slic3rpe:mmu_segmentation="4" ')
+    change(path, "3D/3dmodel.model", "<triangle ", '<triangle slic3rpe:mmu_segmentation="4" paint_seam="8" ')
     model = read_model(path)
     check(model.mesh, BLOCK)
-    assert model.notes == ("12 triangles painted for filaments are not taken",)
+    assert model.notes == (
+        "12 triangles painted for filaments are not taken",
+        "paint against seams on 12 of its triangles is taken as [[no_seam]]",
+    )
