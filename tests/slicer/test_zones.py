@@ -1,6 +1,7 @@
 """What a person marks on a part, in its layers: where none begins, and where no support is printed."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import manifold3d as m3
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
-from mdp.zone import AnyZone, Grown, Marked, Zone
+from mdp.zone import AnyZone, Grown, Marked, MeshVolume, Zone
 from profiles.frozen import Vector
 from slicer.estimate.estimate import estimate
 from slicer.heights import Heights
@@ -24,6 +25,7 @@ BACK_BOX = Zone((-20.0, 8.0, -1.0), (20.0, 12.0, 30.0))
 SUPPORTED = profile("process.skirt_loops=0", "process.support=auto")
 LEANING = ((0.8, 0.36, 0.48), (-0.6, 0.48, 0.64), (0.0, -0.8, 0.6))  # rows of a rotation
 RIGHT_ARM = Zone((4.5, -10.0, -1.0), (25.0, 10.0, 35.0))
+RIGHT_MESH = MeshVolume(Path("arm.stl"), box(20.5, 20.0, 36.0).transform(np.eye(3), (14.75, 0.0, -1.0)))
 
 
 def without_seam(part: Part, *zones: AnyZone) -> Part:
@@ -85,7 +87,7 @@ def test_a_wall_on_which_no_seam_is_wanted_anywhere_begins_inside() -> None:
     assert np.abs(begins(without)).max(axis=1).max() < 9.6
 
 
-@pytest.mark.parametrize("zone", [RIGHT_ARM, Grown((12.0, 0.0, 30.0), 1.0)])
+@pytest.mark.parametrize("zone", [RIGHT_ARM, RIGHT_MESH, Grown((12.0, 0.0, 30.0), 1.0)])
 def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zone: AnyZone) -> None:
     part = whole(tee())
     (free,) = slice_parts([part], SUPPORTED)

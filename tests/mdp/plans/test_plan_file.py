@@ -130,6 +130,8 @@ REFUSED = [
         "version = 1\n[[modifier]]\ncolour = '#ff0000'",
         "modifier 1: 'colour' is no key of a plan: min_mm, max_mm, axes, z_mm,",
     ),
+    ("version = 1\n[[keep]]\nmesh = 'a.stl'", "keep 1: 'mesh' is no key of a plan: min_mm, max_mm, axes, colour,"),
+    ("version = 1\n[[support]]\nmesh = 'a.stl'\ncolour = '#ff0000'", "support 1: has a mesh and colour: one of them is allowed"),
     ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
     ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),
     ("version = 1\n[[front]]\nplanes = []\ncost_mm2 = 'dear'", "front 1: cost_mm2 is 'dear': a number is expected"),
@@ -167,6 +169,18 @@ def test_the_mesh_of_a_modifier_lies_beside_the_plan_as_its_file_has_it(tmp_path
         assert f'mesh = "{written}"' in (folder / "plan.toml").read_text()
         assert read_plan(folder / "plan.toml").zones == plan.zones
     assert f'mesh = "{(tmp_path / "insert.stl").as_posix()}"' in plan_text(plan)
+
+
+def test_support_is_wanted_or_not_in_a_mesh_too(tmp_path: Path) -> None:
+    (tmp_path / "arm.stl").write_bytes(stl(shapes.box(3.0, 4.0, 5.0)))
+    (tmp_path / "mine.toml").write_text("version = 1\n[[support]]\nmesh = 'arm.stl'\n[[no_support]]\nmesh = 'arm.stl'\n")
+    plan = read_plan(tmp_path / "mine.toml")
+    (held,), (bare,) = plan.zones.support, plan.zones.no_support
+    assert isinstance(held, MeshVolume)
+    assert held == bare
+    assert held.mesh.bounds_mm.tolist() == [[-1.5, -2.0, 0.0], [1.5, 2.0, 5.0]]
+    (tmp_path / "again.toml").write_text(plan_text(plan, tmp_path))
+    assert read_plan(tmp_path / "again.toml").zones == plan.zones
 
 
 def test_an_open_mesh_of_a_modifier_is_refused_by_its_name(tmp_path: Path) -> None:
