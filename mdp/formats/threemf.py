@@ -246,6 +246,8 @@ class _Build:
                 self._leave_out(item.get("objectid", ""), "which its project does not print")
             elif chosen is None or instance in chosen.instances:
                 yield item
+            elif not any(instance in plate.instances for plate in self._told.plates):
+                self._leave_out(item.get("objectid", ""), "which stands on none of its plates")
 
     def _plate(self, printed: list[tuple[str, int]], number: int | None) -> Plate | None:
         """The plate of a number, or the first that holds something that is printed; None: there are no plates."""

@@ -66,7 +66,7 @@ def job_of(do: str, asked: ModelRequest, out: Path) -> Job:
     if asked.ranker.endswith(SUFFIX):  # other machines start elsewhere
         file = Path(asked.ranker).resolve()
         asked, ranker = replace(asked, ranker=str(file)), file.read_bytes()
-    words = (version("tiltprint"), do, asked.profile.model_dump_json(), ranker, asked.orient, asked.cuts.parts)
+    words = (version("tiltprint"), do, asked.profile.model_dump_json(), ranker, asked.orient, asked.cuts.parts, asked.plate)
     return Job(do, asked, out, sha256(repr(words).encode()).hexdigest())
 
 

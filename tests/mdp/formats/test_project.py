@@ -216,11 +216,16 @@ def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(t
         "takes plate 2 of its project; --plate takes another: 3",
         "leaves out object b, which its project does not print",
     )
-    check(read_model(path, plate=3).mesh, BOX)
     with pytest.raises(MeshError, match="--plate 1: its plate is empty; there are 2, 3"):
         read_model(path, plate=1)
     with pytest.raises(MeshError, match="--plate 4: its plate is not there; there are 2, 3"):
         read_model(path, plate=4)
+    check(read_model(path, plate=3).mesh, BOX)
+    change(path, "Metadata/model_settings.config", '"instance_id" value="1"', '"instance_id" value="7"')
+    assert read_model(path).notes == (
+        "leaves out object b, which its project does not print",
+        "leaves out object b, which stands on none of its plates",
+    )
     for other in (prusaslicer(tmp_path / "b.3mf", objects), files.written(tmp_path / "b.stl", from_manifold(BLOCK))):
         with pytest.raises(MeshError, match="has no plates: --plate 1 goes with a project of Bambu Studio or OrcaSlicer"):
             read_model(other, plate=1)
