@@ -64,7 +64,7 @@ class Plate:
 class Told:
     """What a project says beside its model. objects: by their numbers; triangles: of an object's mesh, the first and the last of
     each volume; parts: by the numbers of an object and its component; heights: settings between two heights above an object's
-    lowest point, mm, by the place of its mesh among all meshes, from 1."""
+    lowest point, mm, by the place of the object among all (PrusaSlicer: that have a mesh themselves), from 1."""
 
     objects: Mapping[str, Role] = field(default_factory=dict)
     triangles: Mapping[str, Sequence[tuple[int, int, Role]]] = field(default_factory=dict)

@@ -214,8 +214,9 @@ class _Build:
         self._unpainted: Counter[str] = Counter()
         self._placed = self._meshes = self._faces = 0
         objects = package.model(self._start).root.findall("{*}resources/{*}object")
-        with_mesh = [element.get("id", "") for element in objects if element.find("{*}mesh") is not None]
-        self._rank = {number: str(k) for k, number in enumerate(with_mesh, start=1)}
+        if not self._told.parts:
+            objects = [element for element in objects if element.find("{*}mesh") is not None]
+        self._rank = {element.get("id", ""): str(place) for place, element in enumerate(objects, start=1)}
 
     def project(self, plate: int | None) -> Project:
         """What is printed on a plate."""
@@ -271,7 +272,7 @@ class _Build:
         """What an item places; None: nothing."""
         volumes: list[ProjectVolume] = []
         settings: Mapping[str, str] = {}
-        heights: list[tuple[float, float, Mapping[str, str]]] = []
+        heights: Sequence[tuple[float, float, Mapping[str, str]]] = ()
         pending = [self._placement(item, Placement(self._start, "", _IDENTITY))]
         while pending:
             placement = pending.pop()
@@ -289,9 +290,10 @@ class _Build:
             mesh = element.find("{*}mesh")
             if mesh is not None:
                 volumes += self._volumes(placement, model, mesh, element.get("pid", ""))
-                owners = [self._told.objects[own] for own in (*placement.within, placement.identity) if own in self._told.objects]
-                settings = {**settings, **{key: text for own in owners for key, text in own.settings.items()}}
-                heights += self._told.heights.get(self._rank.get(placement.identity, ""), ())
+                own = placement.identity if placement.part == self._start else ""
+                for number in (*placement.within[:1], own):
+                    settings = {**settings, **self._told.objects.get(number, Role()).settings}
+                    heights = self._told.heights.get(self._rank.get(number, ""), heights)
                 continue
             components = element.findall("{*}components/{*}component")
             self._check_understood(element, bool(components))

@@ -1,8 +1,7 @@
 """Project files of other slicers: what is printed of them, on which plate, and what their other volumes become."""
 
 import zipfile
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import manifold3d as m3
@@ -23,8 +22,10 @@ CYLINDER = m3.Manifold.cylinder(40.0, 5.0, circular_segments=24, center=True)
 DIALECTS = ("prusaslicer", "bambu")
 
 
-def written(path: Path, dialect: str, objects: Sequence[Object], seed: int = 0) -> Path:
-    return bambu(path, objects, np.random.default_rng(seed)) if dialect == "bambu" else prusaslicer(path, objects)
+def written(path: Path, dialect: str, objects: Sequence[Object], seed: int = 0, further: Mapping[str, str] | None = None) -> Path:
+    if dialect == "bambu":
+        return bambu(path, objects, np.random.default_rng(seed), further)
+    return prusaslicer(path, objects, further)
 
 
 def check(mesh: Mesh, expected: m3.Manifold) -> None:
@@ -140,19 +141,27 @@ def test_settings_of_an_object_hold_in_a_box_around_it_and_those_of_a_part_in_th
     assert (of_part.process, type(of_part.volume)) == ({"infill_pattern": "gyroid"}, MeshVolume)
 
 
-def test_settings_between_two_heights_count_from_the_lowest_point_of_their_object(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("dialect", "part", "key"),
+    [
+        ("prusaslicer", "Metadata/Prusa_Slicer_layer_config_ranges.xml", "perimeters"),
+        ("bambu", "Metadata/layer_config_ranges.xml", "wall_loops"),
+    ],
+)
+def test_settings_between_two_heights_count_from_the_lowest_point_of_their_object(
+    tmp_path: Path, dialect: str, part: str, key: str
+) -> None:
     ranges = (
-        '<objects><object id="2"><range min_z="5" max_z="8"><option opt_key="perimeters">6</option>'
+        f'<objects><object id="2"><range min_z="5" max_z="8"><option opt_key="{key}">6</option>'
         '<option opt_key="extruder">0</option></range></object></objects>'
     )
     low, high = (Placed(np.vstack([np.eye(3), [x, 0.0, z]])) for x, z in ((0.0, 10.0), (100.0, 17.0)))
-    path = prusaslicer(
-        tmp_path / "a.3mf",
-        [Object([Made(BLOCK)], [low]), Object([Made(BLOCK)], [high])],
-        {"Metadata/Prusa_Slicer_layer_config_ranges.xml": ranges},
-    )
-    (modifier,) = read_model(path).zones.modifiers
-    assert modifier == replace(modifier, volume=Zone((34.0, -16.0, 12.0), (66.0, 16.0, 15.0)), process={"walls": 6})
+    objects = [Object([Made(BLOCK)], [low]), Object([Made(BLOCK), Made(BOX)], [high])]
+    (modifier,) = read_model(written(tmp_path / "a.3mf", dialect, objects, further={part: ranges})).zones.modifiers
+    assert modifier.process == {"walls": 6}
+    assert isinstance(modifier.volume, Zone)
+    corners = [modifier.volume.min_mm, modifier.volume.max_mm]
+    np.testing.assert_allclose(corners, [(34.0, -16.0, 7.0), (66.0, 16.0, 10.0)], atol=1e-9)
 
 
 def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
