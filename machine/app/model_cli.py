@@ -151,7 +151,7 @@ def save(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="NAME.3mf", help="project file to write")],
     given: options.ProfileOptions,
 ) -> int:
-    """Write a project: one 3MF with the model, its parts, marks and profiles. Other slicers open it as a model."""
+    """Write a project: one 3MF with model, plan and profiles. Every command takes it, and other slicers open it."""
     options.check_model(model)
     from machine.app.commands.save import save
 

@@ -216,8 +216,8 @@ def model_request(model: str, search: SearchOptions, given: ProfileOptions, **fu
             further["cuts"] = replace(cuts, plans=(work.plan,) if work.plan else ())
         if "stops" in further:
             further["stops"] = further["stops"] or work.stops
-            further["copies"] = further["copies"] or work.copies
-    further["copies"] = further.get("copies") or 1
+            further["copies"] = work.copies if further["copies"] is None else further["copies"]
+    further["copies"] = 1 if further.get("copies") is None else further["copies"]
     profile = given.profile(search)
     named = ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names)
     return replace(named, settings=given.given(search).settings, **further)
