@@ -1,10 +1,12 @@
-"""Save: a decomposition as STL files, one coloured 3MF, one coloured GLB and JSON values."""
+"""Save: meshes as a 3MF package, and a decomposition as STL files, one coloured 3MF, one coloured GLB and JSON values."""
 
 import io
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -19,17 +21,23 @@ _STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<
 _TYPES = (
     '<?xml version="1.0" encoding="UTF-8"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
     '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>'
+    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>{}</Types>'
 )
 _RELATIONS = (
     '<?xml version="1.0" encoding="UTF-8"?><Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
     '<Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
-    "</Relationships>"
+    "{}</Relationships>"
+)
+_THUMBNAIL = (
+    '<Relationship Target="/{}" Id="rel1" '
+    'Type="http://schemas.openxmlformats.org/package/2006/relationships/metadata/thumbnail"/>'
 )
 _MODEL = (
     '<?xml version="1.0" encoding="UTF-8"?><model unit="millimeter" xml:lang="en" '
-    'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+    'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
 )
+MODEL_PART = "3D/3dmodel.model"
+_DATE = (1980, 1, 1, 0, 0, 0)  # of all entries: the same bytes every time
 
 _GLTF = 0.001 * np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000.0]])  # mm with z up to metres with y up
 
@@ -53,20 +61,42 @@ def stl(mesh: Mesh) -> bytes:
 
 def threemf(decomposition: Decomposition) -> bytes:
     """All parts in place in one 3MF, each an object of its own colour, the same bytes every time."""
-    bases = "".join(
-        f'<base name="part {part.index}" displaycolor="{COLOURS[(part.index - 1) % len(COLOURS)]}FF"/>'
-        for part in decomposition.parts
-    )
-    objects = "".join(_object(part.mesh, part.index) for part in decomposition.parts)
-    items = "".join(f'<item objectid="{part.index + 1}"/>' for part in decomposition.parts)
-    model = f'{_MODEL}<basematerials id="1">{bases}</basematerials>{objects}</resources><build>{items}</build></model>'
     content = io.BytesIO()
-    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, text in (("[Content_Types].xml", _TYPES), ("_rels/.rels", _RELATIONS), ("3D/3dmodel.model", model)):
-            entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, text)
+    write_package(content, model_xml([(part.mesh, f"part {part.index}") for part in decomposition.parts], coloured=True))
     return content.getvalue()
+
+
+def model_xml(bodies: Sequence[tuple[Mesh, str]], metadata: Mapping[str, str] | None = None, coloured: bool = False) -> str:
+    """The model part of a 3MF package with named meshes in place. coloured: each has a colour of its own."""
+    names = [escape(name, {'"': "&quot;"}) for _, name in bodies]
+    said = "".join(f'<metadata name="{key}">{escape(text)}</metadata>' for key, text in (metadata or {}).items())
+    bases = "".join(f'<base name="{name}" displaycolor="{COLOURS[k % len(COLOURS)]}FF"/>' for k, name in enumerate(names))
+    materials = f'<basematerials id="1">{bases}</basematerials>' if coloured else ""
+    objects = "".join(_object(mesh, names[k], k, coloured) for k, (mesh, _) in enumerate(bodies))
+    items = "".join(f'<item objectid="{k + 2}"/>' for k in range(len(bodies)))
+    return f"{_MODEL}{said}<resources>{materials}{objects}</resources><build>{items}</build></model>"
+
+
+def write_package(file: BinaryIO, model: str, others: Sequence[tuple[str, bytes]] = ()) -> None:
+    """Write a 3MF package: its model part and other files by their names; a PNG among them is its thumbnail."""
+    suffixes = sorted({suffix for name, _ in others if (suffix := Path(name).suffix.removeprefix(".").lower())})
+    kinds = {"png": "image/png"}
+    types = "".join(
+        f'<Default Extension="{escape(suffix)}" ContentType="{kinds.get(suffix, "application/octet-stream")}"/>'
+        for suffix in suffixes
+        if suffix not in ("rels", "model")
+    )
+    pictures = "".join(_THUMBNAIL.format(name) for name, _ in others if name.endswith(".png"))
+    parts = [
+        ("[Content_Types].xml", _TYPES.format(types).encode()),
+        ("_rels/.rels", _RELATIONS.format(pictures).encode()),
+        (MODEL_PART, model.encode()),
+    ]
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in (*parts, *others):
+            entry = zipfile.ZipInfo(name, _DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, content)
 
 
 def glb(decomposition: Decomposition) -> bytes:
@@ -141,10 +171,11 @@ def plane_values(plane: Plane) -> dict[str, Any]:
     return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm, **limbs}
 
 
-def _object(mesh: Mesh, index: int) -> str:
+def _object(mesh: Mesh, name: str, number: int, coloured: bool) -> str:
     vertices = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in mesh.vertices.tolist())
     triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist())
+    colour = f' pid="1" pindex="{number}"' if coloured else ""
     return (
-        f'<object id="{index + 1}" name="part {index}" type="model" pid="1" pindex="{index - 1}"><mesh>'
+        f'<object id="{number + 2}" name="{name}" type="model"{colour}><mesh>'
         f"<vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>"
     )

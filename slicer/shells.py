@@ -343,7 +343,7 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
             if process.walls:  # lines end over them, not beside them
                 onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width
                 held += offset(area, onto_mm) - shell.walls.inside
-            above = replace(lines, seen=not (area ^ region.bare).is_empty())
+            above = replace(lines, seen=not (offset(area, width) ^ region.bare).is_empty())
             beads += bridge_beads(held, above, process.infill_bridge_flow, over_infill=True)
             region = replace(_without(region, area, width), sparse=region.sparse)
     skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))

@@ -1,4 +1,4 @@
-"""The command line of models: decompose, export, simulate, view, edit, batch. Heavy imports stay inside the commands."""
+"""The command line of models: decompose, export, simulate, view, edit, save, batch. Heavy imports stay inside the commands."""
 
 from collections.abc import Callable
 from os.path import exists  # pathlib's raises for a name that is too long
@@ -38,7 +38,7 @@ def decompose(
     compare: Annotated[
         bool, typer.Option("--compare", help="slice the parts: tell how their joints lie, and time and material in one part")
     ] = False,
-    given: options.ModelProfileOptions,
+    given: options.ProfileOptions,
 ) -> int:
     """Cut a model into parts, each with its own printing direction."""
     options.check_model(model)
@@ -65,7 +65,7 @@ def export(
         bool, typer.Option("--compare", help="tell also time, material, support and risky area printed in one part")
     ] = False,
     force: options.Force = False,
-    given: options.ModelProfileOptions,
+    given: options.ProfileOptions,
 ) -> int:
     """Write the G-code of one or several models, dry-run first."""
     for model in dict.fromkeys(options.named_models(models)):
@@ -135,14 +135,27 @@ def edit(
         Path | None, typer.Option("--certificate", metavar="FILE", help="PEM file: encrypts --lan, with --key")
     ] = None,
     key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="PEM file: the key of the certificate")] = None,
-    given: options.ModelProfileOptions,
+    given: options.ProfileOptions,
 ) -> int:
     """Open the workbench: a page to look, cut, slice and print. It is on this computer alone, but with --lan; Ctrl-C ends it."""
     from machine.app.commands.edit import edit
-    from machine.app.requests import EditRequest, Given
+    from machine.app.requests import EditRequest
 
-    names = Given(given.machine, given.material, given.process, tuple(given.settings or ()))
-    return edit(EditRequest(given.profile(), names, model, port, not no_browser, upload_mib, lan, certificate, key))
+    return edit(EditRequest(given.profile(), given.given(), model, port, not no_browser, upload_mib, lan, certificate, key))
+
+
+def save(
+    model: options.Model,
+    *,
+    program: options.ProgramOptions,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="NAME.3mf", help="project file to write")],
+    given: options.ProfileOptions,
+) -> int:
+    """Write a project: one 3MF with model, plan and profiles. Every command takes it, and other slicers open it."""
+    options.check_model(model)
+    from machine.app.commands.save import save
+
+    return save(options.program_request([model], program, given), out)
 
 
 def batch(
@@ -165,7 +178,7 @@ def batch(
         float | None, typer.Option("--limit-s", metavar="SECONDS", min=1.0, help="a model that takes longer is given up")
     ] = None,
     search: options.SearchOptions,
-    given: options.ModelProfileOptions,
+    given: options.ProfileOptions,
 ) -> int:
     """Export every model of a folder, on all cores or many machines. Or decompose or estimate them; started again it goes on."""
     from machine.app.commands.batch import batch
@@ -178,5 +191,5 @@ def batch(
 
 
 COMMANDS: dict[str, Callable[..., int]] = {
-    command.__name__: with_option_groups(command) for command in (decompose, export, simulate, view, edit, batch)
+    command.__name__: with_option_groups(command) for command in (decompose, export, simulate, view, edit, save, batch)
 }

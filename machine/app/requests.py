@@ -71,9 +71,9 @@ class ModelRequest:
 
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down in the cheapest orientation; None: where nothing says how it lies. compare: with the same model in one part. force:
-    go on although the dry run found errors. profile_names: of machine, material and process as the user has given them, names or
-    files. stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other
-    models there. plate: of each model's project; None: the first that holds something."""
+    go on although the dry run found errors. profile_names, settings: machine, material and process as the user has given them,
+    names or files, and KEY=VALUE over them. stops: where the print waits for a person. copies: the number of each model on the
+    plate; beside: the other models there. plate: of each model's project; None: the first that holds something."""
 
     model: str
     profile: "Profile"
@@ -85,6 +85,7 @@ class ModelRequest:
     force: bool = False
     cuts: Cuts = Cuts()
     profile_names: tuple[str | None, ...] = ()
+    settings: tuple[str, ...] = ()
     stops: "tuple[Stop, ...]" = ()
     copies: int = 1
     beside: tuple[str, ...] = ()

@@ -10,10 +10,10 @@ from machine.app.requests import CalibrationRequest, CouponRequest, DetectReques
 from machine.app.terminal.option_groups import with_option_groups
 from machine.app.terminal.options import (
     Baud,
+    DefaultProfileOptions,
     Force,
     HtmlFile,
     MachineName,
-    ModelProfileOptions,
     ProbeOptions,
     Settings,
     machine_profile,
@@ -133,7 +133,7 @@ def coupon(
     ] = None,
     replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
     force: Force = False,
-    given: ModelProfileOptions,
+    given: DefaultProfileOptions,
 ) -> int:
     """Measure how joints hold on your machine. Twelve bars with different joints are printed at once, and broken by hand.
 

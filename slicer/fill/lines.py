@@ -27,6 +27,7 @@ OPEN = (0.0, 0.0)  # for lines that do not fill an area
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
 WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: farther in it is too narrow for a bead
 LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a wedge that is smaller stays as it is
+LEAST_RUN = 0.5  # spacings: nor does a line go round a corner for less
 FLAT = 0.05  # sine of the angle between a line and the border: they hardly part
 BEND = 0.6  # spacings before the border at which a line turns into its wedge
 TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
@@ -119,7 +120,7 @@ def _lay_lines(
     after, gap = _next_ends(along_border, pieces.ends, border, way)
     partner, sense = _join_ends(after, gap, group, most_mm)
     runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, hook_mm, apart_mm))
-    wedges = _wedges(pieces, border.edges, sense, after, gap, solid_mm)
+    wedges = _wedges(pieces, border.edges, sense, after, gap, runs, solid_mm)
     _follow_border(wedges, runs, partner, solid_mm[0])
     done = flags(len(pieces.ends))
     n = count = 0
@@ -268,11 +269,14 @@ def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Float
 
 
 @helper
-def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, solid_mm: tuple[float, float]) -> Floats:
+def _wedges(
+    pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, runs: Floats, solid_mm: tuple[float, float]
+) -> Floats:
     """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward.
 
     Between two ends the border is covered by the beads of their lines, half a spacing to both sides and round the end; the rest
-    of it stays open. That is much at the sharp side of a line, and round a corner with room for a line but without one.
+    of it stays open. That is much at the sharp side of a line, and round a corner with room for a line but without one: there
+    the line gets a run along the border.
     """
     spacing, deep = solid_mm
     wedges, before, slants = floats(len(sense), 0.0), longs(len(sense), 0), floats(len(sense), 0.0)
@@ -294,11 +298,12 @@ def _wedges(pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: 
         if sense[here] != sharp and _piece_mm(pieces, here) > 3.0 * BEND * spacing:
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
         beyond, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
-        beyond_mm, alone = WEDGE * (free - 2.0 * blunt_mm), here % 2 == 1 or sense[here ^ 1] != 0
+        beyond_mm, alone = free - blunt_mm - round_mm, here % 2 == 1 or sense[here ^ 1] != 0
         corner = beyond == here ^ 1 and slants[here] * slants[beyond] < 0.0  # one corner lies blunt beyond both ends of the line
-        if sense[here] == 0 and corner and alone and beyond_mm > max(left, spacing):
-            left, sharp = beyond_mm, -sharp
-        wedges[here] = sharp * min(left, MOST_WEDGE * spacing) if left > LEAST_WEDGE * spacing else 0.0
+        if sense[here] == 0 and corner and alone and beyond_mm > max(left, LEAST_RUN * spacing):
+            runs[here] = -sharp * min(beyond_mm, MOST_WEDGE * spacing)
+        elif left > LEAST_WEDGE * spacing:
+            wedges[here] = sharp * min(left, MOST_WEDGE * spacing)
     return wedges
 
 

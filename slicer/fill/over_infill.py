@@ -89,7 +89,7 @@ def infill_bridges(region: Region, sparse_below: Polygons, width_mm: float) -> P
     if spanned.area() < (NARROW * width_mm) ** 2:
         return Polygons()
     wide = opening(spanned, 0.5 * NARROW * width_mm)
-    return wide if wide.is_empty() else offset(wide, ANCHORED * width_mm) ^ solid
+    return wide if wide.is_empty() else opening(offset(wide, ANCHORED * width_mm) ^ solid, 0.5 * width_mm)
 
 
 def _extension(

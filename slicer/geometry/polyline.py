@@ -15,6 +15,8 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 
+SHORT_MM = 0.25  # corners of a path that are nearer to each other slow a printer down
+
 
 class Segment(NamedTuple):
     """A straight line from x0, y0 to x1, y1."""
@@ -129,7 +131,8 @@ def length_between(points: Floats, first: int, end: int) -> float:
 def mark_corners(points: Floats, starts: Indices, tolerance_mm: float) -> Mask:
     """(n,) points that simplified polylines keep (Douglas and Peucker 1973); the chord of a loop is its first point.
 
-    points: (n, 2 or more), one polyline after the other; starts: (k + 1,).
+    Where one point does in place of two that are nearer to each other than SHORT_MM, it is kept instead of them. points: (n, 2 or
+    more), one polyline after the other; starts: (k + 1,).
     """
     corner: Mask = flags(len(points))
     for k in range(len(starts) - 1):
@@ -137,14 +140,54 @@ def mark_corners(points: Floats, starts: Indices, tolerance_mm: float) -> Mask:
         stack = [(starts[k], starts[k + 1] - 1)]
         while len(stack):
             a, b = stack.pop()
-            chord = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
-            farthest, at = tolerance_mm * tolerance_mm, -1
-            for i in range(a + 1, b):
-                away = squared_distance(chord, points[i, 0], points[i, 1])
-                if away > farthest:
-                    farthest, at = away, i
+            at = _farthest(points, a, b, tolerance_mm)
             if at >= 0:
                 corner[at] = True
                 stack.append((a, at))
                 stack.append((at, b))
+        _join_near_corners(points, corner, starts[k], starts[k + 1] - 1, tolerance_mm)
     return corner
+
+
+@no_nrt
+def _farthest(points: Floats, a: int, b: int, tolerance_mm: float) -> int:
+    """The point between two others that is farthest from their chord; -1 where none is beyond the tolerance."""
+    chord = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
+    farthest, at = tolerance_mm * tolerance_mm, -1
+    for i in range(a + 1, b):
+        away = squared_distance(chord, points[i, 0], points[i, 1])
+        if away > farthest:
+            farthest, at = away, i
+    return at
+
+
+@no_nrt
+def _join_near_corners(points: Floats, corner: Mask, first: int, last: int, tolerance_mm: float) -> None:
+    """Keeps one point in place of two corners of a polyline first .. last that are near to each other, where that is enough."""
+    before, p = first, _next_corner(corner, first)
+    while p < last:
+        q = _next_corner(corner, p)
+        if q == last:
+            break
+        joined = -1
+        if np.hypot(points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]) < SHORT_MM:
+            after = _next_corner(corner, q)
+            for m in range(p, q + 1):
+                if _farthest(points, before, m, tolerance_mm) < 0 and _farthest(points, m, after, tolerance_mm) < 0:
+                    joined = m
+                    break
+        if joined < 0:
+            before, p = p, q
+            continue
+        corner[p], corner[q] = False, False
+        corner[joined] = True
+        p = joined
+
+
+@no_nrt
+def _next_corner(corner: Mask, at: int) -> int:
+    """The next point that is kept; the last of a polyline is."""
+    at += 1
+    while not corner[at]:
+        at += 1
+    return at

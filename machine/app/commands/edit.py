@@ -4,6 +4,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from machine.app.project import is_project, unpack
 from machine.app.requests import GCODE_SUFFIXES, EditRequest
 from machine.app.serving.browser import lead_browser
 from machine.app.terminal.plain import show
@@ -11,6 +12,7 @@ from machine.app.terminal.progress import say
 from machine.app.workbench.access.lan import Lan, open_lan
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.serve import serve_workbench
+from machine.app.workbench.work.kept_work import new_folder
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import DEMO, check_file, locate, plan_beside
 from mdp.plans.plan_file import PlanFile
@@ -22,11 +24,12 @@ PLAN_SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class Opened:
-    """What lies on the workbench first: a model's file and name, and the plan to cut it by."""
+    """What lies on the workbench first: the file and name of a model, with a plan to cut it by, or of a project."""
 
     path: Path
     name: str
     plan: PlanFile | None = None
+    project: bool = False
 
 
 def edit(request: EditRequest) -> int:
@@ -62,6 +65,10 @@ def _lan(request: EditRequest) -> Lan | None:
 
 
 async def _open(session: Session, opened: Opened) -> None:
+    if opened.project:
+        folder = new_folder()
+        await session.open_work(folder, unpack(opened.path, folder), f"open {opened.name}")
+        return
     await session.open_model(opened.path, opened.name)
     if opened.plan is not None:
         await session.take_plan(opened.plan)
@@ -75,6 +82,8 @@ def _find(model: str) -> Opened:
         raise MeshError(f"{model} is G-code, which is sliced already: tiltprint view shows it")
     path = locate(model)
     check_file(path)
+    if is_project(path):
+        return Opened(path, path.name, project=True)
     plan = plan_beside(model)
     return Opened(path, model if model.startswith(DEMO) else path.name, None if plan is None else read_plan(plan))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from machine.app.file_roles import check_model_files
 from machine.app.output import check_outputs, write_bytes, write_json
 from machine.app.pipeline.programs import load_program
+from machine.app.project import open_project
 from machine.app.requests import STDOUT, ModelRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.report import agreement_line, print_price, print_table
@@ -31,6 +32,8 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     if reference is not None:
         if not request.is_gcode:
             raise ProfileError(f"--model {reference}: {request.model} is a model itself; --model goes with a G-code file")
+        project = open_project(reference)
+        reference = reference if project is None else project.argument
         check_file(locate(reference))
     loaded = load_program(request)
     program, profile = loaded.program, loaded.profile

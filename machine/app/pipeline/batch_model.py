@@ -13,6 +13,7 @@ from machine.app.pipeline.comparison import support_mm3
 from machine.app.pipeline.parts_folder import FIGURES, MODEL, PLAN, SCENE, save_parts
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
+from machine.app.project import open_project
 from machine.app.requests import ModelRequest
 from machine.app.terminal.plain import plain_line
 from machine.dryrun.dryrun import summary
@@ -23,7 +24,7 @@ from mdp.plans.writing import plan_text
 from mdp.ranking import SUFFIX
 from mdp.save import json_values, part_file
 from profiles.errors import UserError
-from profiles.profile import Profile
+from profiles.profile import Profile, load, with_part_settings
 from slicer.estimate.estimate import estimate
 
 DONE, REFUSED, FAILED = STATUSES = ("done", "refused", "failed")
@@ -86,12 +87,26 @@ def row_of(file: Path, job: Job) -> Row:
     """Do the job with one model."""
     began, row = process_time(), Row(file.name, inputs=inputs_of(file, job))
     try:
-        row = ACTIONS[job.do](replace(job.asked, model=str(file)), row, job.out / file.stem)
+        row = ACTIONS[job.do](request_of(str(file), job.asked), row, job.out / file.stem)
     except UserError as error:
         row = replace(row, status=REFUSED, sentence=_sentence(str(error), file))
     except Exception as error:  # noqa: BLE001 - a bug over one model must not end the others
         row = replace(row, status=FAILED, sentence=_sentence(bug_in_words(error, [job.do, str(file)]), file))
     return replace(row, core_s=round(process_time() - began, 2))
+
+
+def request_of(model: str, asked: ModelRequest) -> ModelRequest:
+    """What is asked of one model; a project says what the options of the batch leave open. Raises UserError."""
+    work = open_project(model)
+    if work is None:
+        return replace(asked, model=model)
+    given, names = work.given, asked.profile_names
+    own = zip((given.machine, given.material, given.process), names, strict=True)
+    machine, material, process = (name or of_project for of_project, name in own)
+    profile = load(machine, material, process, (*given.settings, *asked.settings))
+    cuts = replace(asked.cuts, plans=(work.plan,) if work.plan else ())
+    profile = with_part_settings(profile, asked.profile.parts)
+    return replace(asked, model=work.argument, profile=profile, cuts=cuts, stops=work.stops, copies=work.copies)
 
 
 def _sentence(text: str, file: Path) -> str:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from os.path import exists
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,8 +27,12 @@ def _names_of(kind: str) -> Callable[[str], list[str]]:
     return complete
 
 
+OF_FILE = "; else the project's or G-code file's own, else {}"
+
+
 def _profile_option(kind: str, otherwise: str = "") -> Any:
-    return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=_names_of(kind), help=f"{kind} profile{otherwise}")
+    words = f"{kind} profile{otherwise.format(getattr(Given, kind))}"
+    return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=_names_of(kind), help=words)
 
 
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
@@ -47,7 +51,7 @@ ModelsOrGcode = Annotated[
     ),
 ]
 MachineName = Annotated[str, _profile_option("machine")]
-MachineGiven = Annotated[str | None, _profile_option("machine", "; else the G-code file's own")]
+MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
 PlansGiven = Annotated[
     list[Path] | None,
@@ -131,16 +135,18 @@ class ProgramOptions(SearchOptions):
         list[str] | None,
         typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
     ] = None
-    copies: Annotated[int, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate")] = 1
+    copies: Annotated[
+        int | None, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate, 1 by default")
+    ] = None
 
 
 @dataclass(frozen=True)
 class ProfileOptions:
-    """The profile, by its names and settings over it; what is None is the G-code file's own, else the default."""
+    """The profile, by its names and settings over it; what is None is that of the project or G-code file, else the default."""
 
     machine: MachineGiven = None
-    material: Annotated[str | None, _profile_option("material", "; else the file's")] = None
-    process: Annotated[str | None, _profile_option("process", "; else the file's")] = None
+    material: Annotated[str | None, _profile_option("material", OF_FILE)] = None
+    process: Annotated[str | None, _profile_option("process", OF_FILE)] = None
     settings: Settings = None
 
     @property
@@ -148,34 +154,36 @@ class ProfileOptions:
         """The names of machine, material and process as they were given."""
         return self.machine, self.material, self.process
 
+    def given(self, search: SearchOptions | None = None) -> Given:
+        """The names with the defaults in the place of those that are None, and all settings."""
+        names = {
+            kind: name for kind, name in zip(("machine", "material", "process"), self.names, strict=True) if name is not None
+        }
+        return Given(**names, settings=(*(self.settings or ()), *(search.settings if search else ())))
+
+    def over(self, given: Given) -> "ProfileOptions":
+        """These options over what a project was made with."""
+        machine, material, process = self.machine or given.machine, self.material or given.material, self.process or given.process
+        return ProfileOptions(machine, material, process, [*given.settings, *(self.settings or ())])
+
     @property
     def sections(self) -> frozenset[str]:
         """The sections of the profile that the user has said something about."""
         named = {kind for kind in ("machine", "material", "process") if getattr(self, kind) is not None}
         return frozenset(named | {setting.partition(".")[0] for setting in self.settings or ()})
 
-    def profile(self, search: SearchOptions | None = None, project: str | None = None) -> "Profile":
-        """The profile, with what the options of a search set in it. project: a model's file whose own settings hold beneath those
-        of the options; None: there is none. Raises ProfileError."""
+    def profile(self, search: SearchOptions | None = None) -> "Profile":
+        """The profile, with what the options of a search set in it. Raises ProfileError."""
         from profiles.part_settings import parse_part_settings
-        from profiles.profile import DEFAULTS, load, with_part_settings
+        from profiles.profile import load, with_part_settings
 
-        search = search or SearchOptions()
-        names = {
-            kind: default if name is None else name for (kind, default), name in zip(DEFAULTS.items(), self.names, strict=True)
-        }
-        of_file: list[str] = []
-        if project is not None:
-            from machine.app.terminal.project_file import settings_of
-
-            names, of_file = settings_of(project, names)
-        profile = load(**names, settings=(*of_file, *(self.settings or ()), *search.settings))
-        return with_part_settings(profile, map(parse_part_settings, search.part or ()))
+        profile = load(**asdict(self.given(search)))
+        return with_part_settings(profile, map(parse_part_settings, search.part or () if search else ()))
 
 
 @dataclass(frozen=True)
-class ModelProfileOptions(ProfileOptions):
-    """The same of a command that takes models alone: there is always a machine, a material and a process."""
+class DefaultProfileOptions(ProfileOptions):
+    """The same of a command that reads neither a model nor G-code."""
 
     machine: MachineName = Given.machine
     material: Annotated[str, _profile_option("material")] = Given.material
@@ -205,10 +213,30 @@ def check_model(model: str) -> None:
 
 
 def model_request(model: str, search: SearchOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
-    """What is asked for of a model; further: other fields of the request. Raises ProfileError."""
-    profile = given.profile(search, model if search.settings_of_file else None)
-    asked = {"profile_names": given.names, "plate": search.plate, **further}
-    return ModelRequest(model, profile, given.sections, search.ranker, search.orient, **asked)
+    """What is asked for of a model; further: other fields of the request. A project says what the options leave open.
+
+    Raises ProfileError, and PlanError for a project that is damaged.
+    """
+    from machine.app.project import open_project
+
+    plate = search.plate
+    if (work := open_project(model)) is not None:
+        plate = work.plate if plate is None else plate
+        model, given = work.argument, given.over(work.given)
+        cuts = further.get("cuts", Cuts())
+        if not cuts.plans and cuts.planes is None:
+            further["cuts"] = replace(cuts, plans=(work.plan,) if work.plan else ())
+        if "stops" in further:
+            further["stops"] = further["stops"] or work.stops
+            further["copies"] = work.copies if further["copies"] is None else further["copies"]
+    elif search.settings_of_file:
+        from machine.app.terminal.project_file import given_by
+
+        given = given.over(given_by(model))
+    further["copies"] = 1 if further.get("copies") is None else further["copies"]
+    profile = given.profile(search)
+    named = ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names)
+    return replace(named, settings=given.given(search).settings, plate=plate, **further)
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:

@@ -10,7 +10,7 @@ import shapely
 from shapely.ops import substring
 
 from mdp.mesh import Floats
-from slicer.fill.over_infill import anchored
+from slicer.fill.over_infill import anchored, infill_bridges
 from slicer.fill.region import Region
 from slicer.geometry.polygons import Polygons
 from slicer.paths import SKINS, Kind
@@ -54,6 +54,12 @@ def test_a_skin_grows_along_its_lines_whichever_way_these_run() -> None:
 def test_a_skin_on_the_skin_of_the_layer_below_does_not_grow() -> None:
     solid = block(3.0, 0.0, 2.0)
     assert anchored(region(solid), INSIDE - solid, INFILL, 0.0, WIDTH, CELL).solid.area() == pytest.approx(4.0)
+
+
+def test_a_bridge_over_infill_has_no_tongue_too_narrow_for_a_line() -> None:
+    solid = block(0.0, 0.0, 10.0) + Polygons.square((8.0, 0.5 * WIDTH)).translate((5.0, 0.0))  # a strip of half a line beside it
+    bridge = infill_bridges(region(solid), block(0.0, 0.0, 9.0), WIDTH)
+    assert bridge.bounds() == pytest.approx((-5.0, -5.0, 5.0, 5.0), abs=0.1 * WIDTH)
 
 
 def test_without_infill_a_skin_grows_to_the_walls() -> None:

@@ -54,6 +54,16 @@ def test_skins_that_are_seen_leave_less_than_half_as_much_open_beside_the_walls(
     assert skin_beads(slot, Kind.TOP_SKIN, SolidLines(90.0, WIDTH, HEIGHT, OVERLAP, pattern, True))  # nothing open to reach into
 
 
+@pytest.mark.parametrize("pattern", ["monotonic", "rectilinear"])
+def test_wherever_the_last_line_of_a_seen_skin_meets_a_corner_less_than_a_quarter_of_a_square_of_it_stays_open(
+    pattern: SkinPattern,
+) -> None:
+    solid = SolidLines(45.0, WIDTH, HEIGHT, OVERLAP, pattern, True)
+    for length in np.arange(3.0, 3.6, 0.1):  # of an arm, one row of lines after the other
+        arm = Polygons.square((1.2, float(length))).translate((4.0, 10.0))
+        assert open_mm2(Polygons.square((10.0, 10.0)) + arm, solid) < 0.25 * WIDTH**2
+
+
 def test_no_line_is_a_dot_in_a_corner() -> None:
     (bead,) = skin_beads(Polygons.square((12.0, 12.0)), Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, OVERLAP))
     assert np.hypot(*np.diff(bead.points, axis=0).T).min() > 0.2

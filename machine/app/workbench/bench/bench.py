@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from machine.app.project import STANDING
 from machine.app.requests import Given
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.model import Model
@@ -27,7 +28,6 @@ from profiles.profile import Profile
 
 MOST_STEPS = 200  # that can be undone
 MOST_KEPT_FACES = 5_000_000  # of the models of these steps together, some 25 bytes each: every other scale is a model of its own
-STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
 
 
 @dataclass(frozen=True, eq=False)

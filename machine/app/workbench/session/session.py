@@ -5,11 +5,11 @@ import shutil
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import localtime, strftime
 from typing import Any
 from weakref import finalize
 
 from machine.app.pipeline.given_plan import with_plan_settings
+from machine.app.project import Work
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import (
     Bench,
@@ -36,11 +36,9 @@ from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
-from machine.app.workbench.work.kept_work import KeptWork
 from machine.app.workbench.work.models import Resting, Unscaled
 from machine.app.workbench.work.received import NAMES_KEPT, files_in
 from machine.app.workbench.work.worker_pool import WorkerPools
-from machine.planning.stops import parse_stops
 from mdp.directions.turns import turned_by
 from mdp.model_file import locate, plan_beside
 from mdp.plans.plan_file import PlanFile
@@ -183,10 +181,12 @@ class Session(SessionBase):
         if (plan := plan_beside(name)) is not None:
             await self.open_plan(plan)
 
-    async def open_kept(self, work: KeptWork) -> None:
-        """Put kept work on the bench again, and go on keeping it where it was. Raises UserError, then it stays as it is there."""
-        word = f"open the work of {strftime('%H:%M', localtime(work.written_s))}"
-        async with self.keeping.opening(work.folder):
+    async def open_work(self, folder: Path, work: Work, word: str) -> None:
+        """Put the work in a folder on the bench, and keep it there from now on.
+
+        Raises UserError; the folder stays as it is then.
+        """
+        async with self.keeping.opening(folder):
             await self.take_given(word, lambda given: work.given)
             path = locate(work.name) if work.model is None else self.received.new_file(work.name)
             if work.model is not None:
@@ -195,9 +195,9 @@ class Session(SessionBase):
             if work.plan is not None:
                 await self.open_plan(work.plan)
             bench = with_rotation(self.bench, work.rotation)
+            bench = bench if work.parts else replace(bench, cuts=None)
             locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in work.locked)
-            stops = parse_stops(work.pauses, work.changes)
-            self.do(word, replace(bench, locked=locked, stops=stops, copies=work.copies))
+            self.do(word, replace(bench, locked=locked, stops=work.stops, copies=work.copies))
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""

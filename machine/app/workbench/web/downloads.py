@@ -28,6 +28,13 @@ async def profile(session: Session, request: Request) -> Response:
     return Response(text, headers=own, media_type="application/toml")
 
 
+async def project(session: Session, request: Request) -> Response:
+    """The project file."""
+    out = session.new_file()
+    await session.make("saving the project", "make_project", out)
+    return _once(out, "model/3mf", f"{file_stem(session.bench)}.3mf")
+
+
 async def plan(session: Session, request: Request) -> Response:
     """The plan's file."""
     text: str = await session.make("cutting the parts", "make_plan")

@@ -34,6 +34,7 @@ from machine.app.workbench.web.downloads import (
     print_text,
     print_walls,
     profile,
+    project,
     shared_page,
 )
 from machine.app.workbench.web.line import CLOSED, refuse_closed, talk
@@ -101,6 +102,7 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("left/{number:int}", uploads.open_left, "POST"),
         route("kept", uploads.list_kept),
         route("kept/{name}", uploads.open_kept, "POST"),
+        route("project.3mf", project, need=Need.MODEL),
         route("plan.toml", plan, need=Need.PARTS),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces, need=Need.PARTS),

@@ -7,14 +7,16 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from time import localtime, strftime
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from machine.app.project import Work, is_project, read_folder, unpack
 from machine.app.workbench.access.limits import DEVICE, check_model_name, check_profile
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.profile_files import ProfileFiles
-from machine.app.workbench.work.kept_work import folders_kept, read_work
+from machine.app.workbench.work.kept_work import folders_kept, new_folder
 from machine.app.workbench.work.received import remove_file
 from profiles.errors import PlanError, reason
 
@@ -72,7 +74,7 @@ class Uploads:
         rows = []
         for folder in folders_kept():
             try:
-                work = read_work(folder)
+                work = read_folder(folder)
             except PlanError:
                 rows.append({"kept": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
             else:
@@ -85,19 +87,25 @@ class Uploads:
         folder = next((folder for folder in folders_kept() if folder.name == name), None)
         if folder is None:
             raise PlanError("this work is not kept any more, or another page has opened it")
-        work = read_work(folder)
+        work = read_folder(folder)
+        await self._open_work(session, folder, work, f"open the work of {strftime('%H:%M', localtime(work.written_s))}")
+        return JSONResponse({})
+
+    async def _open_work(self, session: Session, folder: Path, work: Work, word: str) -> None:
         try:
             given = self.profiles.copied(work.given, work.own_names)
-            await session.open_kept(replace(work, given=given))
+            await session.open_work(folder, replace(work, given=given), word)
         except OSError as error:
             raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
-        return JSONResponse({})
 
     async def _open(self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]]) -> Response:
         path, taken = session.received.new_file(name), False
         try:
             await fill(path)
-            if path.suffix.lower() != TEXT_SUFFIX:
+            if is_project(path):
+                folder = new_folder()
+                await self._open_work(session, folder, await asyncio.to_thread(unpack, path, folder), f"open {name}")
+            elif path.suffix.lower() != TEXT_SUFFIX:
                 await session.open_model(path, name)
                 taken = True
             elif not self.profiles.take(path, session):

@@ -9,11 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from machine.app.pictures.picture import parts_together
+from machine.app.pictures.png import png_bytes
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import lies_freely
 from machine.app.pipeline.pricing import pricing
+from machine.app.project import PICTURE_PX, project_bytes
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
+from machine.app.workbench.work.kept_work import work_of
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import standing_still
 from mdp.joint import is_sound
@@ -119,6 +123,15 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
 def make_plan(tell: Tell, bench: Bench) -> str:
     """The plan of the parts as the bench has them, as text."""
     return _plan_text(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)
+
+
+def make_project(tell: Tell, bench: Bench, out: Path) -> None:
+    """The project file of what lies on the bench."""
+    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    compilers.wait_for(compilers.PICTURES)
+    picture = png_bytes(parts_together(decomposition, bench.profile, PICTURE_PX))
+    plan = plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts)
+    out.write_bytes(project_bytes(work_of(bench), plan, decomposition.mesh, picture))
 
 
 def make_folder(tell: Tell, bench: Bench, out: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from machine.app.crash import bug_in_words
 from machine.app.workbench.bench.marks import mark, unmark
-from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, measure_plan, price_row
+from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, make_project, measure_plan, price_row
 from machine.app.workbench.work.models import mark_faces, rank_resting, read_model, rest_facets
 from machine.app.workbench.work.pieces import draw_pieces, make_pictures
 from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
@@ -27,6 +27,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         price_row,
         make_plan,
         make_folder,
+        make_project,
         make_pictures,
         draw_pieces,
         stand,

@@ -74,6 +74,18 @@ def test_the_plate_that_is_asked_for_is_printed() -> None:
     assert main(["export", "two.3mf", "-o", "no.gcode", *FAST, "--plate", "3"]) == 1
 
 
+def test_a_saved_project_prints_its_plate_and_the_settings_inside_again() -> None:
+    objects = [
+        Object([Made(POST)], [beside(0.0, 1)]),
+        Object([Made(TEE), Made(INSERT, "modifier", {"wall_loops": "3"})], [beside(300.0, 2)]),
+    ]
+    bambu(Path("two.3mf"), objects, np.random.default_rng(0), settings_of("OrcaSlicer"))
+    asked = ("--plate", "2", "--settings-of-file")
+    first = export("two.3mf", *asked)
+    assert main(["save", "two.3mf", "-o", "kept.3mf", *FAST, *asked]) == 0
+    assert export("kept.3mf") == first
+
+
 def settings_of(kind: str) -> dict[str, str]:
     """The part of a project that holds its settings."""
     if kind == "PrusaSlicer":

@@ -11,13 +11,14 @@ from threading import Event
 
 import pytest
 
+from machine.app.project import RECORD, read_folder
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.session import keeping
 from machine.app.workbench.session.keeping import Keeping
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.work import kept_work
-from machine.app.workbench.work.kept_work import MOST_KEPT, RECORD, folders_kept, new_folder, read_work, write_work
+from machine.app.workbench.work.kept_work import MOST_KEPT, folders_kept, new_folder, write_work
 from machine.app.workbench.work.received import Received, tidy_left
 from machine.app.workbench.work.worker_pool import WorkerPools
 from machine.planning.stops import parse_stops
@@ -54,9 +55,9 @@ def test_what_lies_on_a_bench_is_read_as_it_was_written(bench: Bench) -> None:
     folder = new_folder()
     write_work(folder, bench)
     write_work(folder, bench)
-    work = read_work(folder)
+    work = read_folder(folder)
     assert (work.name, work.given, work.rotation) == ("tee \u732b.stl", bench.given, bench.rotation)
-    assert (work.locked, work.pauses, work.changes, work.parts) == ((1,), ("1:3",), ("2:1.5mm",), 3)
+    assert (work.locked, work.stops, work.parts) == ((1,), bench.stops, 3)
     assert work.model is not None
     assert work.model.read_bytes() == stl(tee())
     assert work.plan is not None
@@ -66,13 +67,13 @@ def test_what_lies_on_a_bench_is_read_as_it_was_written(bench: Bench) -> None:
 
 def test_profiles_that_are_files_are_kept_with_their_names(bench: Bench, tmp_path: Path) -> None:
     own = tmp_path / "mine.toml"
-    own.write_text("[material]\n")
+    own.write_text('inherits = "pla"\n[material]\nname = "mine"\nbed_c = 55.0\n')
     folder = new_folder()
     write_work(folder, replace(bench, given=Given(material=str(own))))
     own.unlink()
-    work = read_work(folder)
+    work = read_folder(folder)
     assert work.own_names == {"material": "mine.toml"}
-    assert Path(work.given.material).read_text() == "[material]\n"
+    assert load(material=work.given.material).material == load(settings=["material.name=mine", "material.bed_c=55"]).material
 
 
 def test_work_of_a_newer_version_is_refused_and_stays(bench: Bench) -> None:
@@ -80,10 +81,10 @@ def test_work_of_a_newer_version_is_refused_and_stays(bench: Bench) -> None:
     write_work(folder, bench)
     (folder / RECORD).write_text(json.dumps({"version": 2}))
     with pytest.raises(PlanError, match="kept by a newer tiltprint, which can open it; it stays in"):
-        read_work(folder)
+        read_folder(folder)
     (folder / RECORD).write_text('{"version": 1, "name"')
     with pytest.raises(PlanError, match="is no work of a workbench, or damaged"):
-        read_work(folder)
+        read_folder(folder)
     assert folders_kept() == [folder]
 
 
@@ -119,7 +120,7 @@ def test_a_full_disk_is_told_once_and_what_was_kept_before_is_still_there(bench:
 
     told, kept = asyncio.run(change_twice())
     assert told == ["this work cannot be kept for after a crash: no space left on device; Save keeps its plan", ""]
-    assert read_work(kept).copies == 1
+    assert read_folder(kept).copies == 1
 
 
 class Slow:
@@ -167,7 +168,7 @@ def test_a_bench_that_closes_waits_for_the_write_under_way_writes_what_is_newer_
     sent = asyncio.run(close())
     assert (slow.written, slow.most) == ([1, 2], 1)
     (kept,) = folders_kept()
-    work = read_work(kept)
+    work = read_folder(kept)
     assert work.copies == 2
     assert work.model is not None
     assert work.model.read_bytes() == stl(tee())

@@ -6,7 +6,6 @@ import socket
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -50,13 +49,13 @@ def wait_until_kept(since_s: float) -> None:
     """Until all that was done on the one bench from a time on is in the state folder."""
     end_s = time.monotonic() + 30.0
     folder = kept_folder()
-    while not any(_is_locked(json.loads(record.read_text()), since_s) for record in folder.glob("*/work.json")):
+    while not any(_is_locked(record, since_s) for record in folder.glob("*/work.json")):
         assert time.monotonic() < end_s
         time.sleep(0.05)
 
 
-def _is_locked(work: dict[str, Any], since_s: float) -> bool:
-    return bool(work["locked"]) and work["written_s"] > since_s
+def _is_locked(record: Path, since_s: float) -> bool:
+    return bool(json.loads(record.read_text())["locked"]) and record.stat().st_mtime > since_s
 
 
 def test_the_port_of_a_server_whose_lines_are_not_over_yet_is_taken_at_once() -> None:

@@ -113,6 +113,23 @@ def test_a_model_becomes_the_plan_and_the_parts_of_the_command_line(bench: Runni
         assert page.until(lambda state: state["parts"] == searched["parts"])["front"] == searched["front"]
 
 
+def test_a_project_that_a_bench_saves_is_cut_by_the_command_line_and_opened_as_it_was(bench: Running, folder: Path) -> None:
+    (folder / "tee.stl").write_bytes(stl(tee()))
+    with bench.line() as page:
+        assert bench.send(folder / "tee.stl")[0] == 200
+        page.until(lambda state: state["undo"] == "open tee.stl")
+        page.do("search", orient=False)
+        searched = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
+        (folder / "saved.3mf").write_bytes(bench.ask("project.3mf")[1])
+        page.do("demo", name="demo:bracket")
+        page.until(lambda state: state["model"]["name"] == "demo:bracket")
+        assert bench.send(folder / "saved.3mf")[0] == 200
+        again = page.until(lambda state: state["model"]["name"] == "tee.stl" and state["parts"] == searched["parts"])
+        assert [row["planes"] for row in again["front"]] == [row["planes"] for row in searched["front"]]
+    assert main(["decompose", "saved.3mf", "-o", "again"]) == 0
+    assert bench.ask("plan.toml")[1] == (folder / "again" / "plan.toml").read_bytes()
+
+
 def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: Running, folder: Path) -> None:
     (folder / "tee.stl").write_bytes(stl(tee()))
     assert main(["decompose", "tee.stl", *QUICK, "--set=search.seam_mm=100", "--ranker", "learned", "-o", "parts"]) == 0

@@ -14,6 +14,7 @@ function entriesOf({ lacking, sliced, compared, given }) {
     return [kind, [count ? "" : `nothing of ${name} is changed`, `${name} with ${count} change${count === 1 ? "" : "s"}, to be dropped here again`]];
   });
   return {
+    project: [lacking.model, "3MF with model, parts, marks and profiles, to be dropped here again, on another computer, too"],
     plan: [lacking.parts, "how the model lies and is cut, to be dropped here again"], parts: [lacking.parts, "zip of an STL each, a coloured 3MF and the plan"],
     pictures: [lacking.parts, "zip of PNGs: the parts, the print order, every number of parts"],
     gcode: [lacking.slices, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "for the printer"],

@@ -1,0 +1,49 @@
+"""The save command: a project, one 3MF file with a model and all that decides its print."""
+
+from pathlib import Path
+
+from machine.app.file_roles import check_model_files
+from machine.app.output import check_writable, write_bytes
+from machine.app.pictures.picture import parts_together
+from machine.app.pictures.png import png_bytes
+from machine.app.pipeline.pipeline import Decomposed, decompose_model
+from machine.app.project import DEMO, PICTURE_PX, STANDING, SUFFIX, Work, figures_of, project_bytes
+from machine.app.requests import Given, ModelRequest
+from machine.app.terminal.plain import show
+from profiles.errors import OutputError, PlanError
+from profiles.profile import DEFAULTS
+
+
+def save(request: ModelRequest, out: Path) -> int:
+    """Find the parts of a model, or cut it by its plan, and write the project. Raises OutputError and PlanError."""
+    if out.suffix.lower() != SUFFIX:
+        raise OutputError(f"output {out}: a project is a 3MF file: a name that ends in {SUFFIX} is expected")
+    if request.beside:
+        raise PlanError(
+            f"{request.beside[0]}: a project holds one model, {request.name}; --copies N puts more of it on the plate"
+        )
+    check_writable(out)
+    check_model_files(request, (("project", out),))
+    decomposed = decompose_model(request)
+    decomposition = decomposed.decomposition
+    picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
+    write_bytes(out, project_bytes(_work(request, decomposed), decomposed.plan, decomposition.mesh, picture))
+    count = len(decomposition.parts)
+    show(f"{out}: {request.name} in {count} part{'s' * (count > 1)}, with its plan and profiles\n")
+    return 0
+
+
+def _work(request: ModelRequest, decomposed: Decomposed) -> Work:
+    decomposition, orientation = decomposed.decomposition, decomposed.plan.orientation
+    names = {kind: name or DEFAULTS[kind] for kind, name in zip(DEFAULTS, request.profile_names, strict=True)}
+    return Work(
+        name=request.name,
+        model=None if request.model.startswith(DEMO) else Path(request.model),
+        given=Given(**names, settings=request.settings),
+        rotation=STANDING if orientation is None else orientation,
+        parts=len(decomposition.parts),
+        stops=request.stops,
+        copies=request.copies,
+        figures=figures_of(decomposition.chosen),
+        plate=request.plate,
+    )

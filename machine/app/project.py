@@ -1,0 +1,249 @@
+"""Project: a model with all that decides its print: plan, marks, profiles, placement, pauses, copies.
+
+A project's folder holds `work.json`, which says what was asked for and names the other files: the model's file as it was, the
+plan, meshes of modifiers, and profiles that do not ship with the program. The workbench keeps its work in such folders. A project
+file is a 3MF of the model as it lies, which any slicer opens, with a picture and the folder's files under Metadata/tiltprint.
+"""
+
+import hashlib
+import io
+import json
+import re
+import shutil
+import zipfile
+import zlib
+from dataclasses import asdict, dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from machine.app.output import plain_name
+from machine.app.profile_file import profile_text
+from machine.app.requests import Given
+from machine.planning.stops import Stop, parse_stops
+from mdp.decomposition import FrontRow
+from mdp.mesh import Mesh
+from mdp.plans.plan_file import PlanFile
+from mdp.plans.writing import plan_text
+from mdp.save import MODEL_PART, model_xml, write_package
+from mdp.zone import MeshVolume
+from profiles.errors import PlanError, reason
+from profiles.files import LOCK, whole_file, write_whole
+from profiles.frozen import Vector
+from profiles.places import KINDS, own, shipped
+
+VERSION = 1
+STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
+RECORD, PLAN = "work.json", "plan.toml"
+INSIDE, THUMBNAIL = "Metadata/tiltprint/", "Metadata/thumbnail.png"
+PICTURE_PX = (256, 256)
+MESH_DIGEST = "mesh.sha256"  # of the 3MF's model part, to see whether another program has changed it
+PROGRAM = f"tiltprint {version('tiltprint')}"
+SUFFIX, DEMO = ".3mf", "demo:"
+ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-[0-9a-f]{{12}}-")  # to the names of a project's files
+MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
+DAMAGES = (zipfile.BadZipFile, zlib.error, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError)
+_unpacked: list[TemporaryDirectory[str]] = []  # folders of the projects that were opened, removed when the program ends
+
+
+@dataclass(frozen=True)
+class Work:
+    """A model and what was asked for; files lie in the project's folder once it is read.
+
+    model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows them;
+    rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked; parts: 0
+    where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the print waits for
+    a person; figures: of the print, for people and other programs; plate: of the model where that is another slicer's project.
+    """
+
+    name: str
+    model: Path | None
+    given: Given
+    rotation: tuple[Vector, ...] = STANDING
+    plan: Path | None = None
+    parts: int = 0
+    locked: tuple[int, ...] = ()
+    stops: tuple[Stop, ...] = ()
+    copies: int = 1
+    own_names: dict[str, str] = field(default_factory=dict)
+    figures: dict[str, float] = field(default_factory=dict)
+    written_s: float = 0.0
+    plate: int | None = None
+
+    @property
+    def argument(self) -> str:
+        """What a command line says for MODEL."""
+        return self.name if self.model is None else str(self.model)
+
+
+def write_folder(folder: Path, work: Work, plan: PlanFile | None) -> None:
+    """Write a project's folder, and remove what it does not name. Raises OSError, then what was there before is there still."""
+    profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(work.given, kind)))}
+    model = "" if work.model is None else _copied(work.model, folder, "model")
+    meshes: list[str] = []
+    if plan is not None:
+        plan, meshes = _with_meshes(plan, folder)
+        write_whole(folder / PLAN, plan_text(plan, folder).encode())
+    record = {
+        "version": VERSION,
+        "program": PROGRAM,
+        "name": work.name,
+        "model": model,
+        "given": {**asdict(work.given), **profiles},
+        "own_profiles": {kind: _bare_name(Path(getattr(work.given, kind))) for kind in profiles},
+        "rotation": work.rotation,
+        "plan": plan is not None,
+        "parts": work.parts,
+        "locked": work.locked,
+        "pauses": [stop.option.partition(" ")[2] for stop in work.stops if not stop.change],
+        "changes": [stop.option.partition(" ")[2] for stop in work.stops if stop.change],
+        "copies": work.copies,
+        "plate": work.plate,
+        "figures": work.figures,
+    }
+    write_whole(folder / RECORD, json.dumps(record).encode())
+    named = {RECORD, LOCK, model, *profiles.values(), *meshes, *([PLAN] if plan is not None else [])}
+    for file in folder.iterdir():
+        if file.name not in named:
+            file.unlink()
+
+
+def _profile_file(folder: Path, kind: str, name: str) -> str:
+    """The name of a file with a profile of the user's own; "" for one that ships with the program."""
+    if name in shipped(kind) and name not in own(kind):
+        return ""
+    text = profile_text(kind, name).encode()
+    file = f"{kind}-{hashlib.sha256(text).hexdigest()[:12]}-{plain_name(Path(_bare_name(Path(name))).stem)}.toml"
+    if not (folder / file).exists():
+        write_whole(folder / file, text)
+    return file
+
+
+def _with_meshes(plan: PlanFile, folder: Path) -> tuple[PlanFile, list[str]]:
+    """The plan with the meshes of its modifiers in a folder, and the names that they have there."""
+    modifiers, names = [], list[str]()
+    for modifier in plan.zones.modifiers:
+        if isinstance(modifier.volume, MeshVolume):
+            names.append(_copied(modifier.volume.file, folder, "modifier"))
+            modifier = replace(modifier, volume=replace(modifier.volume, file=(folder / names[-1]).absolute()))
+        modifiers.append(modifier)
+    return replace(plan, zones=replace(plan.zones, modifiers=tuple(modifiers))), names
+
+
+def _bare_name(file: Path) -> str:
+    """The name of a file as it was before it became one of a project."""
+    return ADDED.sub("", file.name)
+
+
+def _copied(file: Path, folder: Path, role: str) -> str:
+    """The name in a folder of a copy of a file, which is made where it is not there yet."""
+    with file.open("rb") as source:
+        digest = hashlib.file_digest(source, "sha256").hexdigest()
+    name = f"{role}-{digest[:12]}-{plain_name(_bare_name(file))}"
+    if not (folder / name).exists():
+        with file.open("rb") as source, whole_file(folder / name) as copy:
+            shutil.copyfileobj(source, copy)
+    return name
+
+
+def read_folder(folder: Path) -> Work:
+    """The work in a project's folder. Raises PlanError with a sentence where it cannot be read, or not by this version."""
+    try:
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        newer = isinstance(record["version"], int) and record["version"] > VERSION
+        if newer:
+            raise PlanError(f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}")
+        return _work_of(folder, record)
+    except OSError as error:
+        raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise PlanError(f"what is kept in {folder} is no work of a workbench, or damaged") from None
+
+
+def _work_of(folder: Path, record: dict[str, Any]) -> Work:
+    given = record["given"]
+    own_names = {str(kind): Path(name).name for kind, name in record["own_profiles"].items()}
+    files = {kind: str(folder / Path(given[kind]).name) for kind in own_names}
+    return Work(
+        name=str(record["name"]),
+        model=folder / Path(record["model"]).name if record["model"] else None,
+        given=Given(**{**given, **files, "settings": tuple(map(str, given["settings"]))}),
+        rotation=tuple((float(x), float(y), float(z)) for x, y, z in record["rotation"]),
+        plan=folder / PLAN if record["plan"] else None,
+        parts=int(record["parts"]),
+        locked=tuple(map(int, record["locked"])),
+        stops=parse_stops(record["pauses"], record["changes"]),
+        copies=int(record["copies"]),
+        plate=None if record.get("plate") is None else int(record["plate"]),
+        own_names=own_names,
+        figures={str(key): float(value) for key, value in record.get("figures", {}).items()},
+        written_s=(folder / RECORD).stat().st_mtime,
+    )
+
+
+def figures_of(row: FrontRow | None) -> dict[str, float]:
+    """The figures of a decomposition, as far as they are known."""
+    names = ("time_s", "filament_mm", "support_area_mm2", "seam_mm", "cost_mm2")
+    return {name: value for name in names if (value := getattr(row, name, None)) is not None}
+
+
+def project_bytes(work: Work, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
+    """The content of a project file: mesh is the model as it lies, picture a PNG. Raises OSError."""
+    content = io.BytesIO()
+    with TemporaryDirectory(prefix="tiltprint-project-") as name:
+        folder = Path(name)
+        write_folder(folder, work, plan)
+        model = model_xml([(mesh, work.name)], {"Title": work.name, "Application": PROGRAM})
+        digest = hashlib.sha256(model.encode()).hexdigest().encode()
+        own_files = [(INSIDE + path.name, path.read_bytes()) for path in sorted(folder.iterdir())]
+        write_package(content, model, [(THUMBNAIL, picture), (INSIDE + MESH_DIGEST, digest), *own_files])
+    return content.getvalue()
+
+
+def is_project(path: Path) -> bool:
+    """Whether a file is a project that `write_project` wrote, or one that was damaged since."""
+    if path.suffix.lower() != SUFFIX or not path.is_file():
+        return False
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return INSIDE + RECORD in archive.namelist()
+    except (*DAMAGES, OSError):
+        return False
+
+
+def open_project(model: str) -> Work | None:
+    """The work of a project file, unpacked for as long as the program runs; None for any other MODEL. Raises PlanError."""
+    if model.startswith(DEMO) or not is_project(Path(model)):
+        return None
+    folder = TemporaryDirectory(prefix="tiltprint-project-", ignore_cleanup_errors=True)
+    _unpacked.append(folder)
+    work = unpack(Path(model), Path(folder.name))
+    if work.model is None:
+        return work
+    named = Path(folder.name) / "model" / Path(work.name).name  # messages and G-code say the name that the model had
+    named.parent.mkdir()
+    return replace(work, model=work.model.rename(named))
+
+
+def unpack(path: Path, folder: Path) -> Work:
+    """The work of a project file, unpacked into an empty folder. Raises PlanError for one that is damaged or was changed."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = [entry for entry in archive.infolist() if entry.filename.startswith(INSIDE)]
+            if len(entries) > MOST_FILES or sum(entry.file_size for entry in entries) > LARGEST_BYTES:
+                raise PlanError(f"{path}: unpacks to more than {MOST_FILES} files or {LARGEST_BYTES} bytes")
+            changed = hashlib.sha256(archive.read(MODEL_PART)).hexdigest() != archive.read(INSIDE + MESH_DIGEST).decode()
+            for entry in entries:
+                with archive.open(entry) as source, (folder / Path(entry.filename).name).open("wb") as copy:
+                    shutil.copyfileobj(source, copy)
+        if changed:
+            raise PlanError(
+                f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
+                " from there as STL, and decompose that"
+            )
+        return read_folder(folder)
+    except DAMAGES as error:
+        raise PlanError(f"{path}: this project is damaged ({error})") from None
+    except PlanError as error:
+        raise PlanError(str(error).replace(str(folder), str(path))) from None

@@ -1,0 +1,156 @@
+"""A project file: what it holds prints as what it was saved from, other slicers read it as a model, damage is refused."""
+
+import io
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+from machine.app.cli import main
+from machine.app.project import INSIDE, RECORD, is_project, open_project
+from mdp.cut import mesh_of
+from mdp.read import read_mesh
+from mdp.save import MODEL_PART, stl
+from tests.shapes import tee
+
+FAST = ("--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "machine.thumbnails_px=[]")
+
+PLAN = """
+version = 1
+[[part]]
+[[part]]
+normal = [0.0, 0.0, 1.0]
+offset_mm = 12.0
+process = {infill_density = 0.4}
+[[no_seam]]
+min_mm = [-30.0, -30.0, 5.0]
+max_mm = [30.0, 0.0, 9.0]
+[[modifier]]
+mesh = "insert.stl"
+process = {walls = 4}
+"""
+MINE = """
+inherits = "standard"
+[process]
+name = "mine"
+walls = 3
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("tee.stl").write_bytes(stl(tee()))
+    Path("insert.stl").write_bytes(stl(mesh_of(Manifold.cube((6.0, 6.0, 6.0)).translate((0.0, 0.0, 2.0)))))
+    Path("plan.toml").write_text(PLAN)
+    Path("mine.toml").write_text(MINE)
+    return tmp_path
+
+
+def run(*words: str) -> None:
+    assert main(words) == 0
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--parts", "1", "--as-is", "--part", "1:walls=4", "--pause", "1:3", "--filament-change", "1:2.5mm"),
+        ("--plan", "plan.toml", "--process", "mine.toml", "--machine", "fractal5pro"),
+        ("--parts", "1", "--as-is", "--copies", "2", "--set", "process.scale=0.5"),
+        ("--parts", "1", "--orient"),
+    ],
+)
+def test_a_project_prints_as_what_it_was_saved_from_wherever_it_lies(folder: Path, options: tuple[str, ...]) -> None:
+    run("export", "tee.stl", *FAST, *options, "-o", "before.gcode")
+    run("save", "tee.stl", *FAST, *options, "-o", "tee.3mf")
+    elsewhere = folder / "elsewhere"
+    elsewhere.mkdir()
+    shutil.move("tee.3mf", elsewhere)
+    before = Path("before.gcode").read_bytes()
+    for file in folder.glob("*.*"):
+        file.unlink()
+    run("export", "elsewhere/tee.3mf", "-o", "after.gcode")
+    assert Path("after.gcode").read_bytes() == before
+    run("save", "elsewhere/tee.3mf", "-o", "again.3mf")
+    assert Path("again.3mf").read_bytes() == (elsewhere / "tee.3mf").read_bytes()
+
+
+@pytest.mark.usefixtures("folder")
+def test_options_on_the_command_line_hold_over_those_of_the_project() -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "--set", "process.walls=3", "--pause", "1:3", "-o", "tee.3mf")
+    run("export", "tee.3mf", "--set", "process.walls=4", "--pause", "1:5", "-o", "over.gcode")
+    run("export", "tee.stl", *FAST, "--parts", "1", "--as-is", "--set", "process.walls=4", "--pause", "1:5", "-o", "own.gcode")
+    assert Path("over.gcode").read_bytes() == Path("own.gcode").read_bytes()
+
+
+@pytest.mark.usefixtures("folder")
+def test_other_programs_read_the_model_as_it_lies_and_a_picture() -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "--set", "process.rotate_deg=[90,0,0]", "-o", "tee.3mf")
+    scene = trimesh.load("tee.3mf")
+    laid, _ = read_mesh(Path("tee.stl"), 1.0, (90.0, 0.0, 0.0))
+    assert scene.bounds == pytest.approx(laid.bounds_mm, abs=1e-6)
+    assert scene.volume == pytest.approx(laid.volume_mm3, rel=1e-6)
+    with zipfile.ZipFile("tee.3mf") as archive:
+        assert archive.read("Metadata/thumbnail.png")[:8] == b"\x89PNG\r\n\x1a\n"
+        assert b"Metadata/thumbnail.png" in archive.read("_rels/.rels")
+
+
+def changed(path: Path, name: str, content: bytes | None) -> None:
+    """Writes a project anew with other content of one of its files; None: without it."""
+    with zipfile.ZipFile(path) as archive:
+        files = {entry: archive.read(entry) for entry in archive.namelist()}
+    files[name] = content if content is not None else b""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for entry, text in files.items():
+            if entry != name or content is not None:
+                archive.writestr(entry, text)
+    path.write_bytes(buffer.getvalue())
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        (MODEL_PART, b"<model/>", "another program has changed the model in this project"),
+        (MODEL_PART, None, "this project is damaged"),
+        (INSIDE + RECORD, b'{"version": 1, "na', "is no work of a workbench, or damaged"),
+        (INSIDE + RECORD, b'{"version": 99}', "was kept by a newer tiltprint, which can open it"),
+        (INSIDE + "plan.toml", b"version = ", "plan"),
+    ],
+)
+@pytest.mark.usefixtures("folder")
+def test_a_damaged_project_is_refused_in_one_sentence(
+    name: str, content: bytes | None, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    changed(Path("tee.3mf"), name, content)
+    capsys.readouterr()
+    assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert "Traceback" not in said
+    assert not Path("after.gcode").exists()
+
+
+@pytest.mark.usefixtures("folder")
+def test_files_of_a_project_never_lie_outside_its_folder() -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    changed(Path("tee.3mf"), INSIDE + "../../outside.txt", b"x")
+    work = open_project("tee.3mf")
+    assert work is not None
+    assert work.model is not None
+    assert not (work.model.parents[3] / "outside.txt").exists()
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_plain_3mf_is_no_project(capsys: pytest.CaptureFixture[str]) -> None:
+    trimesh.Trimesh(*(np.array(a) for a in (tee().vertices, tee().faces))).export("plain.3mf")
+    assert not is_project(Path("plain.3mf"))
+    assert main(["save", "plain.3mf", "-o", "plain.3mf"]) == 1
+    assert "the same file as the model, which is read" in capsys.readouterr().err
+    assert main(["save", "tee.stl", "-o", "tee.stl"]) == 1
+    assert "a name that ends in .3mf is expected" in capsys.readouterr().err
