@@ -4,7 +4,7 @@ from itertools import islice
 from pathlib import Path
 
 from mdp.formats.polygons import polygon_surface
-from mdp.formats.surface import Surface, parse_floats, parse_integers
+from mdp.formats.surface import Surface, parse_floats, parse_integers, text_lines
 from mdp.mesh import Indices
 from profiles.errors import MeshError
 
@@ -16,7 +16,7 @@ def read(path: Path) -> list[Surface]:
 
     Raises MeshError for another kind of file, counts that the file does not hold and malformed lines.
     """
-    stripped = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(path.read_text("latin-1").splitlines(), 1))
+    stripped = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(text_lines(path), 1))
     lines = [(number, words) for number, words in stripped if words]
     if not lines or lines[0][1][0] not in KINDS:
         raise MeshError(f"{path}: is not an OFF file: its first word is none of {', '.join(KINDS)}")

@@ -27,6 +27,13 @@ class Surface:
     colours: Indices | None = None
 
 
+def text_lines(path: Path, continued: str = "") -> list[str]:
+    """The lines of a text file, whatever ends them; one that ends with `continued` goes on in the next. Its bytes stand for
+    themselves: 0x85, which str.splitlines takes for an end of line, is an ellipsis or half of a letter in a comment."""
+    text = path.read_text("latin-1")
+    return (text.replace(f"{continued}\n", " ") if continued else text).split("\n")
+
+
 def check_surface(path: Path, vertices: Any, faces: Any, colours: Indices | None = None) -> Surface:
     """A surface with finite coordinates and indices in range.
 

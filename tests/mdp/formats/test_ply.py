@@ -20,6 +20,13 @@ def test_binary_ply_reads_like_ascii(tmp_path: Path, order: str) -> None:
     assert np.array_equal(mesh.faces, plain.faces)
 
 
+def test_a_comment_of_a_ply_header_may_hold_any_bytes(tmp_path: Path) -> None:
+    plain, _ = read_mesh(save(tmp_path / "a.ply", files.ply(tee())))
+    content = files.ply(tee()).replace(b"comment x", b"comment \x85element face 0 \x0cproperty x")
+    mesh, _ = read_mesh(save(tmp_path / "b.ply", content))
+    assert np.array_equal(mesh.faces, plain.faces)
+
+
 def test_a_ply_without_a_list_of_corners_is_refused(tmp_path: Path) -> None:
     content = files.ply(tee()).replace(b"property list uchar int vertex_indices", b"property int vertex_indices")
     assert "`face` with a list vertex_indices" in refusal(save(tmp_path / "a.ply", content))
