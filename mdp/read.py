@@ -1,5 +1,6 @@
 """Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,7 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
     try:
         _check_size(surfaces, scale)
         if scale != 1.0:
-            surfaces = [Surface(surface.vertices * scale, surface.faces, surface.colours) for surface in surfaces]
+            surfaces = [replace(surface, vertices=surface.vertices * scale, gap=surface.gap * scale) for surface in surfaces]
         solid, notes = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
     except SizeError as error:
@@ -50,7 +51,8 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     mesh = _place_on_platform(solid, rotate_deg)
-    return mesh, (*notes, *floating_pieces(mesh), *too_fine(mesh))
+    left_out = (note for surface in surfaces for note in surface.notes)
+    return mesh, (*left_out, *notes, *floating_pieces(mesh), *too_fine(mesh))
 
 
 def read_in_place(path: Path) -> Mesh:
