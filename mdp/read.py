@@ -18,6 +18,8 @@ from profiles.errors import MeshError
 
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
+SMALL_MM = 10.0  # largest extent of a model that may well be of another unit
+INCH_MM, METRE_MM = 25.4, 1000.0
 TYPICAL_MM = 100.0  # of several units that would fit the one is proposed by which a model is nearest to this
 MANY_FACES = 500_000  # more make no better print: at 0.2 mm an edge they are an area of 90 cm2
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
@@ -52,7 +54,8 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
         raise MeshError(f"{path}: {error}") from None
     mesh = _place_on_platform(solid, rotate_deg)
     left_out = (note for surface in surfaces for note in surface.notes)
-    return mesh, (*left_out, *notes, *floating_pieces(mesh), *too_fine(mesh))
+    told = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
+    return mesh, (*told, *left_out, *notes, *floating_pieces(mesh), *too_fine(mesh))
 
 
 def read_in_place(path: Path) -> Mesh:
@@ -63,6 +66,24 @@ def read_in_place(path: Path) -> Mesh:
         text = str(error)
         raise MeshError(text if text.startswith(str(path)) else f"{path}: {text}") from None
     return Mesh(solid.vertices, solid.faces.astype(np.int32))
+
+
+def small(mesh: Mesh, suffix: str, turned: bool) -> tuple[str, ...]:
+    """What its unit may be and how to scale it, for a small model in a format that has none (STL, OBJ, PLY, OFF), or whose metres
+    with y up many programs leave out of account (glTF). turned: whether it is rotated as it is read."""
+    size_mm = float(np.ptp(mesh.bounds_mm, axis=0).max())
+    if size_mm >= SMALL_MM or suffix not in (".stl", ".obj", ".ply", ".off", ".glb", ".gltf"):
+        return ()
+    longest = f"its longest side is {size_mm:.3g} mm: "
+    if suffix not in (".glb", ".gltf"):
+        return (f"{longest}if its coordinates are inches, give --set process.scale={INCH_MM:g}",)
+    turn = "" if turned else " --set process.rotate_deg=[90,0,0]"
+    if size_mm * METRE_MM <= MOST_MM:
+        return (f"{longest}if its coordinates are metres with y up, as glTF has them, give --set process.scale=1000{turn}",)
+    return (
+        f"{longest}metres with y up, as glTF has them, would be more than {MOST_MM:g} mm; for a tenth of that give "
+        f"--set process.scale=100{turn}",
+    )
 
 
 def too_fine(mesh: Mesh) -> tuple[str, ...]:
