@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mdp.formats.surface import Surface, check_surface, parse_floats
-from profiles.errors import MeshError
+from profiles.errors import MeshError, counted
 
 HEADER, FACET = 84, 50  # bytes: 80 of text and the count; normal, three corners and an attribute
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -69,5 +69,5 @@ def _first_bad_facet(text: bytes) -> str:
         vertices = len(VERTEX.findall(text, start, end))
         if b"endfacet" not in text[start:end].lower():
             return f"is cut short or damaged in {where}"
-        return f"{where} has {vertices} vertices instead of 3" if vertices != 3 else f"{where} is malformed"
+        return f"{where} has {counted(vertices, 'vertex', 'vertices')} instead of 3" if vertices != 3 else f"{where} is malformed"
     return ""

@@ -21,8 +21,8 @@ MOST_PLACED_FACES = 20_000_000  # as many as the largest file of facets holds (m
 class Surface:
     """vertices: (n, 3) float64 in the file's coordinates; faces: (m, 3) int64, as wound in the file, maybe open or crossing;
     colours: (m,) what the file paints each face with, NO_COLOUR: nothing; None: it paints none, or they are not known; name:
-    of the part that it is or begins, "": none; gap: how far two faces may lie apart along an edge that they share; notes: what the
-    reader has left out, in sentences."""
+    of the part that it is or begins, "": none; gap: how far two faces may lie apart along an edge that they share; notes: what
+    the reader has left out, in sentences."""
 
     vertices: Floats
     faces: Indices

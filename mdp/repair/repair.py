@@ -29,7 +29,7 @@ from mdp.repair.weld import (
 )
 from mdp.repair.winding import format_point, orient_faces, split_shared_edges, split_touching_fans
 from mdp.topology.edges import edges_of
-from profiles.errors import MeshError
+from profiles.errors import MeshError, counted
 
 if TYPE_CHECKING:
     import manifold3d as m3
@@ -161,7 +161,9 @@ def _mend(surface: Surface, size: float, gap: float, notes: list[str]) -> Surfac
     edges = edges_of(surface.faces)
     if len(edges.unbalanced):
         where = surface.vertices[edges.starts[np.flatnonzero(edges.edge == edges.unbalanced[0])[0]]]
-        raise MeshError(f"is not closed: {len(edges.unbalanced)} open edges that cannot be mended, one at {format_point(where)}")
+        raise MeshError(
+            f"is not closed: {counted(len(edges.unbalanced), 'open edge')} that cannot be mended, one at {format_point(where)}"
+        )
     return surface
 
 

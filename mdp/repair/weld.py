@@ -59,8 +59,8 @@ def split_rim_edges(surface: Surface, distance: float) -> Surface:
         for half_edge in rim.tolist():
             if half_edge // 3 not in split:  # one edge of a face at a time
                 start, end = int(edges.starts[half_edge]), int(edges.ends[half_edge])
-                ends = np.sort(surface.vertices[[start, end]] @ SKEW) + [-distance, distance]
-                near = vertices[slice(*np.searchsorted(along, ends))]
+                low, high = np.sort(surface.vertices[[start, end]] @ SKEW).tolist()
+                near = vertices[slice(*np.searchsorted(along, (low - distance, high + distance)))]
                 apex = int(surface.faces[half_edge // 3, (half_edge + 2) % 3])
                 between = _between(surface, start, end, near[~np.isin(near, (start, end, apex))], distance)
                 chain = [start, *between, end]

@@ -63,7 +63,9 @@ def _json_settings(block: str) -> dict[str, str]:
         groups = [document["presets"].get(group, {}) for group in JSON_GROUPS]
         *of_print, of_filament = [{key: _json_text(value) for key, value in group.items()} for group in groups]
     except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise ProfileError(f"prusaslicer_json_config is not as PrusaSlicer 3 writes it ({type(error).__name__}: {error})") from None
+        raise ProfileError(
+            f"prusaslicer_json_config is not as PrusaSlicer 3 writes it ({type(error).__name__}: {error})"
+        ) from None
     settings: dict[str, str] = {}
     for group in of_print:
         settings |= group

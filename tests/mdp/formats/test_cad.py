@@ -104,10 +104,12 @@ def test_the_faces_of_an_iges_solid_are_sewn_and_read_in_mm(tmp_path: Path, unit
 
 
 def test_an_assembly_is_told_by_the_names_of_its_parts_and_so_is_one_that_is_open() -> None:
-    boxes = [replace(boxed(files.placed(10, 10, 10, (20.0 * k, 0, 0))), name=name) for k, name in enumerate(("nut", "nut", "rod"))]
+    boxes = [
+        replace(boxed(files.placed(10, 10, 10, (20.0 * k, 0, 0))), name=name) for k, name in enumerate(("nut", "nut", "rod"))
+    ]
     assert _assembly(boxes) == ("is an assembly of 3 parts, printed as one model: 2 x nut, rod",)
     open_one = boxed(files.without(files.placed(10, 10, 10, (90.0, 0, 0)), 0, 1, 2, 3))
-    with pytest.raises(MeshError, match="^its part 'lid' is not closed"):
+    with pytest.raises(MeshError, match=r"^its part 'lid' is not closed"):
         repair([*boxes, replace(open_one, name="lid")])
 
 

@@ -97,4 +97,7 @@ def test_points_and_lines_beside_a_solid_are_left_out_with_a_note(tmp_path: Path
     mesh, notes = read_mesh(save(tmp_path / "a.glb", _edited(meshes=[{"primitives": [solid, line]}])))
     assert mesh.volume_mm3 == pytest.approx(1000.0)
     assert notes == ("left out points and lines in one of its parts: only solids and faces are printed",)
-    assert refusal(save(tmp_path / "b.glb", _edited(meshes=[{"primitives": [line]}]))) == "its scene places no mesh but points and lines"
+    assert (
+        refusal(save(tmp_path / "b.glb", _edited(meshes=[{"primitives": [line]}])))
+        == "its scene places no mesh but points and lines"
+    )

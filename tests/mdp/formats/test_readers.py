@@ -32,7 +32,7 @@ def outcome(path: Path) -> Mesh | None:
 @given(suffix=st.sampled_from(FORMATS), x=SIZES, y=SIZES, z=SIZES)
 def test_a_box_in_any_format_comes_back_with_its_volume(tmp_path: Path, suffix: str, x: float, y: float, z: float) -> None:
     mesh, notes = read_mesh(files.written(tmp_path / f"box{suffix}", files.placed(x, y, z, (3.0, -4.0, 5.0))))
-    assert notes == ()
+    assert [note for note in notes if not note.startswith("its longest side is")] == []
     assert mesh.volume_mm3 == pytest.approx(x * y * z, rel=1e-4)
     assert mesh.bounds_mm == pytest.approx(np.array([[-x / 2, -y / 2, 0], [x / 2, y / 2, z]]), abs=1e-4)
 

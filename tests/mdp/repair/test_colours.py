@@ -79,7 +79,8 @@ def test_a_mesh_that_is_scaled_and_turned_keeps_its_colours(tmp_path: Path) -> N
 
 def test_pieces_of_painted_faces_are_found_as_by_trying_all_of_them() -> None:
     rng = np.random.default_rng(7)
-    painted = rng.uniform(-50.0, 50.0, (120, 3, 3)) * rng.choice([0.02, 0.2, 1.0], (120, 1, 1)) + rng.uniform(-50, 50, (120, 1, 3))
+    painted = rng.uniform(-50.0, 50.0, (120, 3, 3)) * rng.choice([0.02, 0.2, 1.0], (120, 1, 1))
+    painted += rng.uniform(-50.0, 50.0, (120, 1, 3))
     painted[:60, :, 2] = np.round(painted[:60, :1, 2])  # many in parallel planes
     shares = rng.dirichlet([1.0, 1.0, 1.0], (120, 3))
     pieces = np.concatenate([np.einsum("nij,njx->nix", shares, painted), rng.uniform(-50.0, 50.0, (40, 3, 3))])
@@ -91,7 +92,7 @@ def test_pieces_of_painted_faces_are_found_as_by_trying_all_of_them() -> None:
 
 
 def lies_on(piece: Floats, triangle: Floats) -> bool:
-    """Whether a piece's middle lies on a triangle of about its direction: barycentric coordinates by the method of least squares."""
+    """Whether a piece's middle lies on a triangle of about its direction: barycentric coordinates by least squares."""
     sides, place = (triangle[1:] - triangle[0]).T, piece.mean(axis=0) - triangle[0]
     shares, *_ = np.linalg.lstsq(sides, place, rcond=None)
     normals = [np.cross(each[1] - each[0], each[2] - each[0]) for each in (piece, triangle)]

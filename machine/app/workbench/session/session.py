@@ -49,7 +49,6 @@ from mdp.read import MANY_FACES
 from profiles.errors import MeshError, PlanError
 from profiles.profile import Profile
 
-
 READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a model is read
 
 
@@ -143,7 +142,9 @@ class Session(SessionBase):
 
     async def open_model(self, path: Path, name: str, anew: bool = True) -> None:
         """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it.
-        Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit."""
+
+        Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
+        """
         self.hear_name(name)
         self.hear_name(str(path))
         self.readiness.load()
