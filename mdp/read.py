@@ -77,7 +77,7 @@ def small(mesh: Mesh, suffix: str, turned: bool) -> tuple[str, ...]:
     longest = f"its longest side is {size_mm:.3g} mm: "
     if suffix not in (".glb", ".gltf"):
         return (f"{longest}if its coordinates are inches, give --set process.scale={INCH_MM:g}",)
-    turn = "" if turned else " --set process.rotate_deg=[90,0,0]"
+    turn = "" if turned else " and --set process.rotate_deg=[90,0,0]"
     if size_mm * METRE_MM <= MOST_MM:
         return (f"{longest}if its coordinates are metres with y up, as glTF has them, give --set process.scale=1000{turn}",)
     return (
