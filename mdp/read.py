@@ -1,6 +1,6 @@
 """Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,8 @@ from profiles.errors import MeshError
 
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
+SMALL_MM = 10.0  # largest extent of a model that may well be of another unit
+INCH_MM, METRE_MM = 25.4, 1000.0
 TYPICAL_MM = 100.0  # of several units that would fit the one is proposed by which a model is nearest to this
 MANY_FACES = 500_000  # more make no better print: at 0.2 mm an edge they are an area of 90 cm2
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
@@ -66,7 +68,7 @@ def read_model(
         surfaces, taken = printed(project)
         _check_size(surfaces, scale)
         if scale != 1.0:
-            surfaces = [Surface(surface.vertices * scale, surface.faces, surface.colours) for surface in surfaces]
+            surfaces = [replace(surface, vertices=surface.vertices * scale, gap=surface.gap * scale) for surface in surfaces]
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
         mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
@@ -75,7 +77,10 @@ def read_model(
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    return ReadModel(mesh, (*project.notes, *taken, *told, *repairs, *floating_pieces(mesh), *too_fine(mesh)), zones)
+    left_out = (note for surface in surfaces for note in surface.notes)
+    size = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
+    notes = (*project.notes, *taken, *told, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
+    return ReadModel(mesh, notes, zones)
 
 
 def read_in_place(path: Path) -> Mesh:
@@ -86,6 +91,24 @@ def read_in_place(path: Path) -> Mesh:
         text = str(error)
         raise MeshError(text if text.startswith(str(path)) else f"{path}: {text}") from None
     return Mesh(solid.vertices, solid.faces.astype(np.int32))
+
+
+def small(mesh: Mesh, suffix: str, turned: bool) -> tuple[str, ...]:
+    """What its unit may be and how to scale it, for a small model in a format that has none (STL, OBJ, PLY, OFF), or whose metres
+    with y up many programs leave out of account (glTF). turned: whether it is rotated as it is read."""
+    size_mm = float(np.ptp(mesh.bounds_mm, axis=0).max())
+    if size_mm >= SMALL_MM or suffix not in (".stl", ".obj", ".ply", ".off", ".glb", ".gltf"):
+        return ()
+    longest = f"its longest side is {size_mm:.3g} mm: "
+    if suffix not in (".glb", ".gltf"):
+        return (f"{longest}if its coordinates are inches, give --set process.scale={INCH_MM:g}",)
+    turn = "" if turned else " and --set process.rotate_deg=[90,0,0]"
+    if size_mm * METRE_MM <= MOST_MM:
+        return (f"{longest}if its coordinates are metres with y up, as glTF has them, give --set process.scale=1000{turn}",)
+    return (
+        f"{longest}metres with y up, as glTF has them, would be more than {MOST_MM:g} mm; for a tenth of that give "
+        f"--set process.scale=100{turn}",
+    )
 
 
 def too_fine(mesh: Mesh) -> tuple[str, ...]:

@@ -138,3 +138,12 @@ class NoAnswerError(ServerError):
 
 class JournalError(UserError):
     """A journal from which a print cannot be resumed; the message says why."""
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """A number of things in words.
+
+    >>> counted(1, "edge"), counted(2, "edge"), counted(0, "vertex", "vertices")
+    ('1 edge', '2 edges', '0 vertices')
+    """
+    return f"{count} {noun if count == 1 else plural or f'{noun}s'}"

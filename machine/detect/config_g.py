@@ -103,7 +103,7 @@ def _commands(config: ConfigText, missing: list[str], count: list[int]) -> Itera
     if count[0] > MOST_INCLUDED:
         raise ProfileError(f"{config.name}: more than {MOST_INCLUDED} macros are called: does one call itself?")
     condition: int | None = None  # its indentation
-    for line in config.text.splitlines():
+    for line in config.text.split("\n"):
         indent = len(line) - len(line.lstrip())
         if condition is not None and (indent > condition or not line.strip()):
             continue

@@ -121,7 +121,7 @@ def _sections(config: ConfigText) -> Sections:
     """The sections of a file; what SAVE_CONFIG has written counts where the file says nothing."""
     own, _, saved = config.text.partition(f"\n{SAVED}[")
     sections = read_sections(replace(config, text=own), INCLUDE)
-    lines = f"[{saved}".splitlines() if saved else []
+    lines = f"[{saved}".split("\n") if saved else []
     for title, values in read_sections(replace(config, text="\n".join(line.removeprefix(SAVED) for line in lines))).of.items():
         sections.of[title] = {**values, **sections[title]}
     return sections

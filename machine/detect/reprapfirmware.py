@@ -67,7 +67,7 @@ def _take_heat(board: DuetBoard, heat: Table, tools: list[Table]) -> None:
 def _model(config: ConfigText) -> dict[str, Any]:
     """Key -> its value; the pages of an array are joined."""
     model: dict[str, Any] = {}
-    for line in config.text.splitlines():
+    for line in config.text.split("\n"):
         if not MODEL.match(line):
             continue
         try:

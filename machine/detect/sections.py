@@ -71,7 +71,7 @@ def _pieces(
     if count[0] > MOST_INCLUDED:
         raise ProfileError(f"{config.name}: more than {MOST_INCLUDED} files are included: does one include itself?")
     lines: list[str] = []
-    for line in CONTINUED.sub(" ", config.text).splitlines():
+    for line in CONTINUED.sub(" ", config.text).split("\n"):
         if (named := include.match(line)) is None:
             lines.append(line.partition("#")[0])
             continue

@@ -195,7 +195,7 @@ def fill_block(block: str, name: str, values: Mapping[str, object], dialect: Dia
     unknown placeholder, for a line whose text firmwares read differently and for a command too long for the firmware.
     """
     lines, longest = [], dialect.longest_line
-    for line in block.splitlines():
+    for line in block.split("\n"):
         text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).rstrip()
         text = text if dialect.statements else text.strip()  # RepRapFirmware tells by the indent what an `if` holds
         try:

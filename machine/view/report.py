@@ -40,7 +40,7 @@ CONTACT = (
     "layer gets of what the room below its tip holds there"
 )
 BREAKS = "breaks: pushed sideways at the end of its arm, the farthest place of what it holds; an estimate of the cold weld alone"
-RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
+RISKY = "risky: faces that would need support if the model were printed in one piece as it lies now; left: as the part is printed"
 
 
 def parts_report(

@@ -6,6 +6,7 @@ or scaled here; a model in metres is caught by the check of its size, one that l
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,15 @@ from profiles.errors import MeshError
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # "glTF", "JSON" and "BIN" read as little-endian numbers
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-TRIANGLES = 4  # primitive mode
+LINES_TO, TRIANGLES = 3, 4  # modes of primitives: up to 3 they are points and lines
+UNNAMED = frozenset({"SOLID", "SHELL", "COMPOUND", "COMPSOLID", "FACE"})  # OpenCASCADE's words for shapes without a name
 DEEPEST = 64  # nodes within nodes
 
 
 def read(path: Path) -> list[Surface]:
-    """One surface for every mesh primitive that the scene places.
+    """One surface for every mesh primitive that the scene places; points and lines are left out with a note.
 
-    Raises MeshError for a damaged file, compressed geometry, outside buffers and primitives that are not plain triangles.
+    Raises MeshError for a damaged file, compressed geometry, outside buffers and strips or fans of triangles.
     """
     return read_scene(path, path.read_bytes())
 
@@ -33,11 +35,14 @@ def read_scene(path: Path, content: bytes) -> list[Surface]:
     """The same for the content of such a file; path: what messages name."""
     document, binary = _chunks(path, content)
     try:
-        surfaces = _scene_meshes(path, document, binary)
+        surfaces, bare = _scene_meshes(path, document, binary)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {str(error)[:200]})") from None
     if not surfaces:
-        raise MeshError(f"{path}: its scene places no mesh")
+        raise MeshError(f"{path}: its scene places no mesh" + (" but points and lines" if bare else ""))
+    if bare:
+        of_parts = "one of its parts" if bare == 1 else f"{bare} of its parts"
+        surfaces[0] = replace(surfaces[0], notes=(f"left out points and lines in {of_parts}: only solids and faces are printed",))
     return _marks(surfaces)
 
 
@@ -68,26 +73,39 @@ def _roots(document: Any) -> list[int]:
     return [number for number in range(len(document.get("nodes", []))) if number not in children]
 
 
-def _scene_meshes(path: Path, document: Any, binary: bytes) -> list[Surface]:
-    """The primitives of all nodes of the scene, parents before children, in the order of the file."""
-    pending = [(number, np.eye(4), 0) for number in reversed(_roots(document))]
+def _scene_meshes(path: Path, document: Any, binary: bytes) -> tuple[list[Surface], int]:
+    """The faces of all nodes of the scene, parents before children, in the order of the file, and how many primitives are
+    points and lines."""
+    pending = [(number, np.eye(4), 0, "") for number in reversed(_roots(document))]
     surfaces: list[Surface] = []
-    placed, faces = 0, 0
+    placed, faces, bare = 0, 0, 0
     while pending:
-        number, parent, depth = pending.pop()
+        number, parent, depth, name = pending.pop()
         placed += 1
         check_placed(path, placed)
         if depth > DEEPEST:
             raise MeshError(f"{path}: its nodes contain each other")
         node = document["nodes"][number]
-        matrix = parent @ _matrix(node)
-        for primitive in document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ():
-            surface = _primitive_surface(path, document, binary, primitive, matrix)
+        matrix, name = parent @ _matrix(node), _name(node, name)
+        mesh = document["meshes"][node["mesh"]] if "mesh" in node else {"primitives": ()}
+        part = _name(mesh, name)  # each of its colours is a primitive
+        for primitive in mesh["primitives"]:
+            if primitive.get("mode", TRIANGLES) <= LINES_TO:
+                bare += 1
+                continue
+            surface = replace(_primitive_surface(path, document, binary, primitive, matrix), name=part)
             surfaces.append(surface)
+            part = ""
             faces += len(surface.faces)
             check_meshes(path, len(surfaces), faces)
-        pending += [(child, matrix, depth + 1) for child in reversed(node.get("children", []))]
-    return surfaces
+        pending += [(child, matrix, depth + 1, name) for child in reversed(node.get("children", []))]
+    return surfaces, bare
+
+
+def _name(element: Any, above: str) -> str:
+    """The name of a node or a mesh, and where it has none that of the node above."""
+    name = str(element.get("name", ""))
+    return above if not name or name in UNNAMED or name.startswith("=>[") else name
 
 
 def _matrix(node: Any) -> Floats:
@@ -108,7 +126,7 @@ def _matrix(node: Any) -> Floats:
 
 def _primitive_surface(path: Path, document: Any, binary: bytes, primitive: Any, matrix: Floats) -> Surface:
     if primitive.get("mode", TRIANGLES) != TRIANGLES or primitive.get("extensions", {}).keys() & {"KHR_draco_mesh_compression"}:
-        raise MeshError(f"{path}: holds lines, strips or compressed geometry; only plain triangles are read")
+        raise MeshError(f"{path}: holds strips or fans of triangles or compressed geometry; only plain triangles are read")
     vertices = _accessor_rows(path, document, binary, primitive["attributes"]["POSITION"], 3)
     if "indices" in primitive:
         faces = _accessor_rows(path, document, binary, primitive["indices"], 1).astype(np.int64).reshape(-1, 3)
@@ -139,7 +157,7 @@ def _marks(surfaces: list[Surface]) -> list[Surface]:
     """The surfaces, without colours where all have the same: it marks nothing."""
     if len({NO_COLOUR if surface.colours is None else int(surface.colours[0]) for surface in surfaces}) > 1:
         return surfaces
-    return [Surface(surface.vertices, surface.faces) for surface in surfaces]
+    return [replace(surface, colours=None) for surface in surfaces]
 
 
 def _accessor_rows(path: Path, document: Any, binary: bytes, number: int, width: int) -> Any:

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from mdp.formats.polygons import polygon_surface
-from mdp.formats.surface import Surface, parse_floats
-from profiles.errors import MeshError
+from mdp.formats.surface import Surface, parse_floats, text_lines
+from profiles.errors import MeshError, counted
 
 MOST_INDEX = 2**62  # no file has that many vertices, and more would not fit into an array
 
@@ -16,7 +16,7 @@ def read(path: Path) -> list[Surface]:
     """
     positions: list[list[str]] = []
     polygons: list[list[int]] = []
-    for number, line in enumerate(path.read_text("latin-1").replace("\\\n", " ").splitlines(), 1):
+    for number, line in enumerate(text_lines(path, continued="\\"), 1):
         words = line.split("#", 1)[0].split()
         if not words:
             continue
@@ -32,7 +32,7 @@ def read(path: Path) -> list[Surface]:
 
 def _corners(path: Path, number: int, words: list[str], vertices: int) -> list[int]:
     if len(words) < 3:
-        raise MeshError(f"{path}: the face in line {number} has {len(words)} corners, at least 3 are needed")
+        raise MeshError(f"{path}: the face in line {number} has {counted(len(words), 'corner')}, at least 3 are needed")
     try:
         named = [int(word.split("/", 1)[0]) for word in words]
     except ValueError:

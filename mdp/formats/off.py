@@ -4,9 +4,9 @@ from itertools import islice
 from pathlib import Path
 
 from mdp.formats.polygons import polygon_surface
-from mdp.formats.surface import Surface, parse_floats, parse_integers
+from mdp.formats.surface import Surface, parse_floats, parse_integers, text_lines
 from mdp.mesh import Indices
-from profiles.errors import MeshError
+from profiles.errors import MeshError, counted
 
 KINDS = ("OFF", "COFF", "NOFF", "CNOFF", "STOFF")  # the letters name columns behind the position, which are left alone
 
@@ -16,7 +16,7 @@ def read(path: Path) -> list[Surface]:
 
     Raises MeshError for another kind of file, counts that the file does not hold and malformed lines.
     """
-    stripped = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(path.read_text("latin-1").splitlines(), 1))
+    stripped = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(text_lines(path), 1))
     lines = [(number, words) for number, words in stripped if words]
     if not lines or lines[0][1][0] not in KINDS:
         raise MeshError(f"{path}: is not an OFF file: its first word is none of {', '.join(KINDS)}")
@@ -26,7 +26,8 @@ def read(path: Path) -> list[Surface]:
         raise MeshError(f"{path}: its line of counts must name the vertices and the faces, got `{' '.join(counts_line)}`")
     held = len(lines) - first
     if sum(counts) > held:
-        raise MeshError(f"{path}: announces {counts[0]} vertices and {counts[1]} faces but holds only {held} lines of them")
+        announced = f"{counted(counts[0], 'vertex', 'vertices')} and {counted(counts[1], 'face')}"
+        raise MeshError(f"{path}: announces {announced} but holds only {counted(held, 'line')} of them")
     vertex_rows, face_rows = lines[first : first + counts[0]], lines[first + counts[0] : first + sum(counts)]
     short = next((number for number, words in vertex_rows if len(words) < 3), None)
     if short is not None:

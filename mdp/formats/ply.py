@@ -116,7 +116,7 @@ def _corner_colours(colours: Indices | None, polygons: list[list[int]] | Indices
 def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
     end = content.find(b"end_header")
     body = content.find(b"\n", end) + 1
-    lines = [line.split() for line in content[: max(end, 0)].decode("latin-1").splitlines()]
+    lines = [line.decode("latin-1").split() for line in content[: max(end, 0)].splitlines()]
     if end < 0 or not body or lines[0] != ["ply"]:
         raise MeshError(f"{path}: is not a PLY file: no header from `ply` to `end_header`")
     order, elements = None, list[Element]()

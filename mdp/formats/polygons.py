@@ -8,7 +8,7 @@ import numpy as np
 from mdp.directions.frame import frame_across
 from mdp.formats.surface import Surface, check_surface, check_vertices
 from mdp.mesh import Floats, Indices
-from profiles.errors import MeshError
+from profiles.errors import MeshError, counted
 
 
 def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | Indices, colours: Indices | None = None) -> Surface:
@@ -27,7 +27,9 @@ def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | In
     for number, polygon in enumerate(polygons, 1):
         corners = np.array(polygon, dtype=np.int64)
         if len(corners) < 3:
-            raise MeshError(f"{path}: face {number} of {len(polygons)} has {len(corners)} corners, at least 3 are needed")
+            raise MeshError(
+                f"{path}: face {number} of {len(polygons)} has {counted(len(corners), 'corner')}, at least 3 are needed"
+            )
         if corners.min() < 0 or corners.max() >= len(vertices):
             worst = next(corner for corner in polygon if not 0 <= corner < len(vertices))
             raise MeshError(f"{path}: face {number} names vertex {worst} (counted from 0) of {len(vertices)} vertices")

@@ -19,6 +19,7 @@ Z_UP_OF = {
     "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
     "Z_UP": np.eye(3),
 }
+COLLADA = "pycollada"  # which trimesh misses without a word of its name
 MM = 1000.0  # in a metre, which the <unit> of COLLADA counts in
 
 
@@ -35,7 +36,9 @@ def read(path: Path) -> list[Surface]:
         scene = trimesh.load_scene(path, process=False)
         nodes = [scene.graph[name] for name in sorted(scene.graph.nodes_geometry)]
     except ImportError as error:
-        raise MeshError(f"{path}: reading {path.suffix} files needs {error.name}: pip install 'tiltprint[dae]'") from None
+        raise MeshError(
+            f"{path}: reading {path.suffix} files needs {error.name or COLLADA}: pip install 'tiltprint[dae]'"
+        ) from None
     except Exception as error:  # noqa: BLE001 - trimesh names no errors of its own: whatever it meets, the file is not what it says
         raise MeshError(f"{path}: cannot be read as {path.suffix} ({type(error).__name__}: {str(error)[:200]})") from None
     placed = [(matrix, mesh) for matrix, name in nodes if isinstance(mesh := scene.geometry[name], trimesh.Trimesh)]

@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from mdp.formats.surface import Surface, check_surface, parse_floats
-from profiles.errors import MeshError
+from profiles.errors import MeshError, counted
 
 HEADER, FACET = 84, 50  # bytes: 80 of text and the count; normal, three corners and an attribute
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+UNCOUNTED = (0, 0xFFFFFFFF)  # counts of a program that wrote its facets as they came
 CORNER = rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)\s+"
-SOUND_FACET = re.compile(
-    rb"facet\s+normal\s+\S+\s+\S+\s+\S+\s+outer\s+loop\s+" + CORNER * 3 + rb"endloop\s+endfacet", re.IGNORECASE
+SOUND_FACET = re.compile(  # some programs write words behind the end of a loop
+    rb"facet\s+normal\s+\S+\s+\S+\s+\S+\s+outer\s+loop\s+" + CORNER * 3 + rb"endloop\b[^\r\n]*?\s+endfacet", re.IGNORECASE
 )
 FACET_START = re.compile(rb"\bfacet\s+normal\b", re.IGNORECASE)
 VERTEX = re.compile(rb"\bvertex\s+[-+.0-9ni]", re.IGNORECASE)  # the word alone may stand in the name of a solid
@@ -27,7 +28,11 @@ def read(path: Path) -> list[Surface]:
         text = file.read(HEADER)
         count = int.from_bytes(text[80:84], "little") if len(text) == HEADER else -1
         ascii_likely = text.lstrip()[:5].lower() in (b"", b"solid")
-        text += file.read() if ascii_likely else file.read(min(FACET * max(count, 0) + 1, path.stat().st_size))
+        size = path.stat().st_size
+        text += file.read(FACET)
+        if count in UNCOUNTED and any(text[HEADER:]):  # a file of zeros is no model, however long
+            count = -(-(size - HEADER) // FACET)
+        text += file.read() if ascii_likely else file.read(min(FACET * max(count - 1, 0) + 1, size))
     if count >= 0 and len(text) == HEADER + FACET * count:
         return [_binary(path, text, count)]
     if text.lstrip()[:5].lower() == b"solid" and FACET_START.search(text):
@@ -36,7 +41,7 @@ def read(path: Path) -> list[Surface]:
         raise MeshError(f"{path}: is not an STL file: neither binary nor ASCII with `solid` and `facet` in it")
     if len(text) < HEADER + FACET * count:
         held = (len(text) - HEADER) // FACET
-        raise MeshError(f"{path}: is cut short: it holds {held} of the {count} facets that its header announces")
+        raise MeshError(f"{path}: is cut short: it holds {held} of the {count} facets that it announces or begins")
     return [_binary(path, text, count)]  # some programs write colours or padding behind the facets
 
 
@@ -64,5 +69,5 @@ def _first_bad_facet(text: bytes) -> str:
         vertices = len(VERTEX.findall(text, start, end))
         if b"endfacet" not in text[start:end].lower():
             return f"is cut short or damaged in {where}"
-        return f"{where} has {vertices} vertices instead of 3" if vertices != 3 else f"{where} is malformed"
+        return f"{where} has {counted(vertices, 'vertex', 'vertices')} instead of 3" if vertices != 3 else f"{where} is malformed"
     return ""

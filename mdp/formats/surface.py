@@ -20,11 +20,23 @@ MOST_PLACED_FACES = 20_000_000  # as many as the largest file of facets holds (m
 @dataclass(frozen=True, eq=False)
 class Surface:
     """vertices: (n, 3) float64 in the file's coordinates; faces: (m, 3) int64, as wound in the file, maybe open or crossing;
-    colours: (m,) what the file paints each face with, NO_COLOUR: nothing; None: it paints none, or they are not known."""
+    colours: (m,) what the file paints each face with, NO_COLOUR: nothing; None: it paints none, or they are not known; name:
+    of the part that it is or begins, "": none; gap: how far two faces may lie apart along an edge that they share; notes: what
+    the reader has left out, in sentences."""
 
     vertices: Floats
     faces: Indices
     colours: Indices | None = None
+    name: str = ""
+    gap: float = 0.0
+    notes: tuple[str, ...] = ()
+
+
+def text_lines(path: Path, continued: str = "") -> list[str]:
+    """The lines of a text file, whatever ends them; one that ends with `continued` goes on in the next. Its bytes stand for
+    themselves: 0x85, which str.splitlines takes for an end of line, is an ellipsis or half of a letter in a comment."""
+    text = path.read_text("latin-1")
+    return (text.replace(f"{continued}\n", " ") if continued else text).split("\n")
 
 
 def check_surface(path: Path, vertices: Any, faces: Any, colours: Indices | None = None) -> Surface:

@@ -1,5 +1,7 @@
 """Colours: which face of a repaired solid is a face, or a piece of one, that the file has painted."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mdp.formats.surface import Surface, concatenate
@@ -8,6 +10,11 @@ from mdp.mesh import NO_COLOUR, Floats, Indices
 NEAR_SHARE = 1e-4  # of the model's size: as far as repairs move a vertex
 SAME_DIRECTION = 1.0 - 1e-6  # cosine of two normals
 INSIDE = -1e-6  # least barycentric coordinate
+# Cells of a plane: its normal, and its distance from the middle in sizes of the model; normals of about one direction differ by
+# 1.5e-3, and with it the distance of a place: what a triangle reaches beyond its own plane, in cells.
+PLANE_CELLS, PLANE_MARGIN = np.array([0.05, 0.05, 0.05, 0.005]), np.array([0.04, 0.04, 0.04, 0.4])
+FINEST = 8  # halvings of the model's size: no smaller cells of place
+PAIRS_AT_ONCE = 1_000_000  # of points and triangles: what that takes of memory is some 100 MB
 
 
 def carry_colours(surfaces: list[Surface], solid: Surface) -> Indices | None:
@@ -44,29 +51,80 @@ def _same_corners(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
 
 def _pieces(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
     """Colours of the triangles whose middle lies on a painted one, and that face the same way or the opposite."""
-    near_mm = NEAR_SHARE * float(np.ptp(np.concatenate([corners, wanted]).reshape(-1, 3), axis=0).max())
+    both = np.concatenate([corners, wanted]).reshape(-1, 3)
+    middle, size = (both.min(axis=0) + both.max(axis=0)) / 2.0, float(np.ptp(both, axis=0).max())
+    near_mm = NEAR_SHARE * size
     order = np.argsort(corners[:, :, 0].min(axis=1), kind="stable")
-    corners, colours = corners[order], colours[order]
-    low, high = corners[:, :, 0].min(axis=1), corners[:, :, 0].max(axis=1)
-    widest, normals, mine = float((high - low).max()), _normals(corners), _normals(wanted)
-    middles = wanted.mean(axis=1)
-    first = np.searchsorted(low, middles[:, 0] - widest - near_mm)
-    end = np.searchsorted(low, middles[:, 0] + near_mm, side="right")
+    corners, colours = corners[order] - middle, colours[order]
+    wanted = wanted - middle
+    normals, wanted_normals, middles = _normals(corners), _normals(wanted), wanted.mean(axis=1)
+    nearest = np.full(len(wanted), np.inf)
     colour_of = np.full(len(wanted), NO_COLOUR, dtype=np.int64)
-    for row, (begin, stop) in enumerate(zip(first.tolist(), end.tolist(), strict=True)):
-        away = np.einsum("ij,ij->i", normals[begin:stop], middles[row] - corners[begin:stop, 0])
-        parallel = np.abs(normals[begin:stop] @ mine[row]) > SAME_DIRECTION
-        near = begin + np.flatnonzero(parallel & (np.abs(away) <= near_mm))
-        on = near[_holds(corners[near], normals[near], middles[row])]
-        if len(on):
-            colour_of[row] = colours[on[np.argmin(np.abs(away[on - begin]))]]
+    for rows, painted in _neighbours(corners, normals, middles, wanted_normals, size):
+        away = np.abs(np.einsum("ij,ij->i", normals[painted], middles[rows] - corners[painted, 0]))
+        parallel = np.abs(np.einsum("ij,ij->i", normals[painted], wanted_normals[rows])) > SAME_DIRECTION
+        on = np.flatnonzero(parallel & (away <= near_mm))
+        on = on[_holds(corners[painted[on]], normals[painted[on]], middles[rows[on]])]
+        on = on[np.lexsort((painted[on], away[on], rows[on]))]
+        row, first = np.unique(rows[on], return_index=True)
+        better = away[on[first]] < nearest[row]
+        row, best = row[better], on[first[better]]
+        nearest[row], colour_of[row] = away[best], colours[painted[best]]
     return colour_of
 
 
-def _holds(corners: Floats, normals: Floats, point: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Whether a point lies over (n, 3, 3) triangles of (n, 3) unit normals."""
+def _neighbours(
+    corners: Floats, normals: Floats, points: Floats, point_normals: Floats, size: float
+) -> Iterator[tuple[Indices, Indices]]:
+    """Pairs of points and of triangles in about one plane whose box holds the point: rows of either.
+
+    Both go into cells of direction, distance of the plane from the origin, and place; a triangle into all that it may reach.
+    Triangles of about one size share a grid for the place whose cells are as large as they are.
+    """
+    near = NEAR_SHARE * size
+    low, high = corners.min(axis=1) - near, corners.max(axis=1) + near
+    sizes = np.maximum(np.ceil(np.log2((high - low).max(axis=1))), np.ceil(np.log2(size)) - FINEST).astype(np.int64)
+    planes = np.column_stack([normals, np.einsum("ij,ij->i", normals, corners[:, 0]) / size]) / PLANE_CELLS
+    point_planes = np.column_stack([point_normals, np.einsum("ij,ij->i", point_normals, points) / size]) / PLANE_CELLS
+    for level in np.unique(sizes).tolist():
+        members = np.flatnonzero(sizes == level)
+        cell = 2.0**level
+        least, most = (
+            np.concatenate([np.column_stack([sign * planes[members] + margin, ends[members] / cell]) for sign in (1.0, -1.0)])
+            for margin, ends in ((-PLANE_MARGIN, low), (PLANE_MARGIN, high))
+        )
+        cells, rows = _cells(np.floor(least).astype(np.int64), np.floor(most).astype(np.int64))
+        inside = np.floor(np.column_stack([point_planes, points / cell])).astype(np.int64)
+        first = np.minimum(cells.min(axis=0), inside.min(axis=0))
+        shape = np.maximum(cells.max(axis=0), inside.max(axis=0)) - first + 1
+        keys, at = (np.ravel_multi_index(tuple((places - first).T), tuple(shape)) for places in (cells, inside))
+        order = np.argsort(keys, kind="stable")
+        keys, triangles = keys[order], np.concatenate([members, members])[rows[order]]
+        begin, end = np.searchsorted(keys, at), np.searchsorted(keys, at, side="right")
+        block = np.cumsum(end - begin) // PAIRS_AT_ONCE
+        for some in np.split(np.arange(len(points)), np.flatnonzero(np.diff(block)) + 1):
+            counts = end[some] - begin[some]
+            row = np.repeat(some, counts)
+            triangle = triangles[np.arange(len(row)) + np.repeat(begin[some] - np.cumsum(counts) + counts, counts)]
+            held = ((points[row] >= low[triangle]) & (points[row] <= high[triangle])).all(axis=1)
+            yield row[held], triangle[held]
+
+
+def _cells(least: Indices, most: Indices) -> tuple[Indices, Indices]:
+    """The cells that boxes from (n, d) least to (n, d) most ones cover, two at most along each axis, and whose each is."""
+    cells, rows = least, np.arange(len(least))
+    for axis in range(least.shape[1]):
+        wider = np.flatnonzero(most[rows, axis] > cells[:, axis])
+        beyond = cells[wider].copy()
+        beyond[:, axis] += 1
+        cells, rows = np.concatenate([cells, beyond]), np.concatenate([rows, rows[wider]])
+    return cells, rows
+
+
+def _holds(corners: Floats, normals: Floats, points: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(n,) whether each of (n, 3) points lies over its triangle, of (n, 3, 3) corners and (n, 3) unit normals."""
     next_corners = np.roll(corners, -1, axis=1)
-    turns = np.einsum("ncx,nx->nc", np.cross(next_corners - corners, point - corners), normals)
+    turns = np.einsum("ncx,nx->nc", np.cross(next_corners - corners, points[:, None] - corners), normals)
     whole = turns.sum(axis=1)
     inside: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turns >= INSIDE * whole[:, None]).all(axis=1)
     return inside

@@ -20,10 +20,16 @@ from mdp.repair.shells import (
     unite,
     volume_of,
 )
-from mdp.repair.weld import drop_collapsed_faces, drop_unused_vertices, merge_rim_vertices, merge_vertices
+from mdp.repair.weld import (
+    drop_collapsed_faces,
+    drop_unused_vertices,
+    merge_rim_vertices,
+    merge_vertices,
+    split_rim_edges,
+)
 from mdp.repair.winding import format_point, orient_faces, split_shared_edges, split_touching_fans
 from mdp.topology.edges import edges_of
-from profiles.errors import MeshError
+from profiles.errors import MeshError, counted
 
 if TYPE_CHECKING:
     import manifold3d as m3
@@ -57,7 +63,12 @@ def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
     _note(
         notes, sum(len(s.faces) for s in surfaces) - sum(len(s.faces) for s in tidy), "left out {} face{} with coinciding corners"
     )
-    closed = [_mend(piece, size, notes) for piece in pieces]
+    gap = max(surface.gap for surface in surfaces)
+    names = {surface.name for surface, merged in zip(surfaces, tidy, strict=True) if not _is_closed(merged)} - {""}
+    try:
+        closed = [_mend(piece, size, gap, notes) for piece in pieces]
+    except MeshError as error:
+        raise MeshError(f"its part {names.pop()!r} {error}" if len(names) == 1 and len(surfaces) > 1 else str(error)) from None
     solid = _unite_shells([split_touching_fans(piece) for piece in closed if len(piece.faces)], size, notes)
     lost = np.abs(_bounds(solid) - before).max()
     if lost > SHRINK * size:
@@ -132,14 +143,14 @@ def _tidy(surface: Surface) -> Surface:
     return given if _is_closed(given) and len(given.faces) else merge_vertices(given)
 
 
-def _mend(surface: Surface, size: float, notes: list[str]) -> Surface:
+def _mend(surface: Surface, size: float, gap: float, notes: list[str]) -> Surface:
     """The surface closed and wound consistently; appends to the notes. Raises MeshError when it stays open."""
     faces = len(surface.faces)
     surface = _drop_repeats(surface)
     _note(notes, faces - len(surface.faces), "left out {} duplicate face{}")
     if _is_closed(surface):
         return surface
-    surface = _close_seams(surface, size, notes)
+    surface = _close_seams(surface if gap == 0.0 else _sew(surface, gap), size, notes)
     faces = len(surface.faces)
     surface = drop_loose_sheets(surface)
     _note(notes, faces - len(surface.faces), "left out {} face{} of loose sheets")
@@ -150,7 +161,9 @@ def _mend(surface: Surface, size: float, notes: list[str]) -> Surface:
     edges = edges_of(surface.faces)
     if len(edges.unbalanced):
         where = surface.vertices[edges.starts[np.flatnonzero(edges.edge == edges.unbalanced[0])[0]]]
-        raise MeshError(f"is not closed: {len(edges.unbalanced)} open edges that cannot be mended, one at {format_point(where)}")
+        raise MeshError(
+            f"is not closed: {counted(len(edges.unbalanced), 'open edge')} that cannot be mended, one at {format_point(where)}"
+        )
     return surface
 
 
@@ -161,6 +174,12 @@ def _drop_repeats(surface: Surface) -> Surface:
         return once
     paired_off = cancel_opposite_faces(surface)
     return paired_off if 2 * len(paired_off.faces) > len(surface.faces) else once
+
+
+def _sew(surface: Surface, gap: float) -> Surface:
+    """The surface whose faces lie that far apart at most along edges that they share."""
+    joined = split_rim_edges(merge_rim_vertices(surface, gap), gap)
+    return drop_duplicate_faces(Surface(joined.vertices, drop_collapsed_faces(joined.faces)))
 
 
 def _close_seams(surface: Surface, size: float, notes: list[str]) -> Surface:

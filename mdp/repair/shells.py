@@ -7,7 +7,7 @@ import numpy as np
 
 from mdp.formats.surface import Surface, concatenate
 from mdp.mesh import Floats, Indices, crosses_of
-from mdp.repair.weld import drop_unused_vertices
+from mdp.repair.weld import drop_unused_vertices, merge_vertices
 from mdp.repair.winding import pair_half_edges
 from mdp.topology.components import connected_components
 from mdp.topology.edges import edges_of
@@ -148,7 +148,7 @@ def unite(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
     fused = 0
     for group in _groups([body[0] for body in bodies], reach):
         plain = [_body_surface(bodies[i]) for i in group]
-        union = _union(plain) if len(group) > 1 else None
+        union = _union(plain, reach) if len(group) > 1 else None
         pieces += plain if union is None else [union]
         fused += len(group) if union is not None else 0
     surface = concatenate(pieces)
@@ -167,11 +167,16 @@ def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
     return [np.flatnonzero(label == first).tolist() for first in np.unique(label)]
 
 
-def _union(bodies: list[Surface]) -> Surface | None:
-    """The union of closed surfaces; None when they neither overlap nor touch."""
+def _union(bodies: list[Surface], reach: float) -> Surface | None:
+    """The union of closed surfaces; None when they neither overlap nor touch.
+
+    Their corners come onto a grid as fine as the reach at most: walls that are meant to touch then do, where the rounding of a
+    file leaves slivers between them so thin that their union cannot be read again.
+    """
     import manifold3d as m3
 
-    solids = [solid_of(body) for body in bodies]
+    grid = 2.0 ** np.floor(np.log2(reach))
+    solids = [solid_of(_on_grid(body, grid)) for body in bodies]
     union = m3.Manifold.batch_boolean(solids, m3.OpType.Add)
     before = sum(solid.volume() for solid in solids)
     if union.num_tri() == sum(s.num_tri() for s in solids) and abs(union.volume() - before) <= 1e-9 * before:
@@ -191,6 +196,13 @@ def subtract(surface: Surface, others: list[Surface]) -> Surface:
 def above(surface: Surface, z_mm: float) -> Surface:
     """What of a closed surface lies above a height, without faces where that is nothing."""
     return surface_of(solid_of(surface).trim_by_plane((0.0, 0.0, 1.0), z_mm))
+
+
+def _on_grid(body: Surface, grid: float) -> Surface:
+    """A closed surface with its corners on a grid; as it is where that opens it or turns it inside out."""
+    snapped = merge_vertices(Surface(np.round(body.vertices / grid) * grid, body.faces))
+    closed = len(snapped.faces) and not len(edges_of(snapped.faces).unbalanced)
+    return snapped if closed and (edges_of(snapped.faces).counts == 2).all() else body
 
 
 def surface_of(solid: "m3.Manifold") -> Surface:

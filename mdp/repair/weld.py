@@ -1,5 +1,7 @@
 """Weld: coincident vertices become one, exactly first, then along open edges within a small distance."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from mdp.formats.surface import Surface
@@ -40,6 +42,49 @@ def merge_rim_vertices(surface: Surface, distance: float) -> Surface:
         return surface
     merged = connected_components(len(surface.vertices), *(np.concatenate(side) for side in zip(*near, strict=True)))
     return drop_unused_vertices(Surface(surface.vertices, drop_collapsed_faces(merged[surface.faces])))
+
+
+def split_rim_edges(surface: Surface, distance: float) -> Surface:
+    """The surface with its open edges split at the vertices of other open edges that lie within the distance of them.
+
+    Faces that share an edge in space but not its corners, as those of CAD files, match corner by corner then.
+    """
+    while True:
+        edges = edges_of(surface.faces)
+        rim = np.flatnonzero(edges.counts[edges.edge] % 2 == 1)
+        vertices = np.unique(np.concatenate([edges.starts[rim], edges.ends[rim]]))
+        vertices = vertices[np.argsort(surface.vertices[vertices] @ SKEW, kind="stable")]
+        along = surface.vertices[vertices] @ SKEW
+        split: dict[int, list[tuple[int, int, int]]] = {}
+        for half_edge in rim.tolist():
+            if half_edge // 3 not in split:  # one edge of a face at a time
+                start, end = int(edges.starts[half_edge]), int(edges.ends[half_edge])
+                low, high = np.sort(surface.vertices[[start, end]] @ SKEW).tolist()
+                near = vertices[slice(*np.searchsorted(along, (low - distance, high + distance)))]
+                apex = int(surface.faces[half_edge // 3, (half_edge + 2) % 3])
+                between = _between(surface, start, end, near[~np.isin(near, (start, end, apex))], distance)
+                chain = [start, *between, end]
+                if between:
+                    split[half_edge // 3] = [(a, b, apex) for a, b in pairwise(chain)]
+        if not split:
+            return surface
+        whole = np.ones(len(surface.faces), dtype=bool)
+        whole[list(split)] = False
+        pieces = np.array([piece for fan in split.values() for piece in fan], dtype=np.int64)
+        surface = Surface(surface.vertices, np.concatenate([surface.faces[whole], pieces]))
+
+
+def _between(surface: Surface, start: int, end: int, near: Indices, distance: float) -> list[int]:
+    """The vertices within the distance of an edge and farther than that from its ends, in their order along it."""
+    origin, way = surface.vertices[start], surface.vertices[end] - surface.vertices[start]
+    length = float(np.linalg.norm(way))
+    if length <= 2.0 * distance:
+        return []
+    steps = (surface.vertices[near] - origin) @ way / length
+    away = np.linalg.norm(surface.vertices[near] - origin - np.outer(steps, way / length), axis=1)
+    on_edge = np.flatnonzero((away <= distance) & (steps > distance) & (steps < length - distance))
+    ordered: list[int] = near[on_edge[np.argsort(steps[on_edge], kind="stable")]].tolist()
+    return ordered
 
 
 def drop_collapsed_faces(faces: Indices) -> Indices:

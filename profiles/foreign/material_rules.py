@@ -51,7 +51,7 @@ def _override(own: str, convert: Convert = number) -> Convert:
 
 def _advance(config: Config, key: str) -> Converted:
     """Pressure advance out of a filament's G-code, where a line says nothing else."""
-    blocks = (config.text(key) or "").strip('"').replace("\\n", "\n").splitlines()
+    blocks = (config.text(key) or "").strip('"').replace("\\n", "\n").split("\n")
     found = [match[1] for line in blocks if (match := ADVANCE.match(line.split(";")[0].strip()))]
     if found:
         return Value(float(found[-1]), "out of the filament's G-code")

@@ -1,11 +1,15 @@
 """PrusaSlicer's and SuperSlicer's files: config.ini, bundles of presets that inherit, and what stands at the end of G-code.
 
 A bundle's sections are [print:NAME], [filament:NAME], [printer:NAME]; `inherits = A; B` takes A, then B over it, and names in
-asterisks are parts that no one chooses (PrusaSlicer, src/libslic3r/PresetBundle.cpp).
+asterisks are parts that no one chooses (PrusaSlicer, src/libslic3r/PresetBundle.cpp). PrusaSlicer 3 writes its settings into
+G-code twice: as JSON, and as older versions read them. The latter have the default of each setting that has moved from the
+printer to the print, such as retraction, so the JSON counts.
 """
 
+import json
 import re
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from profiles.errors import ProfileError
 from profiles.foreign.config import Config, Entry, width_of_nozzle
@@ -18,6 +22,9 @@ OF_SUPERSLICER = frozenset({"extrusion_spacing", "perimeter_extrusion_spacing", 
 OF_NOZZLE = ("extrusion_width", "min_layer_height", "max_layer_height")
 FLOWS = ("bridge_flow_ratio", "over_bridge_flow_ratio")
 SHOWN = 8  # presets that a sentence names
+JSON_BLOCK = re.compile(r"^; prusaslicer_json_config = begin\r?\n(.*?)^; prusaslicer_json_config = ", re.MULTILINE | re.DOTALL)
+BLOCKS = frozenset({"prusaslicer_config", "prusaslicer_json_config"})  # that begin and end like settings
+JSON_GROUPS = ("printer_settings", "print_settings", "toolprint_settings", "filament_settings")  # the last has a key's value
 
 Presets = dict[str, dict[str, dict[str, str]]]  # kind, name, key
 
@@ -36,13 +43,45 @@ def read_settings(lines: list[str], program: str, chosen: Mapping[str, str]) -> 
 
 
 def gcode_settings(text: str) -> dict[str, str]:
-    """The settings at the end of a G-code file: `; key = value`; empty where it has none."""
-    found: dict[str, str] = {}
-    for line in text.splitlines():
-        match = re.fullmatch(r";\s*([A-Za-z0-9_]+)\s*=\s*(.*)", line)
-        if match:
-            found[match[1]] = match[2].strip()
-    return found
+    """The settings at the end of a G-code file: `; key = value`, and those of its JSON; empty where it has none.
+
+    Raises ProfileError for JSON that is none.
+    """
+    settings: dict[str, str] = {}
+    for line in text.split("\n"):
+        match = re.fullmatch(r";\s*([A-Za-z0-9_]+)\s*=\s*(.*)", line.rstrip("\r"))
+        if match and match[1] not in BLOCKS:
+            settings[match[1]] = match[2].strip()
+    block = JSON_BLOCK.search(text)
+    return settings if block is None else settings | _json_settings(block[1])
+
+
+def _json_settings(block: str) -> dict[str, str]:
+    """The settings of the first tool in PrusaSlicer 3's JSON, each line of which is a comment. Raises ProfileError."""
+    try:
+        document = json.loads("\n".join(line.removeprefix(";") for line in block.split("\n")))
+        groups = [document["presets"].get(group, {}) for group in JSON_GROUPS]
+        *of_print, of_filament = [{key: _json_text(value) for key, value in group.items()} for group in groups]
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise ProfileError(
+            f"prusaslicer_json_config is not as PrusaSlicer 3 writes it ({type(error).__name__}: {error})"
+        ) from None
+    settings: dict[str, str] = {}
+    for group in of_print:
+        settings |= group
+    # A filament has a key of the print only where it overrides it, which older versions call filament_KEY.
+    return settings | {f"filament_{key}" if key in settings else key: text for key, text in of_filament.items()}
+
+
+def _json_text(value: Any) -> str:
+    """A value of PrusaSlicer 3's JSON as its config.ini has it; of a list the first."""
+    if isinstance(value, list):
+        return _json_text(value[0]) if value else ""
+    if isinstance(value, dict):
+        return f"{value['value']:g}{'%' if value['is_percent'] else ''}"
+    if value is None:
+        return "nil"
+    return str(int(value)) if isinstance(value, bool) else f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def of_gcode(settings: Mapping[str, str]) -> Config:

@@ -32,12 +32,15 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     text = content.decode("utf-8-sig", errors="replace")
     if text.lstrip().startswith("{"):
         return orcaslicer.read_preset(file, orcaslicer.read_json(file))
-    commented = prusaslicer.gcode_settings(text)
+    try:
+        commented = prusaslicer.gcode_settings(text)
+    except ProfileError as error:
+        raise ProfileError(f"profile {file}: {error}") from None
     if ORCA_KEYS & commented.keys():
         return orcaslicer.of_values(commented)
     if PRUSA_KEYS & commented.keys():
         return prusaslicer.of_gcode(commented)
-    config = prusaslicer.read_settings(text.splitlines(), "PrusaSlicer", presets or {})
+    config = prusaslicer.read_settings(text.split("\n"), "PrusaSlicer", presets or {})
     if not PRUSA_KEYS & config.entries.keys():
         raise ProfileError(
             f"profile {file}: holds no settings; a config.ini, a bundle or a G-code file of PrusaSlicer or SuperSlicer, a JSON "

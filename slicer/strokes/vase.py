@@ -66,9 +66,9 @@ def _is_tip(outline: Polygons, below: Polygons, half_mm: float) -> bool:
 
 def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
     """(n, 2) the wall's centreline, closed; half_mm: half of its width."""
-    loops, holes = contours(offset(outline, -half_mm)), sum(len(loop) > 2 for loop in outline.to_polygons())
-    if holes != 1 or len(loops) != 1:
-        instead = f"{holes} outlines" if holes != 1 else "a place too narrow for a wall"
+    loops, outlines = contours(offset(outline, -half_mm)), sum(len(loop) > 2 for loop in outline.to_polygons())
+    if outlines != 1 or len(loops) != 1:
+        instead = f"{outlines or 'no'} outlines" if outlines != 1 else "a place too narrow for a wall"
         raise SliceError(
             f"process.spiral_vase needs one outline without holes in every layer: the layer at {z_mm:.2f} mm has {instead}"
         )

@@ -110,3 +110,32 @@ def test_a_mesh_of_far_more_faces_than_a_print_shows_is_told_what_to_reduce() ->
     (sentence,) = too_fine(Mesh(*plane))
     assert sentence.startswith(f"{MANY_FACES + 1} faces")
     assert "reduce its faces" in sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "size_mm", "sentence"),
+    [
+        ("a.stl", 3.0, "its longest side is 3 mm: if its coordinates are inches, give --set process.scale=25.4"),
+        ("a.obj", 9.9, "its longest side is 9.9 mm: if its coordinates are inches, give --set process.scale=25.4"),
+        ("a.ply", 10.0, None),
+        ("a.3mf", 3.0, None),
+        (
+            "a.glb",
+            1.5,
+            "its longest side is 1.5 mm: if its coordinates are metres with y up, as glTF has them, "
+            "give --set process.scale=1000 and --set process.rotate_deg=[90,0,0]",
+        ),
+        (
+            "a.glb",
+            6.0,
+            "its longest side is 6 mm: metres with y up, as glTF has them, would be more than 2000 mm; "
+            "for a tenth of that give --set process.scale=100 and --set process.rotate_deg=[90,0,0]",
+        ),
+    ],
+)
+def test_a_small_model_is_told_with_the_scale_that_may_be_meant(
+    tmp_path: Path, name: str, size_mm: float, sentence: str | None
+) -> None:
+    file = files.written(tmp_path / name, files.placed(size_mm, 1.0, 1.0))
+    assert read_mesh(file)[1] == (() if sentence is None else (sentence,))
+    assert read_mesh(file, 25.4)[1] == ()

@@ -32,7 +32,7 @@ from mdp.batch.rows import append_row, read_rows, write_rows, writing_alone
 from mdp.formats.readers import READERS
 from mdp.kernels.workers import CallError
 from mdp.ranking.ranker import ranker_named
-from profiles.errors import BatchError
+from profiles.errors import BatchError, counted
 
 LOCK = "batch.lock"
 NO_FILES = "estimate"  # makes none
@@ -156,7 +156,7 @@ def summary(rows: Iterable[Row], table: Path) -> str:
     """What came of all models, what printing them takes, and why the others are not done."""
     rows = list(rows)
     counts = Counter(row.status for row in rows)
-    text = f"{len(rows)} models: " + ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
+    text = f"{counted(len(rows), 'model')}: " + ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     done = [row for row in rows if row.status == DONE]
     if done:
         filament_m = sum(row.filament_mm for row in done) / 1000.0

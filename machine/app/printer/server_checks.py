@@ -91,7 +91,7 @@ def lacking_macros(greeting: ServerIdentity, lines: Iterable[str]) -> list[str]:
 
 def _block_lines(machine: Machine) -> list[str]:
     blocks = machine.gcode
-    return [line for block in (blocks.start, blocks.before_part, blocks.after_part, blocks.end) for line in block.splitlines()]
+    return [line for block in (blocks.start, blocks.before_part, blocks.after_part, blocks.end) for line in block.split("\n")]
 
 
 def _unknown_macros(names: list[str], caller: str) -> str:

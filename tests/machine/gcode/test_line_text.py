@@ -381,3 +381,8 @@ def test_a_start_block_is_written_without_remarks_and_with_its_indents() -> None
     block = "G28 (home, then G1 Y50)\n(only words)\nif true\n  M400 ; (wait)\n"
     assert fill_block(block, "start", {}, dialect_of(MACHINES["reprapfirmware"])) == ["G28", "if true", "  M400 ; (wait)"]
     assert fill_block("(MSG, hello)\nG28 (home)", "start", {}, dialects()["linuxcnc"]) == ["(MSG, hello)", "G28 (home)"]
+
+
+def test_only_a_line_s_end_ends_a_comment_of_a_start_block() -> None:
+    block = "G28 ; fa\u00e7ade\u2028G1 Z-5 \x85G1 Z-6\nM400"
+    assert fill_block(block, "start", {}, dialect_of(MACHINES["reprapfirmware"])) == [block.split("\n")[0], "M400"]

@@ -1,13 +1,22 @@
 """CAD files: solids of planes and curves become triangles in mm."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mdp.formats.cad import _assembly
+from mdp.formats.surface import Surface
+from mdp.mesh import Mesh
 from mdp.read import read_mesh
+from mdp.repair.repair import repair
+from profiles.errors import MeshError
+from tests.checks import assert_closed
+from tests.mdp import files
 from tests.mdp.files import refusal, save
+from tests.mdp.iges_file import iges_cylinder
 from tests.mdp.step_file import Corner, painted, step_box, step_cylinder, step_prism
 
 
@@ -19,6 +28,10 @@ def test_a_step_file_is_read_in_the_unit_that_it_names_with_z_up(tmp_path: Path,
     assert notes == ()
     assert mesh.bounds_mm == pytest.approx(np.array([[-10, -15, 0], [10, 15, 40]]), abs=1e-5)
     assert mesh.volume_mm3 == pytest.approx(24_000, rel=1e-6)
+
+
+def boxed(mesh: Mesh) -> Surface:
+    return Surface(mesh.vertices, mesh.faces.astype(np.int64))
 
 
 def ring(corners: int, outer: float, inner: float | None = None) -> list[Corner]:
@@ -77,6 +90,27 @@ def test_a_cylinder_has_its_volume_but_for_its_corners(tmp_path: Path, radius: f
     mesh, _ = read_mesh(save(tmp_path / "cylinder.step", step_cylinder(radius, 20.0).encode()))
     whole_mm3 = np.pi * radius**2 * 20.0
     assert (1.0 - 0.17**2 / 6.0) * whole_mm3 < mesh.volume_mm3 < whole_mm3
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+@pytest.mark.parametrize(("unit", "unit_mm"), [("MM", 1.0), ("IN", 25.4)])
+def test_the_faces_of_an_iges_solid_are_sewn_and_read_in_mm(tmp_path: Path, unit: str, unit_mm: float, scale: float) -> None:
+    pytest.importorskip("cascadio")
+    file = save(tmp_path / "cylinder.igs", iges_cylinder(10.0 / unit_mm, 20.0 / unit_mm, unit).encode())
+    mesh, _ = read_mesh(file, scale)
+    assert np.ptp(mesh.bounds_mm, axis=0) / scale == pytest.approx([20.0, 20.0, 20.0], abs=0.02)
+    assert mesh.volume_mm3 / scale**3 == pytest.approx(np.pi * 100.0 * 20.0, rel=0.17**2 / 6.0)
+    assert_closed(mesh)
+
+
+def test_an_assembly_is_told_by_the_names_of_its_parts_and_so_is_one_that_is_open() -> None:
+    boxes = [
+        replace(boxed(files.placed(10, 10, 10, (20.0 * k, 0, 0))), name=name) for k, name in enumerate(("nut", "nut", "rod"))
+    ]
+    assert _assembly(boxes) == ("is an assembly of 3 parts, printed as one model: 2 x nut, rod",)
+    open_one = boxed(files.without(files.placed(10, 10, 10, (90.0, 0, 0)), 0, 1, 2, 3))
+    with pytest.raises(MeshError, match=r"^its part 'lid' is not closed"):
+        repair([*boxes, replace(open_one, name="lid")])
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 0.95])

@@ -88,4 +88,16 @@ def test_a_scene_that_cannot_be_read_is_refused(tmp_path: Path, changes: dict[st
 )
 def test_strips_and_compressed_geometry_are_refused_and_not_guessed(tmp_path: Path, primitive: object) -> None:
     sentence = refusal(save(tmp_path / "a.glb", _edited(meshes=[{"primitives": [primitive]}])))
-    assert sentence == "holds lines, strips or compressed geometry; only plain triangles are read"
+    assert sentence == "holds strips or fans of triangles or compressed geometry; only plain triangles are read"
+
+
+@pytest.mark.parametrize("mode", [0, 1, 3])
+def test_points_and_lines_beside_a_solid_are_left_out_with_a_note(tmp_path: Path, mode: int) -> None:
+    solid, line = ({"attributes": {"POSITION": 1}, "indices": 0}, {"attributes": {"POSITION": 1}, "mode": mode})
+    mesh, notes = read_mesh(save(tmp_path / "a.glb", _edited(meshes=[{"primitives": [solid, line]}])))
+    assert mesh.volume_mm3 == pytest.approx(1000.0)
+    assert notes == ("left out points and lines in one of its parts: only solids and faces are printed",)
+    assert (
+        refusal(save(tmp_path / "b.glb", _edited(meshes=[{"primitives": [line]}])))
+        == "its scene places no mesh but points and lines"
+    )

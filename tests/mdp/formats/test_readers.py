@@ -32,7 +32,7 @@ def outcome(path: Path) -> Mesh | None:
 @given(suffix=st.sampled_from(FORMATS), x=SIZES, y=SIZES, z=SIZES)
 def test_a_box_in_any_format_comes_back_with_its_volume(tmp_path: Path, suffix: str, x: float, y: float, z: float) -> None:
     mesh, notes = read_mesh(files.written(tmp_path / f"box{suffix}", files.placed(x, y, z, (3.0, -4.0, 5.0))))
-    assert notes == ()
+    assert [note for note in notes if not note.startswith("its longest side is")] == []
     assert mesh.volume_mm3 == pytest.approx(x * y * z, rel=1e-4)
     assert mesh.bounds_mm == pytest.approx(np.array([[-x / 2, -y / 2, 0], [x / 2, y / 2, z]]), abs=1e-4)
 
@@ -82,6 +82,12 @@ def test_a_coordinate_that_is_no_number_is_refused(tmp_path: Path) -> None:
     assert "not a number" in refusal(save(tmp_path / "b.off", b"OFF\n1 0 0\n1 2 three\n"))
 
 
+def test_a_comment_of_an_off_file_may_hold_any_bytes(tmp_path: Path) -> None:
+    content = files.off(tee()).replace(b"# made here", b"# fait \x85 \x1c ici")
+    mesh, _ = read_mesh(save(tmp_path / "a.off", content))
+    assert mesh.volume_mm3 == pytest.approx(tee().volume_mm3)
+
+
 @pytest.mark.parametrize("suffix", [".off", ".obj", ".ply", ".3mf", ".glb"])
 def test_an_index_out_of_range_is_refused(tmp_path: Path, suffix: str) -> None:
     wrong = Mesh(tee().vertices, np.where(tee().faces == 5, 99, tee().faces))
@@ -95,5 +101,5 @@ def test_absurd_counts_are_refused_before_anything_is_allocated(tmp_path: Path) 
     content = files.glb(tee()).replace(b'"count": 16', b'"count": 99')
     assert "an accessor of 99 rows lies outside" in refusal(save(tmp_path / "a.glb", content))
     huge = bytearray(files.stl(tee()))
-    huge[80:84] = struct.pack("<I", 2**32 - 1)
-    assert "of the 4294967295 facets" in refusal(save(tmp_path / "a.stl", bytes(huge)))
+    huge[80:84] = struct.pack("<I", 2**32 - 2)
+    assert "of the 4294967294 facets" in refusal(save(tmp_path / "a.stl", bytes(huge)))

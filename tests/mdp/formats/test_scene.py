@@ -104,3 +104,12 @@ def test_a_unit_or_an_axis_that_is_none_is_refused(tmp_path: Path, asset: str, s
 def test_without_its_library_collada_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "collada", None)
     assert refusal(save(tmp_path / "a.dae", dae(""))) == "reading .dae files needs collada: pip install 'tiltprint[dae]'"
+
+
+def test_without_the_extra_the_sentence_says_what_a_dae_file_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(*given: object, **more: object) -> None:
+        raise ImportError("no loader")  # with no name, as trimesh raises it
+
+    monkeypatch.setattr("trimesh.load_scene", missing)
+    sentence = refusal(save(tmp_path / "a.dae", b"<COLLADA/>"))
+    assert sentence == "reading .dae files needs pycollada: pip install 'tiltprint[dae]'"

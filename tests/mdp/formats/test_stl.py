@@ -26,6 +26,21 @@ def test_a_truncated_stl_says_how_many_facets_it_holds(tmp_path: Path) -> None:
     assert "holds 3 of the 28 facets" in refusal(save(tmp_path / "a.stl", content[: 84 + 3 * 50 + 20]))
 
 
+@pytest.mark.parametrize("count", [b"\0\0\0\0", b"\xff\xff\xff\xff"])
+def test_the_size_of_a_binary_stl_tells_how_many_facets_it_has_where_its_count_does_not(tmp_path: Path, count: bytes) -> None:
+    content = files.stl(tee())
+    mesh, _ = read_mesh(save(tmp_path / "a.stl", content[:80] + count + content[84:]))
+    assert mesh.volume_mm3 == pytest.approx(tee().volume_mm3)
+    assert "holds 3 of the 4 facets" in refusal(save(tmp_path / "b.stl", content[:80] + count + content[84 : 84 + 3 * 50 + 20]))
+
+
+@pytest.mark.parametrize("line_end", [b"\n", b"\r", b"\r\n"])
+def test_words_behind_the_end_of_a_loop_are_left_alone(tmp_path: Path, line_end: bytes) -> None:
+    content = files.ascii_stl(tee()).replace(b"endloop\n", b"endloop foo bar \n", 5).replace(b"\n", line_end)
+    mesh, notes = read_mesh(save(tmp_path / "a.stl", content))
+    assert (mesh.volume_mm3, notes) == (pytest.approx(tee().volume_mm3), ())
+
+
 def test_a_text_file_called_stl_is_refused(tmp_path: Path) -> None:
     assert "is not an STL file" in refusal(save(tmp_path / "a.stl", b"This is a letter about something solid.\n" * 5))
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mdp.formats.surface import Surface
-from mdp.mesh import NO_COLOUR, Mesh, colour_text, parse_colour
+from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text, parse_colour
 from mdp.read import read_mesh
-from mdp.repair.colours import carry_colours
+from mdp.repair.colours import SAME_DIRECTION, _pieces, carry_colours
 from mdp.repair.repair import repair
 from tests.mdp import files
 
@@ -75,3 +75,27 @@ def test_a_mesh_that_is_scaled_and_turned_keeps_its_colours(tmp_path: Path) -> N
     turned = mesh.transform(np.eye(3))
     assert turned.colours is not None
     assert turned.colours.tolist() == mesh.colours.tolist()
+
+
+def test_pieces_of_painted_faces_are_found_as_by_trying_all_of_them() -> None:
+    rng = np.random.default_rng(7)
+    painted = rng.uniform(-50.0, 50.0, (120, 3, 3)) * rng.choice([0.02, 0.2, 1.0], (120, 1, 1))
+    painted += rng.uniform(-50.0, 50.0, (120, 1, 3))
+    painted[:60, :, 2] = np.round(painted[:60, :1, 2])  # many in parallel planes
+    shares = rng.dirichlet([1.0, 1.0, 1.0], (120, 3))
+    pieces = np.concatenate([np.einsum("nij,njx->nix", shares, painted), rng.uniform(-50.0, 50.0, (40, 3, 3))])
+    colours = rng.permutation(120)
+    carried = _pieces(painted, colours, pieces)
+    on = [{colours[k] for k in range(120) if lies_on(piece, painted[k])} for piece in pieces]
+    assert all(colour in found or (colour == NO_COLOUR and not found) for colour, found in zip(carried, on, strict=True))
+    assert (carried[:120] == colours).mean() > 0.9
+
+
+def lies_on(piece: Floats, triangle: Floats) -> bool:
+    """Whether a piece's middle lies on a triangle of about its direction: barycentric coordinates by least squares."""
+    sides, place = (triangle[1:] - triangle[0]).T, piece.mean(axis=0) - triangle[0]
+    shares, *_ = np.linalg.lstsq(sides, place, rcond=None)
+    normals = [np.cross(each[1] - each[0], each[2] - each[0]) for each in (piece, triangle)]
+    cosine = abs(normals[0] @ normals[1]) / np.linalg.norm(normals[0]) / np.linalg.norm(normals[1])
+    away = np.linalg.norm(sides @ shares - place)
+    return bool(away < 0.02 and shares.min() > -1e-6 and shares.sum() < 1.0 + 1e-6 and cosine > SAME_DIRECTION)

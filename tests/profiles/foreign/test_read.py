@@ -81,6 +81,51 @@ def test_the_settings_at_the_end_of_gcode_are_read(tmp_path: Path) -> None:
     assert (config.number("perimeters"), config.number("temperature")) == (4, 211)
 
 
+def gcode_of_prusaslicer_3(presets: object) -> str:
+    """The end of a G-code file with settings twice; the older form has the retraction that is the default."""
+    lines = json.dumps({"general": {"producer": "PrusaSlicer"}, "presets": presets, "stats": None}, indent=2).split("\n")
+    block = "".join(f"; {line}\n" for line in lines)
+    return (
+        f"G1 X1 E1\n; prusaslicer_json_config = begin\n{block};\n; prusaslicer_json_config = end\n\n"
+        "; prusaslicer_config = begin\n; layer_height = 0.2\n; nozzle_diameter = 0.4\n; retract_length = 2\n"
+        "; prusaslicer_config = end\n"
+    )
+
+
+def test_the_json_of_prusaslicer_3_counts_for_the_first_tool_and_filament_overrides_keep_their_older_name(tmp_path: Path) -> None:
+    presets = {
+        "print_settings": {
+            "fill_density": {"value": 15.0, "is_percent": True},
+            "perimeter_extrusion_width": {"value": 0.45, "is_percent": False},
+            "support_material": "enforcers_only",
+            "ironing": False,
+            "retract_length": 2.5,
+            "retract_lift": 0.2,
+        },
+        "toolprint_settings": {"seam_position": ["rear", "aligned"], "perimeters": [3, 2]},
+        "printer_settings": {"end_gcode": "M104 S0\nperimeters = 9"},
+        "filament_settings": {"temperature": [225, 250], "idle_temperature": [None], "retract_lift": [0.6, None]},
+    }
+    config = read_config(written(tmp_path, "print.gcode", gcode_of_prusaslicer_3(presets)))
+    numbers = ("layer_height", "retract_length", "retract_lift", "filament_retract_lift", "perimeters", "temperature")
+    assert [config.number(key) for key in numbers] == [0.2, 2.5, 0.2, 0.6, 3, 225]
+    assert (config.share("fill_density"), config.number("perimeter_extrusion_width")) == (0.15, 0.45)
+    assert (config.text("support_material"), config.flag("ironing"), config.text("seam_position")) == (
+        "enforcers_only",
+        False,
+        "rear",
+    )
+    assert config.text("idle_temperature") is None
+    assert "prusaslicer_json_config" not in config.entries
+
+
+def test_json_settings_that_are_cut_off_are_refused(tmp_path: Path) -> None:
+    whole = gcode_of_prusaslicer_3({"print_settings": {"layer_height": 0.2}})
+    file = written(tmp_path, "print.gcode", whole.replace(';   "presets"', '; } "presets"'))
+    with pytest.raises(ProfileError, match=r"print\.gcode: prusaslicer_json_config is not as PrusaSlicer 3 writes it"):
+        read_config(file)
+
+
 def test_a_preset_of_orcaslicer_has_what_the_files_beside_it_say(tmp_path: Path) -> None:
     parent = {"type": "process", "name": "base", "wall_loops": "2", "line_width": "110%", "nozzle_diameter": ["0.4"]}
     written(tmp_path, "base.json", json.dumps(parent))

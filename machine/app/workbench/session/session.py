@@ -47,6 +47,8 @@ from mdp.read import MANY_FACES
 from profiles.errors import MeshError, PlanError
 from profiles.profile import Profile
 
+READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a model is read
+
 
 @dataclass(frozen=True)
 class OpenBench:
@@ -136,25 +138,45 @@ class Session(SessionBase):
         for tasks in (self.quick, self.hand, self.long):
             self.start(tasks.warm())
 
-    async def open_model(self, path: Path, name: str) -> None:
-        """Put the model of a file on the bench. Raises UserError as the command line tells it; where its size is none that a
-        printer makes, a page is asked for its unit."""
+    async def open_model(self, path: Path, name: str, anew: bool = True) -> None:
+        """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it.
+
+        Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
+        """
         self.hear_name(name)
         self.hear_name(str(path))
         self.readiness.load()
         if self._ranking is not None and self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self._ranking.cancel()  # it would be waited for
         with self.waiting(f"reading {name}"):
-            read_for, model = None, None
-            while model is None or _reads(self.bench.profile) != read_for:  # another scale may be set meanwhile
-                read_for = _reads(self.bench.profile)
+            gone, model = self._set_for_another(name) if anew else frozenset[str](), None
+            bench = self._bench_without(gone)
+            read_for: tuple[object, ...] = ()
+            while model is None or _reads(bench.profile) != read_for:  # another scale may be set meanwhile
+                read_for = _reads(bench.profile)
                 try:
-                    model = await self._read(path, name, self.bench.profile)
+                    model = await self._read(path, name, bench.profile)
                 except _UnscaledError as error:
                     self.unscaled = OfUnknownUnit(asking.get(), path, name, error.unscaled.units)
                     raise MeshError(error.unscaled.question if asking.get() else error.unscaled.sentence) from None
-            self.do(f"open {name}", with_model(self.bench, model))
+                bench = self._bench_without(gone)
+            self.do(f"open {name}", with_model(bench, model))
         self._begin_ranking(model)
+
+    def _set_for_another(self, name: str) -> frozenset[str]:
+        """What is set for the reading of a model on the bench that has another name."""
+        model, settings = self.bench.model, self.bench.given.settings
+        if model is None or model.name == name:
+            return frozenset()
+        return frozenset(setting for setting in settings if setting.partition("=")[0].strip() in READ_BY)
+
+    def _bench_without(self, gone: frozenset[str]) -> Bench:
+        """The bench without some of its settings."""
+        bench = self.bench
+        if not gone & set(bench.given.settings):
+            return bench
+        given = replace(bench.given, settings=tuple(setting for setting in bench.given.settings if setting not in gone))
+        return with_profile(bench, given, profile_as_given(given, bench.profile))
 
     async def open_in_unit(self, unit: object) -> None:
         """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
@@ -163,8 +185,9 @@ class Session(SessionBase):
             raise PlanError(
                 f"unit is {unit!r}: {', '.join(waits.units) if waits else 'nothing, for no model waits for one,'} is allowed"
             )
-        given = with_typed(bench.given, "process.scale", f"{waits.units[unit]:g}", bench.profile)
-        scaled = with_profile(bench, given, profile_as_given(given, bench.profile))
+        unscaled = self._bench_without(self._set_for_another(waits.name))
+        given = with_typed(unscaled.given, "process.scale", f"{waits.units[unit]:g}", unscaled.profile)
+        scaled = with_profile(unscaled, given, profile_as_given(given, unscaled.profile))
         with self.waiting(f"reading {waits.name}"):
             model = await self._read(waits.path, waits.name, scaled.profile)
         if self.bench is not bench:
@@ -191,7 +214,7 @@ class Session(SessionBase):
             path = locate(work.name) if work.model is None else self.received.new_file(work.name)
             if work.model is not None:
                 await asyncio.to_thread(shutil.copyfile, work.model, path)
-            await self.open_model(path, work.name)
+            await self.open_model(path, work.name, anew=False)
             if work.plan is not None:
                 await self.open_plan(work.plan)
             bench = with_rotation(self.bench, work.rotation)

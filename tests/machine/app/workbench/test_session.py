@@ -177,6 +177,23 @@ def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
     assert read.name == "b at 2"
 
 
+def test_a_scale_that_was_set_for_a_model_is_not_that_of_the_next_one() -> None:
+    async def work(session: Session) -> None:
+        async def read(task: str, *given: Any, **more: Any) -> Any:
+            return model(f"{given[1]} at {given[2].process.scale:g}") if task == "read_model" else ()
+
+        session.quick.run = read  # type: ignore[method-assign]
+        set_for_one = Given(settings=("process.walls=4", "process.scale=25.4", "process.rotate_deg=[90,0,0]"))
+        session.do("set", with_profile(session.bench, set_for_one, load(settings=set_for_one.settings)))
+        await session.open_model(Path("b"), "b")
+
+    bench = when_done(work).bench
+    assert bench.model is not None
+    assert bench.model.name == "b at 1"
+    assert (bench.given.settings, bench.profile.process.walls) == (("process.walls=4",), 4)
+    assert (bench.profile.process.scale, bench.profile.process.rotate_deg) == (1.0, (0, 0, 0))
+
+
 def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_told_later() -> None:
     best = FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0)
 

@@ -40,14 +40,19 @@ export function modelPanel() {
   subscribe(tellModel);
 }
 
-const TINY_MM = 5, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a model that is smaller is rarely meant so; the largest that is printed
+const TINY_MM = 10, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a model that is smaller is rarely meant so; the largest that is printed
+const GLTF = /\.(glb|gltf)$/i; // its metres have y up
 
 /** Asks for the unit of a model that is very small. */
 function tellTiny({ model }) {
-  const most = Math.max(...model.size_mm), words = Object.keys(UNITS).filter((unit) => most * UNITS[unit] <= MOST_MM);
+  const most = Math.max(...model.size_mm), known = GLTF.test(model.name) ? ["metres"] : Object.keys(UNITS);
+  const words = known.filter((unit) => most * UNITS[unit] <= MOST_MM);
   $("tiny").hidden = most >= TINY_MM || !words.length;
   $("tiny-told").textContent = `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?`;
-  unitButtons($("tiny-units"), words, (unit) => send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) }));
+  unitButtons($("tiny-units"), words, (unit) => {
+    if (GLTF.test(model.name)) send({ do: "set", key: "process.rotate_deg", value: "[90, 0, 0]" });
+    send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) });
+  });
 }
 
 const scaleBy = (factor) => String(Number((store.state.scale * factor).toPrecision(9)));
