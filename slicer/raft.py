@@ -1,4 +1,4 @@
-"""Raft: what is printed first under a model and its support, so that both stick to the plate, and is peeled off.
+"""Raft: layers printed under a model and its support, which make both stick to the plate and are peeled off afterwards.
 
 Its first layer is sparse enough to come off the plate and reaches farthest, the layers above it are sparse, and the upper half
 of the raft, but never the first layer, is as dense as the interface of support. The model begins a small gap above the raft. Its

@@ -1,4 +1,4 @@
-"""Auxiliary beads: what is printed for a part and taken off it: support, a pedestal, skirt and brim.
+"""Auxiliary beads, which are printed for a part and removed from it: support, a pedestal, skirt and brim.
 
 Support has outlines, sparse lines that stand on each other, and dense lines next to the part. A pedestal lifts a model off the
 platform. It is printed like a raft, sparse under a closed roof, and breaks away: the roof ends a small gap below the model's
@@ -103,8 +103,10 @@ def support_beads(
 
 
 def _joined(dense: Polygons, radius_mm: float, width_mm: float) -> Polygons:
-    """Dense places with what lies between them and is narrower than sparse lines are apart, twice the radius: lines that fill
-    one place lie beside each other, those of many small ones hang between the sparse lines."""
+    """Dense areas with gaps closed that are narrower than twice radius_mm, the distance between sparse lines.
+
+    Lines that fill one large area lie beside each other; lines of many small areas would hang between the sparse lines.
+    """
     if dense.num_contour() < 2:
         return dense
     joined = closing(dense, radius_mm)
@@ -188,8 +190,9 @@ def brim(
 ) -> list[Bead]:
     """The brim, outermost bead first so that it ends at the part; without a brim the skirt's loops.
 
-    footprint: all that the first layer prints; base: what of it the print stands on; plate: its outline, which no loop
-    leaves; top_mm: how high the print will be. A base that would tip over gets a brim of process.small_base_brim_mm.
+    footprint: the whole area that the first layer prints; base: the area of it on which the print stands; plate: the outline
+    of the plate, which no loop leaves; top_mm: height of the print. A base that would tip over gets a brim of
+    process.small_base_brim_mm.
     """
     spacing = spacing_mm(process.line_width_mm, height_mm)
     width = process.brim_mm

@@ -1,10 +1,10 @@
-"""Handed down: support of all parts together: what finds no ground above its base plane stands on support printed earlier.
+"""Handed-down support: support that finds no ground above its part's base plane stands on support printed with earlier parts.
 
 Every place over the platform lies above the base plane of some part and below those of all later ones (that of a limb counts
 beside the limb alone): there is just one part with which support can be printed there. So what a part's own support misses is
 handed down in three passes: upward, where support of each part may stand if that of the parts before it may; downward,
 from the last part to the first, the support itself, whose feet on a base plane become patches for the parts before (HandedDown);
-and upward again, what of it stands on what was really built.
+and upward again, to keep only the support that stands on support which is printed.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from slicer.support.support import Supports, find_missed, grow, stand, widen_foo
 AROUND_MM = 3.0  # support handed down may go so much farther aside than its lean takes it
 SHALLOW_MM = 1.2  # so far below a plane the middles of support that can come up to it lie
 DEEP_MM = 1.0  # support begins within this below a plane: as much as keeps a wall along a steep plane upright
-NEAR_MM = 0.35  # what ends nearer to a plane carries what begins on it: a step of a slope and the space beside a disc
+NEAR_MM = 0.35  # support that ends nearer to a plane carries support on it: a step of a slope and the space beside a disc
 STEP_MM = 0.15  # steps of a slope are joined over this
 
 
@@ -42,7 +42,7 @@ class Patch:
         return plane.shadow(self.places, layer) ^ plane.band(layer, -deep_mm, -self.gap_mm)
 
     def begins(self, plane: BasePlane, count: int) -> dict[int, Polygons]:
-        """By layers, of the lowest `count`, the places at which support of the patch has to begin there."""
+        """The areas in which support of the patch has to begin, by layer, among the lowest `count` layers."""
         deep_mm = self.gap_mm + DEEP_MM
         layers = plane.layers_near(self.places, deep_mm)
         begins = {layer: self.under(plane, layer, deep_mm) for layer in layers if layer < count}
@@ -78,10 +78,10 @@ def upper_side(areas: Sequence[Polygons], plane: BasePlane, window: Polygons, de
 class HandedDown:
     """Support that is printed with a part because no other can carry it.
 
-    sections: as high as it is of use; window: the places of the base plane that matter and that the axes reach; areas: of
-    the sections inside the box that matters; shut: where nothing may stand in the first layer; far_mm: how far from the origin
-    of the frame support reaches at most. bodies, contacts: of every layer what has grown, and where it begins; patches: what of
-    it needs support below its base. There are none of them as long as only the room for it is known.
+    sections: up to the highest layer that such support needs; window: the area of the base plane that it may use and that the
+    axes reach; areas: the reachable areas inside the box that it may use; shut: where nothing may stand in the first layer;
+    far_mm: the greatest distance of support from the frame's origin. bodies, contacts: one area per layer, all grown support and
+    where it begins; patches: its feet that need support below the base plane. All three are empty until support has grown.
     """
 
     sections: Sections
@@ -99,7 +99,7 @@ class HandedDown:
 
 
 def plan_supports(own: Sequence[Supports]) -> list[Supports]:
-    """The support of every part; own: of all parts in print order, each on its own."""
+    """The support of every part; own: the support of each part planned alone, in print order."""
     planned = list(own)
     if all(supports.unsupported_mm2 == 0.0 for supports in own[1:]):
         return planned
@@ -114,7 +114,7 @@ def plan_supports(own: Sequence[Supports]) -> list[Supports]:
 
 
 def _extents(own: Sequence[Supports]) -> dict[int, tuple[Polygons, float]]:
-    """The box of its base plane that handed-down support may need, and up to which height, of every part that may have any."""
+    """For each part that may print handed-down support, the box of its base plane for this and its height, mm."""
     lean = tan(radians(max(supports.sections.process.support_branch_angle_deg for supports in own)))
     boxes = [np.array([np.inf, np.inf, -np.inf, -np.inf]) for _ in own]
     tops = [0.0] * len(own)
@@ -242,7 +242,7 @@ def _own_placeable(room: HandedDown) -> Polygons:
 
 
 def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supports:
-    """A part's support with what of the handed-down one stands; earlier: what was built before it."""
+    """A part's support united with the handed-down support that stands; earlier: the support of the parts printed before it."""
     sections, areas, process = room.sections, room.areas, room.areas.process
     whole = replace(areas, sections=sections)
     if not sections.on_platform:
@@ -267,7 +267,7 @@ def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supp
 
 
 def _padded(places: Sequence[Polygons], count: int) -> list[Polygons]:
-    """Places of the lowest layers as those of so many layers."""
+    """Areas of the lowest layers, extended by empty ones to `count` layers."""
     return [*places, *[Polygons()] * (count - len(places))]
 
 

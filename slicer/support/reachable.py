@@ -30,7 +30,7 @@ MARGIN_MM = 0.08  # and grown by this more, which leaves space for simplified su
 FINE_MM = 0.005  # reachable places are simplified by this
 SPARE = 0.15  # share of the lean that reachable places keep in reserve, so that more than a point of the layer below is near
 SMOOTH_MM = 0.05  # support is simplified by this: its edges come from single faces, and nobody needs them
-SLIVER_MM = 0.02  # what is narrower than twice this and has no place has neighbours that do
+SLIVER_MM = 0.02  # an area narrower than twice this may be left out: its neighbours hold it
 SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
 LEAST_MM2 = 1e-5  # places smaller than this are rounding
 BEYOND = 0.75  # of the radius: how far from plastic the middle of a disc may stand; its inner beads then lie on the edge
@@ -44,11 +44,11 @@ LOW_MM = 0.05  # up to this height above the base plane is the cut face itself
 
 @dataclass(frozen=True, eq=False)
 class ReachableAreas:
-    """Where support of a part may stand; per layer, of as many of its lowest ones as are of use: the lean from the layer below,
-    mm, what is placeable, and what is reachable.
+    """Where support of a part may stand, for each of the lowest layers that may need it.
 
-    placeable: places of the ground beneath that a branch may end on: what is solid, grown by BEYOND of the radius. shut: for a
-    limb, where the head cannot print support.
+    lean_mm: how far a layer of support may lean beyond the layer below, mm. placeable: ground beneath the layer on which a branch
+    may end, which is solid area grown by BEYOND of the radius. reachable: where the middle of a branch may be. shut: for a limb,
+    where the head cannot print support.
     """
 
     sections: Sections
@@ -73,7 +73,7 @@ class ReachableAreas:
         return self.sections.heights
 
     def carrying_layers(self, layer: int) -> range:
-        """The layers, from the highest down, on which what hangs in a layer may rest.
+        """The layers, from the highest down, on which the overhangs of a layer may rest.
 
         The distance across keeps support as much lower under a slope that is just too flat, or as steep as one that a person may
         want to be held up.
@@ -101,7 +101,7 @@ def dilate(area: Polygons, distance_mm: float) -> Polygons:
 
 
 def drop_slivers(places: Polygons) -> Polygons:
-    """Without slivers."""
+    """The area without parts narrower than twice SLIVER_MM."""
     core = Polygons() if places.area() < SPECK_MM2 else offset(places, -SLIVER_MM)
     return core if core.is_empty() else offset(core, 1.5 * SLIVER_MM) ^ places
 
@@ -153,7 +153,7 @@ def support_reach_mm(sections: Sections) -> float:
 def blocked_areas(sections: Sections, count: int, gap_mm: float, far_mm: float) -> list[Polygons]:
     """For each of the lowest layers where support cannot be, or where a person wants none.
 
-    gap_mm: what it keeps from later parts' base planes; far_mm: how far from the origin all ends.
+    gap_mm: distance to later parts' base planes; far_mm: distance from the origin beyond which there is no support.
     """
     heights = sections.heights[:count]
     blocked = above_base_planes(sections.part, sections.later, heights, gap_mm, far_mm, sections.profile.machine)

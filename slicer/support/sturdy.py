@@ -1,10 +1,9 @@
-"""Sturdy: pieces of support are thick enough for what stands on them, as far as there is room, and hollow where that will do.
+"""Sturdy support: thickens pieces of support that are too slender for the support above them, and leaves thick ones hollow.
 
-What is printed of a tree or a column is seen here as pieces, the connected places of a layer, with the height to which support
-goes on above each. From it follows the diameter that a piece should have (least_diameter_mm): it grows downward from a branch's
-by an angle, and is never less than a share of that height. A thinner piece is grown into the room beside the part, all round or,
-where the part is near, on the side that is free. So a branch finds its way as thin as it may be, and thick plastic costs no
-place its support: pieces of two branches that have met count as one.
+A piece is a connected area of one layer. The height of support above it gives the diameter it should have (least_diameter_mm):
+the diameter of a branch, which grows downward by an angle, and at least a fixed share of that height. A thinner piece grows into
+the free room beside the part, on all sides or, close to the part, on the free sides only. Branches are routed before they are
+thickened, so thickness never costs an overhang its support. Branches that have met form one piece.
 """
 
 from collections.abc import Sequence
@@ -16,13 +15,13 @@ from slicer.bead import spacing_mm
 from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, union
 from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
 
-SLENDER = 12.0  # times its diameter: what stands higher on a piece sways under the nozzle
+SLENDER = 12.0  # largest height above a piece, in diameters of the piece; taller support sways under the nozzle
 HALVINGS = 4  # of the way from what a piece lacks all round to its diameter: how far it grows on the sides that are free
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A connected place of a layer's support, before and after it grows; top_mm: how high support goes on above it."""
+    """A connected area of a layer's support, before (thin) and after (area) it grows; top_mm: z of the top of its support."""
 
     thin: Polygons
     area: Polygons
@@ -30,20 +29,20 @@ class Piece:
     bounds: tuple[float, float, float, float]
 
     def touches(self, other: Polygons, bounds: tuple[float, float, float, float]) -> bool:
-        """Whether the thin piece lies over a place."""
+        """Whether the thin piece overlaps an area; bounds: the box of that area."""
         (x0, y0, x1, y1), (a0, b0, a1, b1) = self.bounds, bounds
         return x0 < a1 and x1 > a0 and y0 < b1 and y1 > b0 and not (self.thin ^ other).is_empty()
 
 
 def least_diameter_mm(above_mm: float, process: Process) -> float:
-    """The diameter of a circle as large as a piece on which support stands so high."""
+    """The diameter, mm, of a circle with the area that a piece needs to carry support above_mm high."""
     top_mm = process.support_branch_mm
     tapered = top_mm + 2.0 * above_mm * tan(radians(process.support_branch_diameter_angle_deg))
     return max(min(tapered, max(process.support_trunk_mm, top_mm)), above_mm / SLENDER)
 
 
 def thicken(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The support of every layer with its thin pieces grown; what is added lies within the lean of the layer below, or stands."""
+    """The support of every layer with thin pieces grown. Added area is within the lean of the layer below or stands."""
     above: list[Piece] = []
     wide: list[Polygons] = list(bodies)
     for m in range(len(bodies) - 1, -1, -1):
@@ -59,7 +58,7 @@ def thicken(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]
 
 
 def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int) -> Piece:
-    """A piece of a layer, grown where it is thinner than what stands on it asks for, and under what has grown above."""
+    """Grow a piece of layer m if it is too thin for the support above it, and under the grown area of the pieces above it."""
     bounds, heights = thin.bounds(), areas.heights
     over = [piece for piece in above if piece.touches(thin, bounds)]
     if not over:
@@ -71,7 +70,7 @@ def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int
         return Piece(thin, thin, top_mm, bounds)
     room = dilate(areas.reachable[m] ^ bounding_box(thin, least_mm + areas.radius_mm), areas.radius_mm)
     lean_mm, near = float(areas.lean_mm[m + 1]), room ^ bounding_box(thin, least_mm)
-    # What of the pieces above is theirs before they grow is carried by whatever has carried it.
+    # The original area of the pieces above keeps the support below that it already has; only their added area needs more.
     hung = [offset(piece.area, -lean_mm) - (piece.thin - dilate(thin, lean_mm)) for piece in grown]
     area = _touching(thin, union(hung) ^ near) if hung else thin
     if lacking_mm > 0.0:
@@ -80,12 +79,15 @@ def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int
 
 
 def _touching(thin: Polygons, about: Polygons) -> Polygons:
-    """A thin piece with the places about it that touch it."""
+    """A thin piece united with those islands of an area that overlap it."""
     return union([thin, *(piece for piece in islands(about) if not (piece ^ thin).is_empty())])
 
 
 def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
-    """An area with the room about a thin piece, no farther from it than that diameter nor than it takes to be as large."""
+    """An area united with the room around a thin piece until it is as large as a circle of diameter least_mm.
+
+    lacking_mm: the radius that the piece lacks, the first distance to try. Growth ends at least_mm from the piece.
+    """
     least_mm2, near_mm, far_mm = 0.25 * pi * least_mm**2, lacking_mm, least_mm
     if area.area() >= least_mm2:
         return area
@@ -104,7 +106,10 @@ def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, l
 
 
 def _loose(body: Polygons, wide: Polygons, below: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """What has grown of a layer's support neither within the lean of the layer below nor, where it needs that, on something."""
+    """The added area of layer m that neither lies within the lean of the layer below nor stands on something.
+
+    Only pieces thinner than a branch and pieces that begin in this layer may grow onto something to stand on.
+    """
     lean_mm, branch_mm, added = float(areas.lean_mm[m]), areas.process.support_branch_mm, wide - below
     loose = added if below.is_empty() else drop_slivers(added - dilate(below, lean_mm))
     if loose.is_empty() or areas.placeable[m].is_empty():
@@ -117,10 +122,11 @@ def _loose(body: Polygons, wide: Polygons, below: Polygons, areas: ReachableArea
 
 
 def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], process: Process) -> list[Polygons]:
-    """The pieces of each layer's support whose walls are enough.
+    """The pieces of each layer's support that are printed as walls without lines inside.
 
-    Those have lines inside that are wider than sparse lines lie apart, from where lines of the layer above lie on them; narrow
-    ones only right under dense lines, which may run along them.
+    printed, dense: one area per layer. A piece is filled if it is wider than the distance between sparse lines and lies under
+    filled or dense support of the layer above. A narrower piece is filled only directly under dense support, whose lines may run
+    along it. Without walls no piece is hollow.
     """
     hollow, filled = [Polygons()] * len(printed), Polygons()
     if process.support_walls == 0:
@@ -142,6 +148,6 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
 
 
 def support_cell_mm(process: Process) -> float:
-    """How far apart the sparse lines of support lie, mm: what dense lines laid over it have to span."""
+    """The distance between sparse lines of support, mm, which dense lines on top of them have to span."""
     spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
     return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density

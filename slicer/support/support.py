@@ -1,4 +1,4 @@
-"""Support: from hanging places down to what it stands on, what of it is printed, what hanging places it cannot hold, and why."""
+"""Support: grown from hanging places down to the ground, trimmed to what stands, with reasons for places that get none."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -51,8 +51,9 @@ HEAP = 12  # layers united at a time: a sweep over all of them at once meets man
 class Supports:
     """The support of a part's sections, which go up as far as it does.
 
-    Of every layer: where support is printed, where it is dense, where it is hollow, which hanging places want it, which of them
-    nothing holds, and which a person wants to be held by nothing.
+    Each list has one area per layer. areas: printed support; dense: its interface; hollow: printed without lines inside the
+    walls; wanted: hanging places that want support; missed: those of them that nothing holds; unwanted: hanging places that a
+    person wants no support under.
     """
 
     sections: Sections
@@ -128,7 +129,7 @@ def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
 def grow(
     wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas
 ) -> tuple[list[Polygons], list[Polygons]]:
-    """Support from the top down: of every layer all of it, and where it begins.
+    """Grow support from the top down. Returns one area per layer of all support, and one of the support that begins there.
 
     wanted: the hanging places of each layer; begins: places of a layer at which support has to begin.
     """
@@ -192,7 +193,7 @@ def stand(
 
 
 def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """Support of every layer with the roots of what ends in the layers above.
+    """The support of every layer with roots under support that ends in the air above.
 
     A root is at most as deep as the steepest slope that support may not slide along is high under its disc; a thin one no deeper
     than a tip may be long.
@@ -263,7 +264,7 @@ def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
 
 
 def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polygons:
-    """A layer's support without what is loose: the islands that had some of it, where they are wide enough for a bead."""
+    """A layer's support without its loose area; islands that lose some keep only what is wide enough for a bead."""
     boxes = np.array([piece.bounds() for piece in islands(loose)])
     least = 0.5 * np.pi * areas.radius_mm**2
     standing = []
@@ -285,7 +286,7 @@ def widen_foot(area: Polygons, areas: ReachableAreas, free: Polygons) -> Polygon
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """Where printed support is next to the part: under what it holds and over what it stands on."""
+    """Where printed support is next to the part: under the overhangs that it holds and over the surface that it stands on."""
     process = areas.process
     roofs, floors = process.support_interface_layers, process.support_bottom_interface_layers
     reach_mm = (1.0 - BEYOND) * areas.radius_mm
@@ -315,7 +316,7 @@ def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: 
 
 
 def _drop_ledges(missed: Sequence[Polygons], printed: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The missed places without those that, seen from above, have nothing of a size beyond a ledge's reach from what is held."""
+    """The missed places without mere ledges, which have no large area beyond a ledge's reach from held places."""
     above, outlines, process = seen_from_above(missed), areas.sections.outlines, areas.process
     reach, beyond = LEDGE * process.line_width_mm, []
     for k, bare in enumerate(missed):

@@ -16,8 +16,8 @@ Then, from the top down, each layer's branches are made from those above, never 
          /   \        ||   |            |   within the lean, or ends on where the part may be stood on (`placeable`)
     ____/_____\______/__\__|____________|____
 
-The rule for every step: each place of a branch has a place of one below it within the lean, or it stands. What of the tree is as
-wide as a bead and does stand is sifted afterwards (support.stand); what hangs and is not held is counted (missed).
+The rule for every step: each place of a branch has a place of one below it within the lean, or it stands. Afterwards
+support.stand keeps the support that stands and is as wide as a bead, and find_missed counts the overhangs that are not held.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdie
 CORNERS = 12  # of a trunk's outline
 MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
-TIDY_EVERY = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
+TIDY_EVERY = 4  # layers between two removals of slits and slivers from branches that are in the way of an obstacle
 INSET = 0.7  # of the lean: then right corners move by the lean
 
 
@@ -83,7 +83,7 @@ def trunk(x: float, y: float, radius: float) -> Branch:
 
 
 def add_contact(branches: Sequence[Branch], contact: Polygons, reachable: Polygons) -> list[Branch]:
-    """The branches of a layer with what begins in it: those that are no trunks yet take up what begins in their square."""
+    """The branches of a layer with the contacts that begin in it; a contact joins its square's branch if that is no trunk."""
     grown = list(branches)
     young = {_cell(branch.x, branch.y): k for k, branch in enumerate(branches) if not branch.full}
     for cell, piece in _pieces(contact) if not contact.is_empty() else ():
@@ -210,7 +210,7 @@ def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: f
 
 
 def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
-    """Branches in the way of something: what of them has a place below stays, the rest goes aside, or ends on ground."""
+    """Branches in the way of an obstacle: the area with a place below stays; the rest moves aside or ends on the ground."""
     if not branches:
         return []
     reachable, lean = areas.reachable[layer - 1], float(areas.lean_mm[layer])
