@@ -112,12 +112,11 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     processes = strengthen_overhangs(processes, lying, sections.plastic_below)
     model = model_sections(sections)
     counts, count = _wall_counts(sections, processes), len(processes)
-    # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
     whole = layers is None or has_lightning(process, sections.places)  # what holds a layer is planned from the top
-    runs = [range(count)] if whole else [range(max(k - 1, 0), k + 1) for k in layers or ()]
-    needed = sorted({layer for run in runs for layer in run})
+    runs = [range(count)] if whole else _with_those_below(layers or ())
+    needed = [layer for run in runs for layer in run]
     walled = _walled(sections, model, processes, counts, needed)
-    covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
+    covers = cover(sections, model, _enclosed(sections, model, [model_inside for _, _, model_inside in walled], runs))
     filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs, sections.places)
     ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, sections.places)
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
@@ -139,6 +138,27 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
         ],
         fillings,
     )
+
+
+def _with_those_below(layers: Sequence[int]) -> list[range]:
+    """Runs of layers that hold some layers and each one's lower neighbour, whose infill tells of bridges."""
+    needed = np.unique([layer for k in layers for layer in (max(k - 1, 0), k)]).tolist()
+    begins = [k for k in needed if k - 1 not in needed]
+    ends = [k + 1 for k in needed if k + 1 not in needed]
+    return [range(*ends_of) for ends_of in zip(begins, ends, strict=True)]
+
+
+def _enclosed(
+    sections: Sections, model: Sequence[Polygons | None], insides: Sequence[Polygons], runs: Sequence[range]
+) -> list[Polygons]:
+    """What the walls of every layer enclose of the model. Over a run, where walls begin that make its infill solid, about that."""
+    process, known = sections.process, list(insides)
+    reach_mm = max(process.walls - 0.5, 0.0) * spacing_mm(process.line_width_mm, process.layer_height_mm)
+    above = {layer for run in runs for layer in range(run.stop, run.stop + max(sections.shell_layers[0], 1))}
+    for layer in above.intersection(range(len(known))).difference(*runs):
+        whole = model[layer]
+        known[layer] = offset(sections.own[layer] if whole is None else whole, -reach_mm)
+    return known
 
 
 def _wall_counts(sections: Sections, processes: Sequence[Process]) -> list[WallCounts]:

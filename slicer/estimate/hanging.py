@@ -18,7 +18,7 @@ from slicer.sectioning import Sections
 from slicer.support.handed_down import plan_supports, up_to
 from slicer.support.support import Supports, own_supports, wanted_places
 
-STEP = 3  # layers that a thick one stands for: growing support from so few takes a third of the time
+STEP = 4  # layers that a thick one stands for: growing support from so few takes a quarter of the time
 FEW = 40  # layers up to the highest place that hangs whose support is grown as it is
 
 

@@ -88,4 +88,5 @@ def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
     begins = begins[begins < count]
     whole = np.concatenate([[0.0], np.cumsum(weight)])
     middle = 0.5 * (whole[begins] + whole[np.append(begins[1:], count)])
-    return np.minimum(np.searchsorted(whole, middle, side="right") - 1, np.append(begins[1:], count) - 1), begins
+    upper = np.minimum(np.searchsorted(whole, middle, side="right") - 1, np.append(begins[1:], count) - 1)
+    return np.union1d(upper, np.maximum(upper - 1, begins)), begins
