@@ -112,11 +112,13 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     processes = strengthen_overhangs(processes, lying, sections.plastic_below)
     model = model_sections(sections)
     counts, count = _wall_counts(sections, processes), len(processes)
-    whole = layers is None or has_lightning(process, sections.places)  # what holds a layer is planned from the top
-    runs = [range(count)] if whole else _with_those_below(layers or ())
+    # What holds a layer is planned from the top where branches do.
+    runs = [range(count)] if layers is None or has_lightning(process, sections.places) else _with_those_below(layers)
     needed = [layer for run in runs for layer in run]
-    walled = _walled(sections, model, processes, counts, needed)
-    covers = cover(sections, model, _enclosed(sections, model, [model_inside for _, _, model_inside in walled], runs))
+    deep = max(sections.shell_layers[0], 1)
+    above = {layer for run in runs for layer in range(run.start, min(run.stop + deep, count))}  # walls there make infill solid
+    walled = _walled(sections, model, processes, counts, sorted(above))
+    covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
     filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs, sections.places)
     ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, sections.places)
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
@@ -142,23 +144,8 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
 
 def _with_those_below(layers: Sequence[int]) -> list[range]:
     """Runs of layers that hold some layers and each one's lower neighbour, whose infill tells of bridges."""
-    needed = np.unique([layer for k in layers for layer in (max(k - 1, 0), k)]).tolist()
-    begins = [k for k in needed if k - 1 not in needed]
-    ends = [k + 1 for k in needed if k + 1 not in needed]
-    return [range(*ends_of) for ends_of in zip(begins, ends, strict=True)]
-
-
-def _enclosed(
-    sections: Sections, model: Sequence[Polygons | None], insides: Sequence[Polygons], runs: Sequence[range]
-) -> list[Polygons]:
-    """What the walls of every layer enclose of the model. Over a run, where walls begin that make its infill solid, about that."""
-    process, known = sections.process, list(insides)
-    reach_mm = max(process.walls - 0.5, 0.0) * spacing_mm(process.line_width_mm, process.layer_height_mm)
-    above = {layer for run in runs for layer in range(run.stop, run.stop + max(sections.shell_layers[0], 1))}
-    for layer in above.intersection(range(len(known))).difference(*runs):
-        whole = model[layer]
-        known[layer] = offset(sections.own[layer] if whole is None else whole, -reach_mm)
-    return known
+    needed = np.unique([layer for k in layers for layer in (max(k - 1, 0), k)])
+    return [range(int(run[0]), int(run[-1]) + 1) for run in np.split(needed, np.flatnonzero(np.diff(needed) > 1) + 1)]
 
 
 def _wall_counts(sections: Sections, processes: Sequence[Process]) -> list[WallCounts]:
