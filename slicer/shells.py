@@ -112,11 +112,12 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     processes = strengthen_overhangs(processes, lying, sections.plastic_below)
     model = model_sections(sections)
     counts, count = _wall_counts(sections, processes), len(processes)
-    # Infill below a layer tells of bridges. Walls that begin above, which make some of it solid, are left out of single ones.
-    whole = layers is None or has_lightning(process, sections.places)  # what holds a layer is planned from the top
-    runs = [range(count)] if whole else [range(max(k - 1, 0), k + 1) for k in layers or ()]
-    needed = sorted({layer for run in runs for layer in run})
-    walled = _walled(sections, model, processes, counts, needed)
+    # What holds a layer is planned from the top where branches do.
+    runs = [range(count)] if layers is None or has_lightning(process, sections.places) else _with_those_below(layers)
+    needed = [layer for run in runs for layer in run]
+    deep = max(sections.shell_layers[0], 1)
+    above = {layer for run in runs for layer in range(run.start, min(run.stop + deep, count))}  # walls there make infill solid
+    walled = _walled(sections, model, processes, counts, sorted(above))
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
     filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs, sections.places)
     ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, sections.places)
@@ -139,6 +140,12 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
         ],
         fillings,
     )
+
+
+def _with_those_below(layers: Sequence[int]) -> list[range]:
+    """Runs of layers that hold some layers and each one's lower neighbour, whose infill tells of bridges."""
+    needed = np.unique([layer for k in layers for layer in (max(k - 1, 0), k)])
+    return [range(int(run[0]), int(run[-1]) + 1) for run in np.split(needed, np.flatnonzero(np.diff(needed) > 1) + 1)]
 
 
 def _wall_counts(sections: Sections, processes: Sequence[Process]) -> list[WallCounts]:

@@ -42,7 +42,6 @@ def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
     # Hanging places lie anywhere in a thick layer, and support ends below it: the gaps are lost in that.
     coarse = {
         "support": "auto",  # the wanted places are chosen already
-        "layer_height_mm": STEP * process.layer_height_mm,
         "support_interface_layers": -(-process.support_interface_layers // STEP),
         "support_bottom_interface_layers": -(-process.support_bottom_interface_layers // STEP),
         "support_gap_mm": 0.0,
@@ -94,7 +93,10 @@ def support_lengths_mm(supports: Supports) -> Floats:
     inside = np.maximum(area - walls_mm * spacing, 0.0)
     dense = np.minimum(close, inside)
     sparse = (inside - dense) * filled / np.maximum(area, LEAST_MM2)
-    return np.column_stack([walls_mm + sparse * density / spacing, dense * process.support_interface_density / spacing])
+    lengths_mm = np.column_stack([walls_mm + sparse * density / spacing, dense * process.support_interface_density / spacing])
+    if sections.on_raft:
+        lengths_mm[0] = 0.0  # what lies beside the first layer there is the raft's
+    return lengths_mm
 
 
 def _around_mm(area: Polygons) -> float:

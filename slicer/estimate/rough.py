@@ -79,13 +79,17 @@ def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Float
 
 
 def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
-    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, the others for runs of equal
-    weight."""
+    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, then runs of equal weight.
+
+    The difference of a layer's weight from that of the next one counts, too, so that runs are short where weights vary and begin
+    at large jumps. A run's samples are the two neighbours in its middle, whose lines have turned directions.
+    """
     count = len(weight)
-    done = np.cumsum(weight[1:])
+    done = np.cumsum(weight[1:] + np.abs(np.diff(weight[1:], append=weight[-1:])))
     cuts = np.searchsorted(done, done[-1] * np.arange(1, samples) / samples) + 2 if count > 1 else np.zeros(0, np.int64)
     begins = np.unique(np.concatenate([[0, 1], cuts]))
     begins = begins[begins < count]
-    whole = np.concatenate([[0.0], np.cumsum(weight)])
-    middle = 0.5 * (whole[begins] + whole[np.append(begins[1:], count)])
-    return np.minimum(np.searchsorted(whole, middle, side="right") - 1, np.append(begins[1:], count) - 1), begins
+    ends, whole = np.append(begins[1:], count), np.concatenate([[0.0], np.cumsum(weight)])
+    middle = 0.5 * (whole[begins] + whole[ends])
+    upper = np.minimum(np.searchsorted(whole, middle, side="right") - 1, ends - 1)
+    return np.union1d(upper, np.maximum(upper - 1, begins)), begins

@@ -84,12 +84,13 @@ def regions(
 def _hollow(run: range, cover: Cover, process: Process) -> list[Polygons]:
     """The area of each layer of a run that would be sparse if the model were in one piece."""
     top, bottom = shell_layers(process)
-    inner = cover.insides[run.start : run.stop]
-    stacked = [cover.section(layer) for layer in range(run.start - bottom, run.stop + top)]
+    inner = cover.insides[run.start : run.stop + max(top, 1)]  # walls that begin above make infill solid
+    end = run.start + len(inner)
+    stacked = [cover.section(layer) for layer in range(run.start - bottom, end + top)]
     above = _common(stacked, top)[bottom + 1 :] if top else inner
     below = _common(stacked[::-1], bottom)[::-1][bottom - 1 :] if bottom else inner
     sparse_areas = [sparse_area(*row, process) for row in zip(inner, above, below, strict=False)]
-    return _without_footings(sparse_areas, cover.sections[run.start + 1 : run.stop], inner[1:], process)
+    return _without_footings(sparse_areas, cover.sections[run.start + 1 : end], inner[1:], process)[: len(run)]
 
 
 def _solid_rule(process: Process) -> tuple[object, ...]:
@@ -105,11 +106,10 @@ def _hollow_with(hollow: Sequence[Polygons], run: range, cover: Cover, place: Pl
     there = [layer for layer in run if not areas[layer].is_empty()]
     if not there:
         return list(hollow)
-    stretch = range(there[0], min(there[-1] + 1 + max(shell_layers(own)[0], 1), run.stop))
-    inside, done = _hollow(stretch, cover, own), list(hollow)
+    inside, done = _hollow(range(there[0], there[-1] + 1), cover, own), list(hollow)
     for layer in there:
         area, at = areas[layer], layer - run.start
-        both = overlaid(hollow[at], [(area, inside[layer - stretch.start])])
+        both = overlaid(hollow[at], [(area, inside[layer - there[0]])])
         border = offset(area, 2.0 * width_mm) - offset(area, -2.0 * width_mm)
         done[at] = larger(both - ((both - opening(both, width_mm)) ^ border), FEW_MM2 * width_mm**2)
     return done

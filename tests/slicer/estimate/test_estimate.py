@@ -156,15 +156,15 @@ LEANING, LEVEL = ((0.3, 0.1, 0.95), 9.0), ((0.0, 0.0, 1.0), 9.0)
 @pytest.mark.parametrize(
     ("mesh", "planes", "share"),
     [
-        (tower(), (), 0.04),
-        (thin_box(), (), 0.04),
-        (box(24, 20, 40), (((0.3, 0.1, 0.95), 18.0),), 0.12),  # under its slanted top skins are bridged in bursts of layers
-        (vase(), (), 0.05),
-        (vase(), (LEANING,), 0.04),
-        (comb(), (), 0.04),
-        (comb(), (LEANING,), 0.04),
-        (star(), (), 0.06),  # its many small places that hang get less support in thick layers
-        (star(), (LEVEL,), 0.06),
+        (tower(), (), 0.02),
+        (thin_box(), (), 0.02),
+        (box(24, 20, 40), (((0.3, 0.1, 0.95), 18.0),), 0.05),  # under its slanted top skins are bridged in bursts of layers
+        (vase(), (), 0.03),
+        (vase(), (LEANING,), 0.03),
+        (comb(), (), 0.03),
+        (comb(), (LEANING,), 0.03),
+        (star(), (), 0.05),  # its many small places that hang get less support in thick layers
+        (star(), (LEVEL,), 0.04),
     ],
     ids=["tower on support", "thin box", "cut box", "vase", "cut vase", "comb", "cut comb", "star", "cut star"],
 )

@@ -1,5 +1,7 @@
 """What layers take roughly, and which of them stand for all."""
 
+from itertools import pairwise
+
 import manifold3d as m3
 import numpy as np
 import pytest
@@ -7,9 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import spacing_mm
+from slicer.estimate.hanging import support_lengths_mm
 from slicer.estimate.rough import choose_layers, rough_lengths_mm
+from slicer.overhangs import find_overhangs
 from slicer.sectioning import section_part
-from tests.shapes import box, standing
+from slicer.support.support import own_supports
+from tests.shapes import box, standing, tee
 from tests.slicer.hand import profile, whole
 
 PROFILE = profile()
@@ -34,17 +39,35 @@ def test_a_ledge_half_way_up_has_skin_below_it() -> None:
 
 @settings(max_examples=50)
 @given(st.integers(0, 10**6), st.integers(1, 300), st.integers(1, 40))
-def test_every_layer_is_stood_for_by_one_of_its_own_run(seed: int, count: int, samples: int) -> None:
+def test_every_run_of_layers_has_samples_of_its_own(seed: int, count: int, samples: int) -> None:
     weight = np.random.default_rng(seed).uniform(0.01, 5.0, count)
     layers, begins = choose_layers(weight, samples)
-    ends = np.append(begins[1:], count)
-    assert begins[0] == 0
-    assert ((begins <= layers) & (layers < ends)).all()
-    assert layers[0] == 0
-    assert len(layers) <= samples + 1
+    of_runs = [layers[(begin <= layers) & (layers < end)] for begin, end in pairwise([*begins.tolist(), count])]
+    assert np.concatenate(of_runs).tolist() == layers.tolist()
+    assert of_runs[0].tolist() == [0]
+    assert all(1 <= len(own) <= 2 for own in of_runs)
+    assert len(of_runs) <= samples + 1
 
 
 def test_layers_of_more_weight_are_sampled_more_densely() -> None:
     weight = np.where(np.arange(100) < 50, 9.0, 1.0)
     layers, _ = choose_layers(weight, 10)
-    assert (layers[1:] < 50).sum() == 9
+    assert (layers[1:] < 50).mean() == pytest.approx(0.9, abs=0.05)
+
+
+def test_a_layer_much_heavier_than_its_neighbours_stands_for_itself_alone() -> None:
+    layers, begins = choose_layers(np.where(np.arange(100) == 50, 40.0, 1.0), 10)
+    assert 50 in layers
+    assert {50, 51} <= set(begins.tolist())
+
+
+def test_what_alternates_from_layer_to_layer_is_sampled_as_often_one_way_as_the_other() -> None:
+    layers, _ = choose_layers(np.ones(200), 10)
+    assert (layers[1:] % 2).mean() == 0.5
+
+
+@pytest.mark.parametrize(("raft_layers", "lowest"), [(0, 0), (3, 1)], ids=["on the plate", "on a raft"])
+def test_support_beside_the_first_layer_is_counted_with_the_raft_if_there_is_one(raft_layers: int, lowest: int) -> None:
+    sections = section_part(whole(tee()), profile(f"process.raft_layers={raft_layers}"))
+    lengths_mm = support_lengths_mm(own_supports(sections, find_overhangs(sections))).sum(axis=1)
+    assert np.flatnonzero(lengths_mm)[0] == lowest
