@@ -20,6 +20,7 @@ NEGLIGIBLE = 1e-7  # of the volume of all shells: 0.1 mm across beside a 20 mm c
 FLAT_SHEETS = "its faces lie in one plane or on each other; give it a thickness (Blender: Solidify)"
 FLAT = 1e-9  # of the cube of a shell's diagonal
 MOST_BODIES = 2000  # each takes its time in every step: 20 s of export for this number of cubes of 1 mm
+GRID = 0.1  # of the reach: corners of bodies that are united lie on a grid as fine as that, finer than files round
 SAMPLES = 24  # vertices of a shell that must all lie inside another for it to count as contained
 
 
@@ -170,12 +171,12 @@ def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
 def _union(bodies: list[Surface], reach: float) -> Surface | None:
     """The union of closed surfaces; None when they neither overlap nor touch.
 
-    Their corners come onto a grid as fine as the reach at most: walls that are meant to touch then do, where the rounding of a
+    Their corners come onto a grid finer than the reach: walls that are meant to touch then do, where the rounding of a
     file leaves slivers between them so thin that their union cannot be read again.
     """
     import manifold3d as m3
 
-    grid = 2.0 ** np.floor(np.log2(reach))
+    grid = 2.0 ** np.floor(np.log2(GRID * reach))
     solids = [solid_of(_on_grid(body, grid)) for body in bodies]
     union = m3.Manifold.batch_boolean(solids, m3.OpType.Add)
     before = sum(solid.volume() for solid in solids)
