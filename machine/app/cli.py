@@ -76,7 +76,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     except TyperException as error:
         return _complain(sentence(error, given))
     except UserError as error:
-        return _complain(str(error))
+        projects = sys.modules.get("machine.app.project")
+        return _complain(projects.without_folders(str(error)) if projects else str(error))
     except (KeyboardInterrupt, typer.Abort) as error:
         return _complain(f"interrupted{notes(error)}", 130)
     except BrokenPipeError:

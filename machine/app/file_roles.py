@@ -63,7 +63,7 @@ def _read_by(request: ModelRequest) -> list[Role]:
     ranker = Path(request.ranker) if request.ranker.endswith(SUFFIX) else None
     own = [(option, Path(name)) for option, name in profiles if name is not None and is_file_name(name)]
     plans = [("--plan", plan) for plan in request.cuts.plans]
-    return [*models, *plans, ("--planes", request.cuts.planes), ("--ranker", ranker), *own]
+    return [*models, ("the project", request.project), *plans, ("--planes", request.cuts.planes), ("--ranker", ranker), *own]
 
 
 def _written(outputs: Outputs) -> list[Role]:

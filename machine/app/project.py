@@ -24,11 +24,11 @@ from machine.app.requests import Given
 from machine.planning.stops import Stop, parse_stops
 from mdp.decomposition import FrontRow
 from mdp.mesh import Mesh
-from mdp.plans.plan_file import PlanFile
+from mdp.plans.plan_file import ZONE_KINDS, PlanFile
 from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
-from profiles.errors import PlanError, reason
+from profiles.errors import PlanError, SliceError, reason
 from profiles.files import LOCK, whole_file, write_whole
 from profiles.frozen import Vector
 from profiles.places import KINDS, own, shipped
@@ -41,10 +41,26 @@ PICTURE_PX = (256, 256)
 MESH_DIGEST = "mesh.sha256"  # of the 3MF's model part, to see whether another program has changed it
 PROGRAM = f"tiltprint {version('tiltprint')}"
 SUFFIX, DEMO = ".3mf", "demo:"
+FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: in no other folder, on any disk
 ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-[0-9a-f]{{12}}-")  # to the names of a project's files
+LONGEST_NAME = 255  # bytes of a file's name on any disk
 MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
 DAMAGES = (zipfile.BadZipFile, zlib.error, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError)
-_unpacked: list[TemporaryDirectory[str]] = []  # folders of the projects that were opened, removed when the program ends
+BAD_RECORD = (ValueError, KeyError, TypeError, AttributeError, SliceError)
+_unpacked: list[tuple[TemporaryDirectory[str], str]] = []  # folders of the projects that were opened, and their files
+
+
+def without_folders(text: str) -> str:
+    """A sentence that names a project where it named its temporary folder."""
+    for folder, model in _unpacked:
+        text = text.replace(folder.name, model)
+    return text
+
+
+def close_projects() -> None:
+    """Remove the folders of all projects that were opened; else that is done when the program ends."""
+    while _unpacked:
+        _unpacked.pop()[0].cleanup()
 
 
 @dataclass(frozen=True)
@@ -83,7 +99,7 @@ def write_folder(folder: Path, work: Work, plan: PlanFile | None) -> None:
     model = "" if work.model is None else _copied(work.model, folder, "model")
     meshes: list[str] = []
     if plan is not None:
-        plan, meshes = _with_meshes(plan, folder)
+        plan, meshes = with_meshes(plan, folder)
         write_whole(folder / PLAN, plan_text(plan, folder).encode())
     record = {
         "version": VERSION,
@@ -120,15 +136,29 @@ def _profile_file(folder: Path, kind: str, name: str) -> str:
     return file
 
 
-def _with_meshes(plan: PlanFile, folder: Path) -> tuple[PlanFile, list[str]]:
-    """The plan with the meshes of its modifiers in a folder, and the names that they have there."""
-    modifiers, names = [], list[str]()
-    for modifier in plan.zones.modifiers:
-        if isinstance(modifier.volume, MeshVolume):
-            names.append(_copied(modifier.volume.file, folder, "modifier"))
-            modifier = replace(modifier, volume=replace(modifier.volume, file=(folder / names[-1]).absolute()))
-        modifiers.append(modifier)
-    return replace(plan, zones=replace(plan.zones, modifiers=tuple(modifiers))), names
+def with_meshes(plan: PlanFile, folder: Path) -> tuple[PlanFile, list[str]]:
+    """The plan with copies of the meshes of its marks and modifiers in a folder, and the names that they have there."""
+    names = list[str]()
+
+    def copied(volume: Any) -> Any:
+        if not isinstance(volume, MeshVolume):
+            return volume
+        names.append(_copied(volume.file, folder, "modifier"))
+        return replace(volume, file=(folder / names[-1]).absolute())
+
+    marks = {kind: tuple(map(copied, getattr(plan.zones, kind))) for kind in ZONE_KINDS}
+    modifiers = tuple(replace(own, volume=copied(own.volume)) for own in plan.zones.modifiers)
+    return replace(plan, zones=replace(plan.zones, modifiers=modifiers, **marks)), names
+
+
+def _check_alone(model: Path | None) -> None:
+    """Raise PlanError for a glTF file that refers to others, which a project would lack."""
+    if model is None or model.suffix.lower() != ".gltf":
+        return
+    document = json.loads(model.read_text(encoding="utf-8"))
+    for buffer in document.get("buffers", []):
+        if not (file := buffer.get("uri", "data:")).startswith("data:"):
+            raise PlanError(f"{model}: refers to the file {file}, and a project holds one model file: save it as .glb first")
 
 
 def _bare_name(file: Path) -> str:
@@ -150,23 +180,34 @@ def _copied(file: Path, folder: Path, role: str) -> str:
 def read_folder(folder: Path) -> Work:
     """The work in a project's folder. Raises PlanError with a sentence where it cannot be read, or not by this version."""
     try:
-        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        newer = isinstance(record["version"], int) and record["version"] > VERSION
-        if newer:
-            raise PlanError(f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}")
-        return _work_of(folder, record)
+        return _read(folder, f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}")
     except OSError as error:
         raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except BAD_RECORD:
         raise PlanError(f"what is kept in {folder} is no work of a workbench, or damaged") from None
 
 
+def _read(folder: Path, newer: str) -> Work:
+    """The work; newer: the sentence for one of a newer version."""
+    record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+    if isinstance(record["version"], int) and record["version"] > VERSION:
+        raise PlanError(newer)
+    work = _work_of(folder, record)
+    if work.model is not None and not work.model.is_file():
+        raise ValueError(f"model {record['model']!r}")
+    return work
+
+
 def _work_of(folder: Path, record: dict[str, Any]) -> Work:
-    given = record["given"]
+    given, name = record["given"], str(record["name"])
+    if Path(name).name != name or name in ("", "..") or not name.isprintable() or len(name.encode()) > LONGEST_NAME:
+        raise ValueError(f"name {name!r}")
+    if not all(isinstance(given[kind], str) for kind in KINDS):
+        raise ValueError(f"profiles {given!r}")
     own_names = {str(kind): Path(name).name for kind, name in record["own_profiles"].items()}
     files = {kind: str(folder / Path(given[kind]).name) for kind in own_names}
     return Work(
-        name=str(record["name"]),
+        name=name,
         model=folder / Path(record["model"]).name if record["model"] else None,
         given=Given(**{**given, **files, "settings": tuple(map(str, given["settings"]))}),
         rotation=tuple((float(x), float(y), float(z)) for x, y, z in record["rotation"]),
@@ -190,6 +231,7 @@ def figures_of(row: FrontRow | None) -> dict[str, float]:
 
 def project_bytes(work: Work, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
     """The content of a project file: mesh is the model as it lies, picture a PNG. Raises OSError."""
+    _check_alone(work.model)
     content = io.BytesIO()
     with TemporaryDirectory(prefix="tiltprint-project-") as name:
         folder = Path(name)
@@ -217,7 +259,7 @@ def open_project(model: str) -> Work | None:
     if model.startswith(DEMO) or not is_project(Path(model)):
         return None
     folder = TemporaryDirectory(prefix="tiltprint-project-", ignore_cleanup_errors=True)
-    _unpacked.append(folder)
+    _unpacked.append((folder, model))
     work = unpack(Path(model), Path(folder.name))
     if work.model is None:
         return work
@@ -231,19 +273,23 @@ def unpack(path: Path, folder: Path) -> Work:
     try:
         with zipfile.ZipFile(path) as archive:
             entries = [entry for entry in archive.infolist() if entry.filename.startswith(INSIDE)]
-            if len(entries) > MOST_FILES or sum(entry.file_size for entry in entries) > LARGEST_BYTES:
+            read = [*entries, archive.getinfo(MODEL_PART)]
+            if len(entries) > MOST_FILES or sum(entry.file_size for entry in read) > LARGEST_BYTES:
                 raise PlanError(f"{path}: unpacks to more than {MOST_FILES} files or {LARGEST_BYTES} bytes")
-            changed = hashlib.sha256(archive.read(MODEL_PART)).hexdigest() != archive.read(INSIDE + MESH_DIGEST).decode()
             for entry in entries:
-                with archive.open(entry) as source, (folder / Path(entry.filename).name).open("wb") as copy:
+                if not FILE_NAME.fullmatch(entry.filename.removeprefix(INSIDE)):
+                    raise ValueError(f"file name {entry.filename!r}")
+                with archive.open(entry) as source, (folder / Path(entry.filename).name).open("xb") as copy:
                     shutil.copyfileobj(source, copy)
-        if changed:
-            raise PlanError(
-                f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
-                " from there as STL, and decompose that"
-            )
-        return read_folder(folder)
-    except DAMAGES as error:
-        raise PlanError(f"{path}: this project is damaged ({error})") from None
-    except PlanError as error:
-        raise PlanError(str(error).replace(str(folder), str(path))) from None
+            changed = hashlib.sha256(archive.read(MODEL_PART)).hexdigest() != archive.read(INSIDE + MESH_DIGEST).decode()
+        work = _read(folder, f"{path}: this project was saved by a newer tiltprint, which can open it")
+    except PlanError:
+        raise
+    except (*DAMAGES, *BAD_RECORD, OSError) as error:
+        raise PlanError(f"{path}: this project is damaged ({error})".replace(str(folder), str(path))) from None
+    if changed:
+        raise PlanError(
+            f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
+            " from there as STL, and decompose that"
+        )
+    return work

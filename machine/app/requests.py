@@ -72,8 +72,10 @@ class ModelRequest:
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down in the cheapest orientation; None: where nothing says how it lies. compare: with the same model in one part. force:
     go on although the dry run found errors. profile_names, settings: machine, material and process as the user has given them,
-    names or files, and KEY=VALUE over them. stops: where the print waits for a person. copies: the number of each model on the
-    plate; beside: the other models there. plate: of each model's project; None: the first that holds something."""
+    names or files, and KEY=VALUE over them. project: the project file that the model comes from. stops: where the print waits
+    for a person. copies: the number of each model on the plate; beside: the other models there. plate: of each model's
+    project; None: the first that holds something.
+    """
 
     model: str
     profile: "Profile"
@@ -86,6 +88,7 @@ class ModelRequest:
     cuts: Cuts = Cuts()
     profile_names: tuple[str | None, ...] = ()
     settings: tuple[str, ...] = ()
+    project: Path | None = None
     stops: "tuple[Stop, ...]" = ()
     copies: int = 1
     beside: tuple[str, ...] = ()

@@ -11,6 +11,7 @@ from machine.app.pipeline import compilers
 from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
 from machine.app.pipeline.parts_folder import PLAN, save_parts
 from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.project import with_meshes
 from machine.app.requests import STDOUT, ModelRequest, Outputs
 from machine.app.terminal.advice import advice
 from machine.app.terminal.plain import show
@@ -40,7 +41,8 @@ def decompose(request: ModelRequest) -> int:
         save_parts(outputs.folder, decomposition, figures)
     for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
         if file is not None and not _is_same(file, request.cuts.plan):
-            write_bytes(file, plan_text(decomposed.plan, file.parent).encode())
+            plan = with_meshes(decomposed.plan, file.parent)[0] if request.project else decomposed.plan
+            write_bytes(file, plan_text(plan, file.parent).encode())
     _draw(outputs, decomposition, profile)
     if outputs.html is not None:
         write_bytes(outputs.html, parts_page(decomposition, profile, alternatives))

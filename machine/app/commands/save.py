@@ -10,25 +10,21 @@ from machine.app.pipeline.pipeline import Decomposed, decompose_model
 from machine.app.project import DEMO, PICTURE_PX, STANDING, SUFFIX, Work, figures_of, project_bytes
 from machine.app.requests import Given, ModelRequest
 from machine.app.terminal.plain import show
-from profiles.errors import OutputError, PlanError
+from profiles.errors import OutputError
 from profiles.profile import DEFAULTS
 
 
 def save(request: ModelRequest, out: Path) -> int:
-    """Find the parts of a model, or cut it by its plan, and write the project. Raises OutputError and PlanError."""
+    """Find the parts of a model, or cut it by its plan, and write the project. Raises OutputError."""
     if out.suffix.lower() != SUFFIX:
         raise OutputError(f"output {out}: a project is a 3MF file: a name that ends in {SUFFIX} is expected")
-    if request.beside:
-        raise PlanError(
-            f"{request.beside[0]}: a project holds one model, {request.name}; --copies N puts more of it on the plate"
-        )
     check_writable(out)
     check_model_files(request, (("project", out),))
     decomposed = decompose_model(request)
     decomposition = decomposed.decomposition
     picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
     write_bytes(out, project_bytes(_work(request, decomposed), decomposed.plan, decomposition.mesh, picture))
-    count = len(decomposition.parts)
+    count = len(decomposed.plan.parts) + 1
     show(f"{out}: {request.name} in {count} part{'s' * (count > 1)}, with its plan and profiles\n")
     return 0
 

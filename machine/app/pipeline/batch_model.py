@@ -13,7 +13,7 @@ from machine.app.pipeline.comparison import support_mm3
 from machine.app.pipeline.parts_folder import FIGURES, MODEL, PLAN, SCENE, save_parts
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
-from machine.app.project import open_project
+from machine.app.project import close_projects, open_project, with_meshes, without_folders
 from machine.app.requests import ModelRequest
 from machine.app.terminal.plain import plain_line
 from machine.dryrun.dryrun import summary
@@ -92,6 +92,8 @@ def row_of(file: Path, job: Job) -> Row:
         row = replace(row, status=REFUSED, sentence=_sentence(str(error), file))
     except Exception as error:  # noqa: BLE001 - a bug over one model must not end the others
         row = replace(row, status=FAILED, sentence=_sentence(bug_in_words(error, [job.do, str(file)]), file))
+    finally:
+        close_projects()
     return replace(row, core_s=round(process_time() - began, 2))
 
 
@@ -101,17 +103,19 @@ def request_of(model: str, asked: ModelRequest) -> ModelRequest:
     if work is None:
         return replace(asked, model=model)
     given, names = work.given, asked.profile_names
-    own = zip((given.machine, given.material, given.process), names, strict=True)
-    machine, material, process = (name or of_project for of_project, name in own)
+    named = zip((given.machine, given.material, given.process), names, strict=True)
+    machine, material, process = (name or of_project for of_project, name in named)
     profile = load(machine, material, process, (*given.settings, *asked.settings))
     cuts = replace(asked.cuts, plans=(work.plan,) if work.plan else ())
     profile = with_part_settings(profile, asked.profile.parts)
-    return replace(asked, model=work.argument, profile=profile, cuts=cuts, stops=work.stops, copies=work.copies)
+    return replace(
+        asked, model=work.argument, project=Path(model), profile=profile, cuts=cuts, stops=work.stops, copies=work.copies
+    )
 
 
 def _sentence(text: str, file: Path) -> str:
     """What is said of a model, without the folder that all have in common."""
-    return plain_line(text.replace(str(file), file.name))
+    return plain_line(without_folders(text).replace(str(file), file.name))
 
 
 def _estimate(request: ModelRequest, row: Row, out: Path) -> Row:
@@ -131,7 +135,8 @@ def _decompose(request: ModelRequest, row: Row, out: Path) -> Row:
     decomposition, profile = decomposed.decomposition, decomposed.profile
     figures = json_values(decomposition, joints_of(decomposition.parts, profile), decomposed.read_s, decomposed.total_s)
     save_parts(out, decomposition, figures | {"rotate_deg": profile.process.rotate_deg})
-    write_bytes(out / PLAN, plan_text(decomposed.plan, out).encode())
+    plan = with_meshes(decomposed.plan, out)[0] if request.project else decomposed.plan
+    write_bytes(out / PLAN, plan_text(plan, out).encode())
     names = (*(part_file(part.index) for part in decomposition.parts), MODEL, SCENE, FIGURES, PLAN)
     row = replace(row, parts=len(decomposition.parts), files=BETWEEN.join(f"{out.name}/{name}" for name in names))
     try:

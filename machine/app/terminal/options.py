@@ -27,6 +27,7 @@ def _names_of(kind: str) -> Callable[[str], list[str]]:
     return complete
 
 
+PLACING = ("process.scale", "process.rotate_deg", "process.place_mm")
 OF_FILE = "; else the project's or G-code file's own, else {}"
 
 
@@ -164,7 +165,14 @@ class ProfileOptions:
     def over(self, given: Given) -> "ProfileOptions":
         """These options over what a project was made with."""
         machine, material, process = self.machine or given.machine, self.material or given.material, self.process or given.process
-        return ProfileOptions(machine, material, process, [*given.settings, *(self.settings or ())])
+        kept = [setting for setting in given.settings if not self._replaces(setting)]
+        return ProfileOptions(machine, material, process, [*kept, *(self.settings or ())])
+
+    def _replaces(self, setting: str) -> bool:
+        """Whether a project's setting goes with a profile that the user has replaced; how the model lies and stands stays."""
+        key = setting.partition("=")[0].strip()
+        section = {"search": "process"}.get(key.partition(".")[0], key.partition(".")[0])
+        return getattr(self, section, None) is not None and key not in PLACING
 
     @property
     def sections(self) -> frozenset[str]:
@@ -219,8 +227,11 @@ def model_request(model: str, search: SearchOptions, given: ProfileOptions, **fu
     """
     from machine.app.project import open_project
 
-    plate = search.plate
+    plate, project = search.plate, None
     if (work := open_project(model)) is not None:
+        if search.settings_of_file:
+            raise PlanError(f"--settings-of-file: {model} is a project of tiltprint, whose settings hold without it")
+        project = Path(model)
         plate = work.plate if plate is None else plate
         model, given = work.argument, given.over(work.given)
         cuts = further.get("cuts", Cuts())
@@ -236,11 +247,12 @@ def model_request(model: str, search: SearchOptions, given: ProfileOptions, **fu
     further["copies"] = 1 if further.get("copies") is None else further["copies"]
     profile = given.profile(search)
     named = ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names)
-    return replace(named, settings=given.given(search).settings, plate=plate, **further)
+    return replace(named, settings=given.given(search).settings, plate=plate, project=project, **further)
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
     """The request for the program of models on a plate, or of a G-code file. Raises PlanError, SliceError, ProfileError."""
+    from machine.app.project import is_project
     from machine.planning.stops import parse_stops
 
     stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(tuple(program.plan or ()), program.parts)
@@ -248,6 +260,9 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     if program.settings_of_file and len({first, *others}) > 1:
         several = ", ".join(dict.fromkeys((first, *others)))
         raise PlanError(f"--settings-of-file goes with one model, and several are given: {several}")
+    for name in models if len(models) > 1 or others else ():
+        if is_project(Path(named_models([name])[0])):
+            raise PlanError(f"{name} is a project, which is a plate of its own: no model goes beside it; --copies N prints more")
     plate = {"copies": program.copies, "beside": tuple(others)}
     return model_request(first, program, given, cuts=cuts, stops=stops, **plate, **further)
 

@@ -1,6 +1,7 @@
 """A project file: what it holds prints as what it was saved from, other slicers read it as a model, damage is refused."""
 
 import io
+import json
 import shutil
 import zipfile
 from pathlib import Path
@@ -11,7 +12,7 @@ import trimesh
 from manifold3d import Manifold
 
 from machine.app.cli import main
-from machine.app.project import INSIDE, RECORD, is_project, open_project
+from machine.app.project import INSIDE, RECORD, close_projects, is_project
 from mdp.cut import mesh_of
 from mdp.read import read_mesh
 from mdp.save import MODEL_PART, stl
@@ -117,8 +118,10 @@ def changed(path: Path, name: str, content: bytes | None) -> None:
     [
         (MODEL_PART, b"<model/>", "another program has changed the model in this project"),
         (MODEL_PART, None, "this project is damaged"),
-        (INSIDE + RECORD, b'{"version": 1, "na', "is no work of a workbench, or damaged"),
-        (INSIDE + RECORD, b'{"version": 99}', "was kept by a newer tiltprint, which can open it"),
+        (INSIDE + RECORD, b'{"version": 1, "na', "this project is damaged"),
+        (INSIDE + RECORD, b'{"version": 99}', "was saved by a newer tiltprint, which can open it"),
+        (INSIDE + "..", b"x", "this project is damaged"),
+        (INSIDE + 300 * "a", b"x", "this project is damaged"),
         (INSIDE + "plan.toml", b"version = ", "plan"),
     ],
 )
@@ -136,14 +139,73 @@ def test_a_damaged_project_is_refused_in_one_sentence(
     assert not Path("after.gcode").exists()
 
 
+@pytest.mark.parametrize("name", ["", "..", "a/b.stl", "a\0b.stl", 400 * "a", "\ud800.stl"])
 @pytest.mark.usefixtures("folder")
-def test_files_of_a_project_never_lie_outside_its_folder() -> None:
+def test_a_model_s_name_that_no_file_can_have_is_damage(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    with zipfile.ZipFile("tee.3mf") as archive:
+        record = json.loads(archive.read(INSIDE + RECORD))
+    changed(Path("tee.3mf"), INSIDE + RECORD, json.dumps(record | {"name": name}).encode())
+    assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
+    assert "this project is damaged" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+def test_files_of_a_project_never_lie_outside_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
     run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     changed(Path("tee.3mf"), INSIDE + "../../outside.txt", b"x")
-    work = open_project("tee.3mf")
-    assert work is not None
-    assert work.model is not None
-    assert not (work.model.parents[3] / "outside.txt").exists()
+    assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
+    assert "this project is damaged" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words", [("save", "-o", "tee.3mf"), ("export", "-o", "tee.3mf"), ("export", "-o", "a.gcode", "--json", "tee.3mf")]
+)
+@pytest.mark.usefixtures("folder")
+def test_a_project_that_is_read_is_never_written_over(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    before = Path("tee.3mf").read_bytes()
+    assert main([words[0], "tee.3mf", *words[1:]]) == 1
+    assert "the same file as the project, which is read" in capsys.readouterr().err
+    assert Path("tee.3mf").read_bytes() == before
+
+
+@pytest.mark.parametrize("models", [("tee.3mf", "tee.stl"), ("tee.stl", "tee.3mf"), ("tee.3mf:2",)])
+@pytest.mark.usefixtures("folder")
+def test_a_project_is_a_plate_of_its_own(models: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    assert main(["export", *models, "-o", "after.gcode"]) == 1
+    assert "is a project, which is a plate of its own" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+def test_another_process_replaces_the_settings_of_the_project_but_not_how_the_model_lies() -> None:
+    lying = ("--parts", "1", "--as-is", "--set", "process.scale=0.5")
+    run("save", "tee.stl", *lying, "--set", "process.layer_height_mm=0.3", "-o", "tee.3mf")
+    run("export", "tee.3mf", "--process", "draft", "-o", "after.gcode")
+    run("export", "tee.stl", *lying, "--process", "draft", "-o", "before.gcode")
+    assert Path("after.gcode").read_bytes() == Path("before.gcode").read_bytes()
+
+
+def test_a_plan_of_a_project_s_parts_cuts_when_the_project_is_gone(folder: Path) -> None:
+    Path("plan.toml").write_text(PLAN + '[[no_support]]\nmesh = "insert.stl"\n')
+    run("save", "tee.stl", *FAST, "--plan", "plan.toml", "-o", "tee.3mf")
+    Path("insert.stl").unlink()
+    run("export", "tee.3mf", "-o", "before.gcode")
+    run("decompose", "tee.3mf", "-o", "parts")
+    close_projects()
+    Path("tee.3mf").unlink()
+    run("export", "tee.stl", *FAST, "--plan", "parts/plan.toml", "-o", "after.gcode")
+    assert Path("after.gcode").read_bytes() == Path("before.gcode").read_bytes()
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_gltf_that_needs_other_files_is_not_saved(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, content in trimesh.Scene(trimesh.creation.box((20, 20, 20))).export(file_type="gltf").items():
+        Path(name).write_bytes(content)
+    assert main(["save", "model.gltf", *FAST, "--parts", "1", "--as-is", "--set", "process.scale=1", "-o", "box.3mf"]) == 1
+    assert "a project holds one model file: save it as .glb first" in capsys.readouterr().err
+    assert not Path("box.3mf").exists()
 
 
 @pytest.mark.usefixtures("folder")
