@@ -190,7 +190,9 @@ def read_folder(folder: Path) -> Work:
 def _read(folder: Path, newer: str) -> Work:
     """The work; newer: the sentence for one of a newer version."""
     record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-    if isinstance(record["version"], int) and record["version"] > VERSION:
+    if not isinstance(record["version"], int) or record["version"] < 1:
+        raise ValueError(f"version {record['version']!r}")
+    if record["version"] > VERSION:
         raise PlanError(newer)
     work = _work_of(folder, record)
     if work.model is not None and not work.model.is_file():
@@ -263,7 +265,7 @@ def open_project(model: str) -> Work | None:
     work = unpack(Path(model), Path(folder.name))
     if work.model is None:
         return work
-    named = Path(folder.name) / "model" / Path(work.name).name  # messages and G-code say the name that the model had
+    named = Path(folder.name) / ".model" / Path(work.name).name  # messages and G-code say the name that the model had
     named.parent.mkdir()
     return replace(work, model=work.model.rename(named))
 
