@@ -11,27 +11,30 @@ import json
 import re
 import shutil
 import zipfile
-import zlib
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from machine.app.output import plain_name
 from machine.app.profile_file import profile_text
-from machine.app.requests import Given
+from machine.app.requests import MOST_COPIES, Given
 from machine.planning.stops import Stop, parse_stops
 from mdp.decomposition import FrontRow
+from mdp.formats.threemf import DAMAGES
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile
 from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
 from profiles.errors import PlanError, SliceError, reason
-from profiles.files import LOCK, whole_file, write_whole
+from profiles.files import whole_file, write_whole
 from profiles.frozen import Vector
-from profiles.places import KINDS, own, shipped
+from profiles.places import KINDS, PARENT, is_file_name, own, shipped
+from profiles.toml_text import read_toml
 
 VERSION = 1
 STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
@@ -45,15 +48,15 @@ FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: in no
 ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-[0-9a-f]{{12}}-")  # to the names of a project's files
 LONGEST_NAME = 255  # bytes of a file's name on any disk
 MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
-DAMAGES = (zipfile.BadZipFile, zlib.error, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError)
-BAD_RECORD = (ValueError, KeyError, TypeError, AttributeError, SliceError)
+BAD_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError, SliceError)
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGES, *BAD_RECORD, OSError)
 _unpacked: list[tuple[TemporaryDirectory[str], str]] = []  # folders of the projects that were opened, and their files
 
 
 def without_folders(text: str) -> str:
     """A sentence that names a project where it named its temporary folder."""
     for folder, model in _unpacked:
-        text = text.replace(folder.name, model)
+        text = text.replace(f"{folder.name}/.model/", "").replace(folder.name, model)
     return text
 
 
@@ -67,10 +70,11 @@ def close_projects() -> None:
 class Work:
     """A model and what was asked for; files lie in the project's folder once it is read.
 
-    model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows them;
-    rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked; parts: 0
-    where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the print waits for
-    a person; figures: of the print, for people and other programs; plate: of the model where that is another slicer's project.
+    model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows
+    them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
+    parts: 0 where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the
+    print waits for a person; marks_in_plan: the plan has the marks that the model's own file has, too; figures: of the print,
+    for people and other programs; plate: of the model where that is another slicer's project.
     """
 
     name: str
@@ -86,6 +90,7 @@ class Work:
     figures: dict[str, float] = field(default_factory=dict)
     written_s: float = 0.0
     plate: int | None = None
+    marks_in_plan: bool = False
 
     @property
     def argument(self) -> str:
@@ -94,12 +99,14 @@ class Work:
 
 
 def write_folder(folder: Path, work: Work, plan: PlanFile | None) -> None:
-    """Write a project's folder, and remove what it does not name. Raises OSError, then what was there before is there still."""
+    """Write a project's folder. Older models in it go; profiles and meshes stay, for a step that is undone may name them.
+
+    Raises OSError and ProfileError; the record is written last, so that it names only what is there.
+    """
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(work.given, kind)))}
     model = "" if work.model is None else _copied(work.model, folder, "model")
-    meshes: list[str] = []
     if plan is not None:
-        plan, meshes = with_meshes(plan, folder)
+        plan, _ = with_meshes(plan, folder)
         write_whole(folder / PLAN, plan_text(plan, folder).encode())
     record = {
         "version": VERSION,
@@ -116,13 +123,15 @@ def write_folder(folder: Path, work: Work, plan: PlanFile | None) -> None:
         "changes": [stop.option.partition(" ")[2] for stop in work.stops if stop.change],
         "copies": work.copies,
         "plate": work.plate,
+        "marks_in_plan": work.marks_in_plan,
         "figures": work.figures,
     }
     write_whole(folder / RECORD, json.dumps(record).encode())
-    named = {RECORD, LOCK, model, *profiles.values(), *meshes, *([PLAN] if plan is not None else [])}
-    for file in folder.iterdir():
-        if file.name not in named:
+    for file in folder.glob("model-*"):
+        if file.name != model:
             file.unlink()
+    if plan is None:
+        (folder / PLAN).unlink(missing_ok=True)
 
 
 def _profile_file(folder: Path, kind: str, name: str) -> str:
@@ -194,16 +203,42 @@ def _read(folder: Path, newer: str) -> Work:
         raise ValueError(f"version {record['version']!r}")
     if record["version"] > VERSION:
         raise PlanError(newer)
-    work = _work_of(folder, record)
+    return _work_of(folder, record)
+
+
+def _check_name(name: str) -> None:
+    """Raise ValueError for a model's name that no file can have."""
+    control = any(ord(letter) < 32 for letter in name)
+    if Path(name).name != name or name in ("", "..") or control or len(name.encode()) > LONGEST_NAME:
+        raise ValueError(f"name {name!r}")
+
+
+def _check_inside(folder: Path, work: Work) -> None:
+    """Raise ValueError where a project names files that are not in it."""
     if work.model is not None and not work.model.is_file():
-        raise ValueError(f"model {record['model']!r}")
-    return work
+        raise ValueError(f"model {work.model.name!r}")
+    for kind in KINDS:
+        name = getattr(work.given, kind)
+        if kind not in work.own_names:
+            outside = is_file_name(name)
+        else:
+            outside = is_file_name(str(read_toml(Path(name).read_text(encoding="utf-8")).get(PARENT, shipped(kind)[0])))
+        if outside:
+            raise ValueError(f"{kind} {name!r}")
+    plan = {} if work.plan is None else read_toml(work.plan.read_text(encoding="utf-8"))
+    for table in (table for key in (*ZONE_KINDS, "modifier") for table in plan.get(key, [])):
+        if (mesh := table.get("mesh")) is not None and Path(str(mesh)).name != mesh:
+            raise ValueError(f"mesh {mesh!r}")
 
 
 def _work_of(folder: Path, record: dict[str, Any]) -> Work:
     given, name = record["given"], str(record["name"])
-    if Path(name).name != name or name in ("", "..") or not name.isprintable() or len(name.encode()) > LONGEST_NAME:
-        raise ValueError(f"name {name!r}")
+    _check_name(name)
+    rows = np.array(record["rotation"], dtype=np.float64)
+    if rows.shape != (3, 3) or not np.allclose(rows @ rows.T, np.eye(3), atol=1e-6):
+        raise ValueError(f"rotation {record['rotation']!r}")
+    if not 1 <= int(record["copies"]) <= MOST_COPIES:
+        raise ValueError(f"copies {record['copies']!r}")
     if not all(isinstance(given[kind], str) for kind in KINDS):
         raise ValueError(f"profiles {given!r}")
     own_names = {str(kind): Path(name).name for kind, name in record["own_profiles"].items()}
@@ -218,6 +253,7 @@ def _work_of(folder: Path, record: dict[str, Any]) -> Work:
         locked=tuple(map(int, record["locked"])),
         stops=parse_stops(record["pauses"], record["changes"]),
         copies=int(record["copies"]),
+        marks_in_plan=bool(record.get("marks_in_plan", True)),
         plate=None if record.get("plate") is None else int(record["plate"]),
         own_names=own_names,
         figures={str(key): float(value) for key, value in record.get("figures", {}).items()},
@@ -240,6 +276,7 @@ def project_bytes(work: Work, plan: PlanFile, mesh: Mesh, picture: bytes) -> byt
         write_folder(folder, work, plan)
         model = model_xml([(mesh, work.name)], {"Title": work.name, "Application": PROGRAM})
         digest = hashlib.sha256(model.encode()).hexdigest().encode()
+        _check_name(work.name)
         own_files = [(INSIDE + path.name, path.read_bytes()) for path in sorted(folder.iterdir())]
         write_package(content, model, [(THUMBNAIL, picture), (INSIDE + MESH_DIGEST, digest), *own_files])
     return content.getvalue()
@@ -252,7 +289,7 @@ def is_project(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as archive:
             return INSIDE + RECORD in archive.namelist()
-    except (*DAMAGES, OSError):
+    except DAMAGED:
         return False
 
 
@@ -285,9 +322,10 @@ def unpack(path: Path, folder: Path) -> Work:
                     shutil.copyfileobj(source, copy)
             changed = hashlib.sha256(archive.read(MODEL_PART)).hexdigest() != archive.read(INSIDE + MESH_DIGEST).decode()
         work = _read(folder, f"{path}: this project was saved by a newer tiltprint, which can open it")
+        _check_inside(folder, work)
     except PlanError:
         raise
-    except (*DAMAGES, *BAD_RECORD, OSError) as error:
+    except DAMAGED as error:
         raise PlanError(f"{path}: this project is damaged ({error})".replace(str(folder), str(path))) from None
     if changed:
         raise PlanError(

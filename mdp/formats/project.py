@@ -7,6 +7,7 @@ OrcaSlicer have a component for each and say in model_settings.config what it is
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from xml.etree.ElementTree import Element
 
 from mdp.formats.surface import Surface
@@ -140,6 +141,8 @@ def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[
         for between in element.findall("range"):
             settings = {option.get("opt_key", ""): (option.text or "").strip() for option in between.findall("option")}
             low, high = float(between.get("min_z", "")), float(between.get("max_z", ""))
+            if not (isfinite(low) and isfinite(high)):
+                raise ValueError(f"a range of heights from {low:g} to {high:g}")
             heights.setdefault(element.get("id", ""), []).append((low, high, _settings(settings)))
     return heights
 

@@ -1,6 +1,8 @@
 """Project: the settings inside the project files (.3mf) of PrusaSlicer, Bambu Studio, OrcaSlicer and Cura."""
 
 import json
+import lzma
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +62,7 @@ def read_project_settings(file: Path) -> ProjectSettings:
                 return ProjectSettings({}, prusaslicer.of_gcode)
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
-    except (BadZipFile, ValueError, NotImplementedError, RuntimeError) as error:
+    except (BadZipFile, zlib.error, lzma.LZMAError, EOFError, ValueError, NotImplementedError, RuntimeError) as error:
         raise ProfileError(f"profile {file}: its settings are damaged ({str(error).splitlines()[0]})") from None
     kept = any(name.startswith(OF_CURA) for name in entries)
     return ProjectSettings(cura.read_values(file)[0] if kept else {}, cura.of_values)

@@ -164,7 +164,7 @@ def _farthest(points: Floats, a: int, b: int, tolerance_mm: float) -> int:
 @no_nrt
 def _join_near_corners(points: Floats, corner: Mask, first: int, last: int, tolerance_mm: float) -> None:
     """Keeps one point in place of two corners of a polyline first .. last that are near to each other, where that is enough."""
-    before, p = first, _next_corner(corner, first)
+    before, p = first, _next_corner(corner, first) if last > first else last
     while p < last:
         q = _next_corner(corner, p)
         if q == last:

@@ -1,5 +1,6 @@
 """The edit command: the workbench, served on this computer until Ctrl-C."""
 
+import shutil
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,7 +68,11 @@ def _lan(request: EditRequest) -> Lan | None:
 async def _open(session: Session, opened: Opened) -> None:
     if opened.project:
         folder = new_folder()
-        await session.open_work(folder, unpack(opened.path, folder), f"open {opened.name}")
+        try:
+            await session.open_work(folder, unpack(opened.path, folder), f"open {opened.name}")
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
         return
     await session.open_model(opened.path, opened.name)
     if opened.plan is not None:

@@ -33,6 +33,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
         if not request.is_gcode:
             raise ProfileError(f"--model {reference}: {request.model} is a model itself; --model goes with a G-code file")
         project = open_project(reference)
+        plate = request.plate if project is None else project.plate
         reference = reference if project is None else project.argument
         check_file(locate(reference))
     loaded = load_program(request)
@@ -42,7 +43,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
         from machine.planning.fit import mesh_at_place
         from mdp.read import read_model
 
-        model = read_model(locate(reference), profile.process.scale, profile.process.rotate_deg, request.plate)
+        model = read_model(locate(reference), profile.process.scale, profile.process.rotate_deg, plate)
         mesh = mesh_at_place(model.mesh, profile)
     agreed = None
     if mesh is not None:

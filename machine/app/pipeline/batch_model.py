@@ -15,6 +15,7 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
 from machine.app.project import close_projects, open_project, with_meshes, without_folders
 from machine.app.requests import ModelRequest
+from machine.app.terminal.options import ProfileOptions
 from machine.app.terminal.plain import plain_line
 from machine.dryrun.dryrun import summary
 from machine.planning.fit import check_parts
@@ -24,7 +25,7 @@ from mdp.plans.writing import plan_text
 from mdp.ranking import SUFFIX
 from mdp.save import json_values, part_file
 from profiles.errors import UserError
-from profiles.profile import Profile, load, with_part_settings
+from profiles.profile import Profile, with_part_settings
 from slicer.estimate.estimate import estimate
 
 DONE, REFUSED, FAILED = STATUSES = ("done", "refused", "failed")
@@ -67,7 +68,17 @@ def job_of(do: str, asked: ModelRequest, out: Path) -> Job:
     if asked.ranker.endswith(SUFFIX):  # other machines start elsewhere
         file = Path(asked.ranker).resolve()
         asked, ranker = replace(asked, ranker=str(file)), file.read_bytes()
-    words = (version("tiltprint"), do, asked.profile.model_dump_json(), ranker, asked.orient, asked.cuts.parts, asked.plate)
+    named = asked.profile_names, asked.settings, asked.profile.parts  # over what a project says
+    words = (
+        version("tiltprint"),
+        do,
+        asked.profile.model_dump_json(),
+        ranker,
+        asked.orient,
+        asked.cuts.parts,
+        asked.plate,
+        named,
+    )
     return Job(do, asked, out, sha256(repr(words).encode()).hexdigest())
 
 
@@ -102,14 +113,18 @@ def request_of(model: str, asked: ModelRequest) -> ModelRequest:
     work = open_project(model)
     if work is None:
         return replace(asked, model=model)
-    given, names = work.given, asked.profile_names
-    named = zip((given.machine, given.material, given.process), names, strict=True)
-    machine, material, process = (name or of_project for of_project, name in named)
-    profile = load(machine, material, process, (*given.settings, *asked.settings))
-    cuts = replace(asked.cuts, plans=(work.plan,) if work.plan else ())
-    profile = with_part_settings(profile, asked.profile.parts)
+    machine, material, process = asked.profile_names
+    profile = ProfileOptions(machine, material, process, list(asked.settings)).over(work.given).profile()
     return replace(
-        asked, model=work.argument, project=Path(model), profile=profile, cuts=cuts, stops=work.stops, copies=work.copies
+        asked,
+        model=work.argument,
+        project=Path(model),
+        profile=with_part_settings(profile, asked.profile.parts),
+        cuts=replace(asked.cuts, plans=(work.plan,) if work.plan else ()),
+        stops=work.stops,
+        copies=work.copies,
+        plate=work.plate if asked.plate is None else asked.plate,
+        own_marks=not work.marks_in_plan,
     )
 
 

@@ -61,6 +61,8 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
         raise PlanError(f"--record {record}: --plan {cuts.plan} exists, so nothing is searched that could be recorded")
     if cuts.planes is not None and request.orient:
         raise PlanError(f"--orient: the planes of {cuts.planes} belong to the model as it lies; process.rotate_deg turns it")
+    if cuts.plan is not None and request.orient:
+        raise PlanError(f"--orient: the plan {cuts.plan} says how the model lies; leave one of them out")
     file = cuts.plan or cuts.planes or _plan_of_demo(request)
     given = None if file is None else read_plan(file)
     if given is not None and given.orientation is not None and request.orient is False:

@@ -166,7 +166,7 @@ class _Search:
     def _with_marks(self, mesh: Mesh) -> PlanFile | None:
         """The plan with the marks that the model's file has, on the model as it lies now; None: there are neither."""
         model = self._model
-        if model.zones == NO_ZONES:
+        if model.zones == NO_ZONES or not self._request.own_marks:
             return self._given
         given = PlanFile(self._request.name) if self._given is None else self._given
         rotation, shift_mm = (np.eye(3), np.zeros(3)) if mesh is model.mesh else motion_between(model.mesh, mesh)

@@ -231,7 +231,7 @@ def model_request(model: str, search: SearchOptions, given: ProfileOptions, **fu
     if (work := open_project(model)) is not None:
         if search.settings_of_file:
             raise PlanError(f"--settings-of-file: {model} is a project of tiltprint, whose settings hold without it")
-        project = Path(model)
+        project, further["own_marks"] = Path(model), not work.marks_in_plan
         plate = work.plate if plate is None else plate
         model, given = work.argument, given.over(work.given)
         cuts = further.get("cuts", Cuts())

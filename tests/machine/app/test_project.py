@@ -122,7 +122,7 @@ def changed(path: Path, name: str, content: bytes | None) -> None:
         (INSIDE + RECORD, b'{"version": 99}', "was saved by a newer tiltprint, which can open it"),
         (INSIDE + "..", b"x", "this project is damaged"),
         (INSIDE + 300 * "a", b"x", "this project is damaged"),
-        (INSIDE + "plan.toml", b"version = ", "plan"),
+        (INSIDE + "plan.toml", b"version = ", "this project is damaged"),
     ],
 )
 @pytest.mark.usefixtures("folder")
@@ -168,6 +168,53 @@ def test_a_project_that_is_read_is_never_written_over(words: tuple[str, ...], ca
     assert main([words[0], "tee.3mf", *words[1:]]) == 1
     assert "the same file as the project, which is read" in capsys.readouterr().err
     assert Path("tee.3mf").read_bytes() == before
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_name_with_letters_of_all_kinds_is_kept() -> None:
+    name = "my\u00a0t\u00e9e \u732b '1'.stl"
+    Path("tee.stl").rename(name)
+    run("save", name, *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    run("decompose", "tee.3mf", "-o", "parts")
+    assert json.loads(Path("parts/decomposition.json").read_text())["model"] == name
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("rotation", [[1, 0, 0], [0, 1, 0]]),
+        ("rotation", [[2, 0, 0], [0, 1, 0], [0, 0, 1]]),
+        ("copies", -4),
+        ("parts", float("inf")),
+        ("given", {"machine": "/etc/passwd", "material": "pla", "process": "standard", "settings": []}),
+        ("given", {"machine": 3, "material": "pla", "process": "standard", "settings": []}),
+    ],
+)
+@pytest.mark.usefixtures("folder")
+def test_a_record_that_no_project_has_is_damage(key: str, value: object, capsys: pytest.CaptureFixture[str]) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    with zipfile.ZipFile("tee.3mf") as archive:
+        record = json.loads(archive.read(INSIDE + RECORD))
+    changed(Path("tee.3mf"), INSIDE + RECORD, json.dumps(record | {key: value}).encode())
+    assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
+    assert "this project is damaged" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_batch_has_its_options_over_a_project_as_export_has() -> None:
+    lying = ("--parts", "1", "--as-is")
+    Path("models").mkdir()
+    run("save", "tee.stl", *FAST, *lying, "--set", "process.walls=3", "-o", "models/tee.3mf")
+    run("batch", "models", "-o", "out", "--process", "draft", "--workers", "1")
+    run("export", "models/tee.3mf", "--process", "draft", "-o", "one.gcode")
+    assert Path("out/tee.gcode").read_bytes() == Path("one.gcode").read_bytes()
+
+
+@pytest.mark.usefixtures("folder")
+def test_how_a_project_lies_is_not_asked_for_twice(capsys: pytest.CaptureFixture[str]) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    assert main(["decompose", "tee.3mf", "--orient"]) == 1
+    assert "--orient: the plan tee.3mf/plan.toml says how the model lies" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("models", [("tee.3mf", "tee.stl"), ("tee.stl", "tee.3mf"), ("tee.3mf:2",)])

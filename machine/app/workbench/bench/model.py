@@ -19,7 +19,9 @@ from profiles.frozen import Vector
 @dataclass(frozen=True, eq=False)
 class Model:
     """A model as it is read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for every repair. key:
-    what tells it from every other reading; a page asks for its triangles by it. zones: the boxes that its file marks."""
+    what tells it from every other reading; a page asks for its triangles by it. zones: the boxes that its file marks; plate:
+    of another slicer's project, None: the first that holds something.
+    """
 
     name: str
     path: Path
@@ -30,9 +32,10 @@ class Model:
     notes: tuple[str, ...] = ()
     key: str = field(default_factory=lambda: token_hex(8))
     zones: Zones = NO_ZONES
+    plate: int | None = None
 
     @classmethod
-    def stored(cls, name: str, path: Path, read: ReadModel, mesh_file: Path) -> "Model":
+    def stored(cls, name: str, path: Path, read: ReadModel, mesh_file: Path, plate: int | None = None) -> "Model":
         """One whose mesh is written to a file first; of its marks boxes alone are kept, which move with it."""
         mesh, zones = read.mesh, read.zones
         with mesh_file.open("wb") as file:
@@ -42,7 +45,7 @@ class Model:
         if left := zones.count - kept.count:
             verb, it = ("is", "it") if left == 1 else ("are", "them")
             notes += (f"{left} of these marks {verb} no box and left out here: the command line has {it}",)
-        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes, zones=kept)
+        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes, zones=kept, plate=plate)
 
     def mesh(self) -> Mesh:
         """Its triangles, read anew."""

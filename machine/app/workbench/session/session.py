@@ -44,6 +44,7 @@ from mdp.model_file import locate, plan_beside
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import MANY_FACES
+from mdp.zone import NO_ZONES
 from profiles.errors import MeshError, PlanError
 from profiles.profile import Profile
 
@@ -138,8 +139,9 @@ class Session(SessionBase):
         for tasks in (self.quick, self.hand, self.long):
             self.start(tasks.warm())
 
-    async def open_model(self, path: Path, name: str, anew: bool = True) -> None:
-        """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it.
+    async def open_model(self, path: Path, name: str, anew: bool = True, plate: int | None = None) -> None:
+        """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it;
+        plate: of another slicer's project.
 
         Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
         """
@@ -155,7 +157,7 @@ class Session(SessionBase):
             while model is None or _reads(bench.profile) != read_for:  # another scale may be set meanwhile
                 read_for = _reads(bench.profile)
                 try:
-                    model = await self._read(path, name, bench.profile)
+                    model = await self._read(path, name, bench.profile, plate)
                 except _UnscaledError as error:
                     self.unscaled = OfUnknownUnit(asking.get(), path, name, error.unscaled.units)
                     raise MeshError(error.unscaled.question if asking.get() else error.unscaled.sentence) from None
@@ -214,12 +216,14 @@ class Session(SessionBase):
             path = locate(work.name) if work.model is None else self.received.new_file(work.name)
             if work.model is not None:
                 await asyncio.to_thread(shutil.copyfile, work.model, path)
-            await self.open_model(path, work.name, anew=False)
+            await self.open_model(path, work.name, anew=False, plate=work.plate)
+            marks = NO_ZONES if work.marks_in_plan else with_rotation(self.bench, work.rotation).zones
             if work.plan is not None:
                 await self.open_plan(work.plan)
             bench = with_rotation(self.bench, work.rotation)
             bench = bench if work.parts else replace(bench, cuts=None)
             locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in work.locked)
+            bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES and work.plan is not None else bench
             self.do(word, replace(bench, locked=locked, stops=work.stops, copies=work.copies))
 
     async def open_plan(self, path: Path) -> None:
@@ -298,7 +302,7 @@ class Session(SessionBase):
         new, old = bench.profile.process, before.profile.process
         if model is not None and _reads(bench.profile) != _reads(before.profile):
             with self.waiting(f"reading {model.name}"):
-                model = await self._read(model.path, model.name, bench.profile)
+                model = await self._read(model.path, model.name, bench.profile, model.plate)
             self._begin_ranking(model)
             if new.rotate_deg != old.rotate_deg:
                 turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
@@ -315,9 +319,9 @@ class Session(SessionBase):
                 return replace(with_cuts(bench, ()), cuts=None), why
         return bench, ""
 
-    async def _read(self, path: Path, name: str, profile: Profile) -> Model:
+    async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None) -> Model:
         """The model of a file, whose mesh stays as long as anybody has it."""
-        model: Model | Unscaled = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file())
+        model: Model | Unscaled = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file(), plate)
         if isinstance(model, Unscaled):
             raise _UnscaledError(model)
         finalize(model, model.mesh_file.unlink, missing_ok=True)

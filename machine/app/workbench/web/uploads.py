@@ -43,7 +43,7 @@ class Uploads:
 
         if DEVICE in request.scope:
             check_model_name(name)
-        return await self._open(session, name, receive)
+        return await self._open(session, name, receive, DEVICE in request.scope)
 
     async def list_left(self, session: Session, request: Request) -> Response:
         """What has been left and is still there."""
@@ -98,13 +98,25 @@ class Uploads:
         except OSError as error:
             raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
 
-    async def _open(self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]]) -> Response:
+    async def _open_project(self, session: Session, path: Path, name: str, of_device: bool) -> None:
+        folder = new_folder()
+        try:
+            work = await asyncio.to_thread(unpack, path, folder)
+            if of_device:
+                check_model_name(work.name)
+            await self._open_work(session, folder, work, f"open {name}")
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+
+    async def _open(
+        self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]], of_device: bool = False
+    ) -> Response:
         path, taken = session.received.new_file(name), False
         try:
             await fill(path)
             if is_project(path):
-                folder = new_folder()
-                await self._open_work(session, folder, await asyncio.to_thread(unpack, path, folder), f"open {name}")
+                await self._open_project(session, path, name, of_device)
             elif path.suffix.lower() != TEXT_SUFFIX:
                 await session.open_model(path, name)
                 taken = True

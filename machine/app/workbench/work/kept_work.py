@@ -53,6 +53,8 @@ def work_of(bench: Bench) -> Work:
         locked=tuple(k for k, part in enumerate(bench.cuts or ()) if part in bench.locked),
         stops=bench.stops,
         copies=bench.copies,
+        plate=model.plate,
+        marks_in_plan=True,
         figures=figures_of(next((row for row in bench.rows if row.parts == bench.parts), None)),
     )
 

@@ -40,16 +40,18 @@ class Unscaled:
     units: dict[str, float]
 
 
-def read_model(tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path) -> Model | Unscaled:
+def read_model(
+    tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path, plate: int | None = None
+) -> Model | Unscaled:
     """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
     try:
-        read = read_model_file(path, profile.process.scale, profile.process.rotate_deg)
+        read = read_model_file(path, profile.process.scale, profile.process.rotate_deg, plate)
     except SizeError as error:
         sentence, question = (text.replace(str(path), name) for text in (str(error), error.question))
         return Unscaled(sentence, question, error.units)
     except MeshError as error:
         raise MeshError(str(error).replace(str(path), name)) from None
-    return Model.stored(name, path, read, mesh_file)
+    return Model.stored(name, path, read, mesh_file, plate)
 
 
 def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, ...]:
