@@ -26,6 +26,7 @@ from machine.planning.stops import Stop, parse_stops
 from mdp.decomposition import FrontRow
 from mdp.formats.threemf import DAMAGES
 from mdp.mesh import Mesh
+from mdp.model_file import DEMO
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile
 from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
@@ -43,7 +44,7 @@ INSIDE, THUMBNAIL = "Metadata/tiltprint/", "Metadata/thumbnail.png"
 PICTURE_PX = (256, 256)
 MESH_DIGEST = "mesh.sha256"  # of the 3MF's model part, to see whether another program has changed it
 PROGRAM = f"tiltprint {version('tiltprint')}"
-SUFFIX, DEMO = ".3mf", "demo:"
+SUFFIX = ".3mf"
 FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: in no other folder, on any disk
 ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-[0-9a-f]{{12}}-")  # to the names of a project's files
 LONGEST_NAME = 255  # bytes of a file's name on any disk
@@ -283,7 +284,7 @@ def project_bytes(work: Work, plan: PlanFile, mesh: Mesh, picture: bytes) -> byt
 
 
 def is_project(path: Path) -> bool:
-    """Whether a file is a project that `write_project` wrote, or one that was damaged since."""
+    """Whether a file is a project that `project_bytes` made, or one that was damaged since."""
     if path.suffix.lower() != SUFFIX or not path.is_file():
         return False
     try:

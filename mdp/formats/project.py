@@ -118,7 +118,7 @@ def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[t
 
 
 def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], Role], list[Plate]]:
-    """The objects, the parts and the plates of Told. Raises ValueError for a number that is none."""
+    """The objects, the parts and the plates of Told. Raises ValueError for text that is not a number."""
     objects, parts = dict[str, Role](), dict[tuple[str, str], Role]()
     for element in config.findall("object"):
         number = element.get("id", "")

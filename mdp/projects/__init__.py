@@ -1,4 +1,4 @@
-"""Projects of other slicers: what of one is printed, and which of our own marks its other volumes are.
+"""Projects of other slicers: the volumes that are printed, and the marks and modifiers that the others become.
 
 `printed.printed` takes negative volumes out, `marks.marks` makes modifiers and marks; `mdp.formats.project` is what a file says.
 """

@@ -91,8 +91,10 @@ class _Marks:
         return process
 
     def _place(self, volume: ProjectVolume, own: ProjectObject) -> Volume | None:
-        """Where a volume lies, within the box of its object where there are others; None: it is no solid, which is told. Where an
-        object is nothing but marks, as in Cura, they hold for all."""
+        """Where a volume lies, within the box of its object if there are others; None for one that is no solid, with a note.
+
+        Where an object is nothing but marks, as in Cura, they hold for all.
+        """
         try:
             solid = solid_of_volume(volume)
         except MeshError as error:

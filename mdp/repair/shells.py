@@ -195,7 +195,7 @@ def subtract(surface: Surface, others: list[Surface]) -> Surface:
 
 
 def above(surface: Surface, z_mm: float) -> Surface:
-    """What of a closed surface lies above a height, without faces where that is nothing."""
+    """The part of a closed surface above a height; without faces where there is none."""
     return surface_of(solid_of(surface).trim_by_plane((0.0, 0.0, 1.0), z_mm))
 
 

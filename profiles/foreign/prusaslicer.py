@@ -45,7 +45,7 @@ def read_settings(lines: list[str], program: str, chosen: Mapping[str, str]) -> 
 def gcode_settings(text: str) -> dict[str, str]:
     """The settings at the end of a G-code file: `; key = value`, and those of its JSON; empty where it has none.
 
-    Raises ProfileError for JSON that is none.
+    Raises ProfileError for text that is not JSON.
     """
     settings: dict[str, str] = {}
     for line in text.split("\n"):

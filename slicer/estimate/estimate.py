@@ -119,7 +119,7 @@ def _weights(rough: Floats, layers: Indices, begins: Indices) -> Floats:
 
 
 def _support_mm3(rough: Floats, real: Floats, layers: Indices, counts: Floats) -> float:
-    """Support of all layers, mm3, from what the sampled ones have, each counted so many times as counts say.
+    """Support of all layers, mm3, from what the sampled ones have, each weighted by its count.
 
     Single layers may have none, so the factor between rough and real figures is one for all layers over the first.
     """

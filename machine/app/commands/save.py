@@ -7,9 +7,10 @@ from machine.app.output import check_writable, write_bytes
 from machine.app.pictures.picture import parts_together
 from machine.app.pictures.png import png_bytes
 from machine.app.pipeline.pipeline import Decomposed, decompose_model
-from machine.app.project import DEMO, PICTURE_PX, STANDING, SUFFIX, Work, figures_of, project_bytes
+from machine.app.project import PICTURE_PX, STANDING, SUFFIX, Work, figures_of, project_bytes
 from machine.app.requests import Given, ModelRequest
 from machine.app.terminal.plain import show
+from mdp.model_file import DEMO
 from profiles.errors import OutputError
 from profiles.profile import DEFAULTS
 

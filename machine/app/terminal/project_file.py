@@ -11,7 +11,7 @@ from profiles.foreign.read import read_config
 
 
 def given_by(model: str) -> Given:
-    """The shipped material that is the nearest, and the settings that print a project as it was saved; a person is told how many
+    """The nearest shipped material and the settings that print a project as it was saved; a note on stderr says how many
     there are. Raises ProfileError for a model that keeps no settings."""
     if not model:
         raise ProfileError("--settings-of-file goes with one model, not with a folder of them")

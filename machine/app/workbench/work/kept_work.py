@@ -12,8 +12,9 @@ from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
 
-from machine.app.project import DEMO, PLAN, RECORD, Work, figures_of, write_folder
+from machine.app.project import PLAN, RECORD, Work, figures_of, write_folder
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
+from mdp.model_file import DEMO
 from profiles.files import lock_folder
 from profiles.folders import state_folder
 

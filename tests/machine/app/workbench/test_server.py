@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from shlex import split
 
+import manifold3d as m3
 import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
@@ -17,6 +18,7 @@ from websockets.exceptions import InvalidStatus
 from machine.app.cli import main
 from mdp.save import stl
 from tests.machine.workbench import PATIENCE_S, QUICK, Running, is_there, workbench
+from tests.mdp.projects import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import box, tee
 
 
@@ -128,6 +130,17 @@ def test_a_project_that_a_bench_saves_is_cut_by_the_command_line_and_opened_as_i
         assert [row["planes"] for row in again["front"]] == [row["planes"] for row in searched["front"]]
     assert main(["decompose", "saved.3mf", "-o", "again"]) == 0
     assert bench.ask("plan.toml")[1] == (folder / "again" / "plan.toml").read_bytes()
+
+
+def test_marks_of_another_slicer_s_project_are_there_when_it_is_saved_and_opened(bench: Running, folder: Path) -> None:
+    post = m3.Manifold.cube((8.0, 10.0, 12.0), True).translate((0.0, 0.0, 6.0))
+    near = m3.Manifold.cube((20.0, 20.0, 4.0), True).translate((0.0, 0.0, 8.0))
+    prusaslicer(folder / "post.3mf", [Object([Made(post), Made(near, "no_support")], [AT_ORIGIN])])
+    assert main(["save", "post.3mf", *QUICK, "--parts", "1", "--as-is", "-o", "kept.3mf"]) == 0
+    with bench.line() as page:
+        assert bench.send(folder / "kept.3mf")[0] == 200
+        opened = page.until(lambda state: state["model"]["name"] == "post.3mf" and state["parts"] == 1)
+        assert [zone["kind"] for zone in opened["zones"]] == ["no_support"]
 
 
 def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: Running, folder: Path) -> None:
