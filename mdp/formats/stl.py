@@ -30,8 +30,9 @@ def read(path: Path) -> list[Surface]:
         ascii_likely = text.lstrip()[:5].lower() in (b"", b"solid")
         size = path.stat().st_size
         text += file.read(FACET)
+        announced = "that its header announces"
         if count in UNCOUNTED and any(text[HEADER:]):  # a file of zeros is no model, however long
-            count = -(-(size - HEADER) // FACET)
+            count, announced = -(-(size - HEADER) // FACET), "that it begins"
         text += file.read() if ascii_likely else file.read(min(FACET * max(count - 1, 0) + 1, size))
     if count >= 0 and len(text) == HEADER + FACET * count:
         return [_binary(path, text, count)]
@@ -41,7 +42,7 @@ def read(path: Path) -> list[Surface]:
         raise MeshError(f"{path}: is not an STL file: neither binary nor ASCII with `solid` and `facet` in it")
     if len(text) < HEADER + FACET * count:
         held = (len(text) - HEADER) // FACET
-        raise MeshError(f"{path}: is cut short: it holds {held} of the {count} facets that it announces or begins")
+        raise MeshError(f"{path}: is cut short: it holds {held} of the {count} facets {announced}")
     return [_binary(path, text, count)]  # some programs write colours or padding behind the facets
 
 

@@ -18,7 +18,7 @@ SOLID = {  # file: (scale, volume in mm3, words of a note or nothing)
     "durga_chest.stl": (1.0, 21_928, "turned 36 faces over"),
     "f18_jet.stl": (1.0, 27_693.8, "left out 99 shells"),
     "lutyens_garden_set.stl": (1.0, 22_868.9, "united 211 bodies"),
-    "npm_notANumberNormal.ascii.stl": (1.0, 1 / 6, ""),
+    "npm_notANumberNormal.ascii.stl": (1.0, 1 / 6, "its longest side is 1 mm"),
     "slicer_double_slit_experiment.stl": (1.0, 6_282.9, "filled 2 small holes"),
     "slicer_extra_surface.stl": (1.0, 10_239.5, "loose sheets"),
     "slicer_extra_vertices.obj": (1.0, 20**3, ""),
