@@ -142,6 +142,6 @@ async def _receive(request: Request, path: Path, name: str, most_mib: int) -> No
 def _check_size(name: str, size: int, most_mib: int) -> None:
     if size > most_mib * MIB:
         raise PlanError(
-            f"{name}: has more than {most_mib} MiB, more than a page may send: a model of fewer faces is needed, or"
+            f"{name}: has more than the {most_mib} MiB that a page may send: a model of fewer faces is needed, or"
             " tiltprint edit with the file's name, or with a larger --upload-mib"
         )

@@ -61,7 +61,7 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
         with suppress(OSError):  # it is not heard to its end
             bench.send(sent / "large.stl")
         problem = page.until(lambda state: state["problem"])["problem"]
-        assert problem.startswith("large.stl: has more than 1 MiB, at most so many are taken from a page")
+        assert problem.startswith("large.stl: has more than the 1 MiB that a page may send:")
         assert [bench.send(sent / name)[0] for name in (broken, "tee.stl", "plan.toml")] == [422, 200, 422]
         assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken}: ")  # in no words of the page's
         assert [names_in(folder) for folder in temporary.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
