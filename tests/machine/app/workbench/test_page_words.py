@@ -97,7 +97,7 @@ NAMES = st.builds(
 )
 SAID = (
     "reading {}",
-    "{}: has more than 1 MiB, at most so many are taken from a page",
+    "{}: has more than the 1 MiB that a page may send",
     "plan tee.toml: there is no model on the workbench to cut by it: open {} first",
     "3 copies: {} is cut into 2 parts, copies are printed in one piece each: --parts 1",
     "uploading {}: 1.0 of 2.0 MB",
