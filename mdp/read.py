@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from mdp.directions.turns import turned_by
-from mdp.formats.project import Project, ProjectObject, ProjectVolume
+from mdp.foreign.marks import marks
+from mdp.foreign.printed import printed
 from mdp.formats.readers import READERS
+from mdp.formats.slicer_file import Build, BuildObject, BuildVolume
 from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import check_file
 from mdp.overhang import PLATFORM_TOLERANCE_MM
-from mdp.projects.marks import marks
-from mdp.projects.printed import printed
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
 from mdp.topology.components import vertex_components
@@ -41,7 +41,7 @@ class SizeError(MeshError):
 @dataclass(frozen=True, eq=False)
 class ReadModel:
     """A model as its file has it: its solid, a short sentence for every repair and for what else a person must know, and the
-    marks that a slicer's project brings along, where they lie on the solid."""
+    marks that a slicer file brings along, where they lie on the solid."""
 
     mesh: Mesh
     notes: tuple[str, ...] = ()
@@ -61,32 +61,32 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
 def read_model(
     path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0), plate: int | None = None
 ) -> ReadModel:
-    """The same with the marks of a project. plate: of its plates; None: the first that holds something. Raises MeshError."""
+    """The same with the marks of a build. plate: of its plates; None: the first that holds something. Raises MeshError."""
     with np.errstate(all="ignore"):  # what overflows is no finite number, or too large: both are said in a sentence below
-        project = _read_project(path, plate)
+        build = _read_build(path, plate)
     try:
-        surfaces, taken = printed(project)
+        surfaces, taken = printed(build)
         _check_size(surfaces, scale)
         if scale != 1.0:
             surfaces = [replace(surface, vertices=surface.vertices * scale, gap=surface.gap * scale) for surface in surfaces]
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
         mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
-        zones, told = marks(project, path, scale * turn, shift_mm)
+        zones, told = marks(build, path, scale * turn, shift_mm)
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     left_out = (note for surface in surfaces for note in surface.notes)
     size = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
-    notes = (*project.notes, *taken, *told, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
+    notes = (*build.notes, *taken, *told, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
     return ReadModel(mesh, notes, zones)
 
 
 def read_in_place(path: Path) -> Mesh:
     """The solid of a model file where the file has it, in mm. Raises MeshError as read_mesh, but for sizes."""
     try:
-        solid, _ = repair(printed(_read_project(path))[0])
+        solid, _ = repair(printed(_read_build(path))[0])
     except MeshError as error:
         text = str(error)
         raise MeshError(text if text.startswith(str(path)) else f"{path}: {text}") from None
@@ -137,8 +137,8 @@ def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
     return (f"{pieces} {height}, as its file has it, on nothing: only support can hold such, whatever is cut",)
 
 
-def _read_project(path: Path, plate: int | None = None) -> Project:
-    """What a model file prints; one that is no project is one object."""
+def _read_build(path: Path, plate: int | None = None) -> Build:
+    """What a model file prints; one that no slicer has saved is one object."""
     check_file(path)
     try:
         size = path.stat().st_size
@@ -147,12 +147,12 @@ def _read_project(path: Path, plate: int | None = None) -> Project:
         if size > MOST_BYTES:
             raise MeshError(f"{path}: has {size} bytes, at most {MOST_BYTES} are read: a model of fewer faces is needed")
         if path.suffix.lower() == ".3mf":
-            from mdp.formats.threemf import read_project
+            from mdp.formats.threemf import read_build
 
-            return read_project(path, plate)
+            return read_build(path, plate)
         if plate is not None:
-            raise MeshError(f"{path}: has no plates: --plate {plate} goes with a project of Bambu Studio or OrcaSlicer (.3mf)")
-        return Project([ProjectObject([ProjectVolume(surface) for surface in READERS[path.suffix.lower()](path)])])
+            raise MeshError(f"{path}: has no plates: --plate {plate} goes with a .3mf that Bambu Studio or OrcaSlicer has saved")
+        return Build([BuildObject([BuildVolume(surface) for surface in READERS[path.suffix.lower()](path)])])
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from None
 

@@ -205,6 +205,13 @@ class MeshVolume:
 
 
 Volume = Zone | MeshVolume
+
+
+def in_room(volume: Volume, room: Zone) -> Volume:
+    """A volume that ends at a box around its model, too, where other models stand beside it."""
+    return replace(volume, room=replace(room, room=volume.room))
+
+
 AnyZone = Zone | MeshVolume | Painted | Grown | Triangles
 
 
@@ -219,17 +226,14 @@ def faces_of(mesh: Mesh, zone: MeshVolume | Painted | Grown | Triangles) -> Mask
 
 @dataclass(frozen=True)
 class Modifier:
-    """A volume inside which other values of the process hold, by their keys. room: a box around its model, outside of which are
-    others that it does not change; None: there are no others."""
+    """A volume inside which other values of the process hold, by their keys."""
 
     volume: Volume
     process: dict[str, Any]
-    room: Zone | None = None
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Modifier":
         """The same with every place p at rotation @ p + shift_mm."""
-        room = None if self.room is None else self.room.transform(rotation, shift_mm)
-        return replace(self, volume=self.volume.transform(rotation, shift_mm), room=room)
+        return replace(self, volume=self.volume.transform(rotation, shift_mm))
 
 
 @dataclass(frozen=True)
@@ -314,7 +318,7 @@ class Marked:
 
     def within(self, room: Zone) -> "Marked":
         """The same, but nothing is marked outside of a box around the mesh."""
-        return replace(self, volumes=tuple(replace(volume, room=room) for volume in self.volumes))
+        return replace(self, volumes=tuple(in_room(volume, room) for volume in self.volumes))
 
     @classmethod
     def together(cls, marks: Sequence[tuple["Marked", int]]) -> "Marked":

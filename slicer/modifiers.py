@@ -97,12 +97,7 @@ def _areas(part: Part, modifiers: Sequence[Modifier], mesh: Mesh, cuts_mm: Float
     """The sections of volumes in each layer, near the part."""
     (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
     window = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
-    sections = []
-    for modifier in modifiers:
-        sections.append(volume_sections(part, modifier.volume, cuts_mm))
-        if modifier.room is not None:
-            rooms = volume_sections(part, modifier.room, cuts_mm)
-            sections[-1] = [area ^ room for area, room in zip(sections[-1], rooms, strict=True)]
+    sections = [volume_sections(part, modifier.volume, cuts_mm) for modifier in modifiers]
     return [union(layer) ^ window for layer in zip(*sections, strict=True)]
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from machine.app.output import plain_name
 from machine.app.profile_file import profile_text
-from machine.app.requests import MOST_COPIES, Given
+from machine.app.requests import MOST_COPIES, Given, ModelRequest
 from machine.planning.stops import Stop, parse_stops
 from mdp.decomposition import FrontRow
 from mdp.formats.threemf import DAMAGES
@@ -68,8 +68,8 @@ def close_projects() -> None:
 
 
 @dataclass(frozen=True)
-class Work:
-    """A model and what was asked for; files lie in the project's folder once it is read.
+class Project:
+    """A model and everything that decides its print; files lie in the project's folder once it is read.
 
     model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows
     them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
@@ -93,39 +93,55 @@ class Work:
     plate: int | None = None
     marks_in_plan: bool = False
 
+    def applied(self, asked: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
+        """A request for the model inside: the project decides what the command line leaves open.
+
+        file: the project; copies: as the user has given it, None for as many as the project has.
+        """
+        own_plan = self.plan if not asked.cuts.plans and asked.cuts.planes is None else None
+        return replace(
+            asked,
+            model=self.argument,
+            project=file,
+            cuts=asked.cuts if own_plan is None else replace(asked.cuts, plans=(own_plan,)),
+            own_marks=own_plan is None or not self.marks_in_plan,
+            stops=asked.stops or self.stops,
+            copies=self.copies if copies is None else copies,
+            plate=self.plate if asked.plate is None else asked.plate,
+        )
+
     @property
     def argument(self) -> str:
         """What a command line says for MODEL."""
         return self.name if self.model is None else str(self.model)
 
 
-def write_folder(folder: Path, work: Work, plan: PlanFile | None) -> None:
+def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     """Write a project's folder. Older models in it go; profiles and meshes stay, for a step that is undone may name them.
 
     Raises OSError and ProfileError; the record is written last, so that it names only what is there.
     """
-    profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(work.given, kind)))}
-    model = "" if work.model is None else _copied(work.model, folder, "model")
+    profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
+    model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
-        plan, _ = with_meshes(plan, folder)
-        write_whole(folder / PLAN, plan_text(plan, folder).encode())
+        write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
     record = {
         "version": VERSION,
         "program": PROGRAM,
-        "name": work.name,
+        "name": project.name,
         "model": model,
-        "given": {**asdict(work.given), **profiles},
-        "own_profiles": {kind: _bare_name(Path(getattr(work.given, kind))) for kind in profiles},
-        "rotation": work.rotation,
+        "given": {**asdict(project.given), **profiles},
+        "own_profiles": {kind: _bare_name(Path(getattr(project.given, kind))) for kind in profiles},
+        "rotation": project.rotation,
         "plan": plan is not None,
-        "parts": work.parts,
-        "locked": work.locked,
-        "pauses": [stop.option.partition(" ")[2] for stop in work.stops if not stop.change],
-        "changes": [stop.option.partition(" ")[2] for stop in work.stops if stop.change],
-        "copies": work.copies,
-        "plate": work.plate,
-        "marks_in_plan": work.marks_in_plan,
-        "figures": work.figures,
+        "parts": project.parts,
+        "locked": project.locked,
+        "pauses": [stop.option.partition(" ")[2] for stop in project.stops if not stop.change],
+        "changes": [stop.option.partition(" ")[2] for stop in project.stops if stop.change],
+        "copies": project.copies,
+        "plate": project.plate,
+        "marks_in_plan": project.marks_in_plan,
+        "figures": project.figures,
     }
     write_whole(folder / RECORD, json.dumps(record).encode())
     for file in folder.glob("model-*"):
@@ -146,19 +162,17 @@ def _profile_file(folder: Path, kind: str, name: str) -> str:
     return file
 
 
-def with_meshes(plan: PlanFile, folder: Path) -> tuple[PlanFile, list[str]]:
-    """The plan with copies of the meshes of its marks and modifiers in a folder, and the names that they have there."""
-    names = list[str]()
+def with_meshes(plan: PlanFile, folder: Path) -> PlanFile:
+    """The plan with copies of the meshes of its marks and modifiers in a folder."""
 
     def copied(volume: Any) -> Any:
         if not isinstance(volume, MeshVolume):
             return volume
-        names.append(_copied(volume.file, folder, "modifier"))
-        return replace(volume, file=(folder / names[-1]).absolute())
+        return replace(volume, file=(folder / _copied(volume.file, folder, "modifier")).absolute())
 
     marks = {kind: tuple(map(copied, getattr(plan.zones, kind))) for kind in ZONE_KINDS}
     modifiers = tuple(replace(own, volume=copied(own.volume)) for own in plan.zones.modifiers)
-    return replace(plan, zones=replace(plan.zones, modifiers=modifiers, **marks)), names
+    return replace(plan, zones=replace(plan.zones, modifiers=modifiers, **marks))
 
 
 def _check_alone(model: Path | None) -> None:
@@ -187,8 +201,8 @@ def _copied(file: Path, folder: Path, role: str) -> str:
     return name
 
 
-def read_folder(folder: Path) -> Work:
-    """The work in a project's folder. Raises PlanError with a sentence where it cannot be read, or not by this version."""
+def read_folder(folder: Path) -> Project:
+    """The project in a folder. Raises PlanError with a sentence where it cannot be read, or not by this version."""
     try:
         return _read(folder, f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}")
     except OSError as error:
@@ -197,14 +211,14 @@ def read_folder(folder: Path) -> Work:
         raise PlanError(f"what is kept in {folder} is no work of a workbench, or damaged") from None
 
 
-def _read(folder: Path, newer: str) -> Work:
-    """The work; newer: the sentence for one of a newer version."""
+def _read(folder: Path, newer: str) -> Project:
+    """The project; newer: the sentence for one of a newer version."""
     record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
     if not isinstance(record["version"], int) or record["version"] < 1:
         raise ValueError(f"version {record['version']!r}")
     if record["version"] > VERSION:
         raise PlanError(newer)
-    return _work_of(folder, record)
+    return _project_of(folder, record)
 
 
 def _check_name(name: str) -> None:
@@ -214,25 +228,25 @@ def _check_name(name: str) -> None:
         raise ValueError(f"name {name!r}")
 
 
-def _check_inside(folder: Path, work: Work) -> None:
+def _check_inside(folder: Path, project: Project) -> None:
     """Raise ValueError where a project names files that are not in it."""
-    if work.model is not None and not work.model.is_file():
-        raise ValueError(f"model {work.model.name!r}")
+    if project.model is not None and not project.model.is_file():
+        raise ValueError(f"model {project.model.name!r}")
     for kind in KINDS:
-        name = getattr(work.given, kind)
-        if kind not in work.own_names:
+        name = getattr(project.given, kind)
+        if kind not in project.own_names:
             outside = is_file_name(name)
         else:
             outside = is_file_name(str(read_toml(Path(name).read_text(encoding="utf-8")).get(PARENT, shipped(kind)[0])))
         if outside:
             raise ValueError(f"{kind} {name!r}")
-    plan = {} if work.plan is None else read_toml(work.plan.read_text(encoding="utf-8"))
+    plan = {} if project.plan is None else read_toml(project.plan.read_text(encoding="utf-8"))
     for table in (table for key in (*ZONE_KINDS, "modifier") for table in plan.get(key, [])):
         if (mesh := table.get("mesh")) is not None and Path(str(mesh)).name != mesh:
             raise ValueError(f"mesh {mesh!r}")
 
 
-def _work_of(folder: Path, record: dict[str, Any]) -> Work:
+def _project_of(folder: Path, record: dict[str, Any]) -> Project:
     given, name = record["given"], str(record["name"])
     _check_name(name)
     rows = np.array(record["rotation"], dtype=np.float64)
@@ -244,7 +258,7 @@ def _work_of(folder: Path, record: dict[str, Any]) -> Work:
         raise ValueError(f"profiles {given!r}")
     own_names = {str(kind): Path(name).name for kind, name in record["own_profiles"].items()}
     files = {kind: str(folder / Path(given[kind]).name) for kind in own_names}
-    return Work(
+    return Project(
         name=name,
         model=folder / Path(record["model"]).name if record["model"] else None,
         given=Given(**{**given, **files, "settings": tuple(map(str, given["settings"]))}),
@@ -268,16 +282,16 @@ def figures_of(row: FrontRow | None) -> dict[str, float]:
     return {name: value for name in names if (value := getattr(row, name, None)) is not None}
 
 
-def project_bytes(work: Work, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
+def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
     """The content of a project file: mesh is the model as it lies, picture a PNG. Raises OSError."""
-    _check_alone(work.model)
+    _check_alone(project.model)
     content = io.BytesIO()
     with TemporaryDirectory(prefix="tiltprint-project-") as name:
         folder = Path(name)
-        write_folder(folder, work, plan)
-        model = model_xml([(mesh, work.name)], {"Title": work.name, "Application": PROGRAM})
+        write_folder(folder, project, plan)
+        model = model_xml([(mesh, project.name)], {"Title": project.name, "Application": PROGRAM})
         digest = hashlib.sha256(model.encode()).hexdigest().encode()
-        _check_name(work.name)
+        _check_name(project.name)
         own_files = [(INSIDE + path.name, path.read_bytes()) for path in sorted(folder.iterdir())]
         write_package(content, model, [(THUMBNAIL, picture), (INSIDE + MESH_DIGEST, digest), *own_files])
     return content.getvalue()
@@ -294,22 +308,22 @@ def is_project(path: Path) -> bool:
         return False
 
 
-def open_project(model: str) -> Work | None:
-    """The work of a project file, unpacked for as long as the program runs; None for any other MODEL. Raises PlanError."""
+def open_project(model: str) -> Project | None:
+    """A project file, unpacked for as long as the program runs; None for any other MODEL. Raises PlanError."""
     if model.startswith(DEMO) or not is_project(Path(model)):
         return None
     folder = TemporaryDirectory(prefix="tiltprint-project-", ignore_cleanup_errors=True)
     _unpacked.append((folder, model))
-    work = unpack(Path(model), Path(folder.name))
-    if work.model is None:
-        return work
-    named = Path(folder.name) / ".model" / Path(work.name).name  # messages and G-code say the name that the model had
+    project = unpack(Path(model), Path(folder.name))
+    if project.model is None:
+        return project
+    named = Path(folder.name) / ".model" / Path(project.name).name  # messages and G-code say the name that the model had
     named.parent.mkdir()
-    return replace(work, model=work.model.rename(named))
+    return replace(project, model=project.model.rename(named))
 
 
-def unpack(path: Path, folder: Path) -> Work:
-    """The work of a project file, unpacked into an empty folder. Raises PlanError for one that is damaged or was changed."""
+def unpack(path: Path, folder: Path) -> Project:
+    """A project file, unpacked into an empty folder. Raises PlanError for one that is damaged or was changed."""
     try:
         with zipfile.ZipFile(path) as archive:
             entries = [entry for entry in archive.infolist() if entry.filename.startswith(INSIDE)]
@@ -322,8 +336,8 @@ def unpack(path: Path, folder: Path) -> Work:
                 with archive.open(entry) as source, (folder / Path(entry.filename).name).open("xb") as copy:
                     shutil.copyfileobj(source, copy)
             changed = hashlib.sha256(archive.read(MODEL_PART)).hexdigest() != archive.read(INSIDE + MESH_DIGEST).decode()
-        work = _read(folder, f"{path}: this project was saved by a newer tiltprint, which can open it")
-        _check_inside(folder, work)
+        project = _read(folder, f"{path}: this project was saved by a newer tiltprint, which can open it")
+        _check_inside(folder, project)
     except PlanError:
         raise
     except DAMAGED as error:
@@ -333,4 +347,4 @@ def unpack(path: Path, folder: Path) -> Work:
             f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
             " from there as STL, and decompose that"
         )
-    return work
+    return project

@@ -1,5 +1,5 @@
 """3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3), the colours
-of their triangles (Materials and Properties Extension 1.2), and what a slicer's project says of them (mdp.formats.project)."""
+of their triangles (Materials and Properties Extension 1.2), and the roles that a slicer gives to volumes."""
 
 import lzma
 import re
@@ -16,15 +16,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from mdp.formats.project import (
+from mdp.formats.slicer_file import (
     PAINTS,
     PART,
+    Build,
+    BuildObject,
+    BuildVolume,
+    Configs,
     Plate,
-    Project,
-    ProjectObject,
-    ProjectVolume,
     Role,
-    Told,
     read_bambu,
     read_cura,
     read_heights,
@@ -185,11 +185,11 @@ class Placement:
 
 
 def read(path: Path) -> list[Surface]:
-    """One surface for every mesh that the build prints, in mm; see read_project."""
-    return [surface for built in read_project(path).objects for surface in built.surfaces(PART)]
+    """One surface for every mesh that the build prints, in mm; see read_build."""
+    return [surface for built in read_build(path).objects for surface in built.surfaces(PART)]
 
 
-def read_project(path: Path, plate: int | None = None) -> Project:
+def read_build(path: Path, plate: int | None = None) -> Build:
     """The objects that the build prints on one plate; None: the first that holds something.
 
     Raises MeshError for a damaged package, an unknown unit, an object or a plate that does not exist, indices out of range and
@@ -200,25 +200,25 @@ def read_project(path: Path, plate: int | None = None) -> Project:
     except (zipfile.BadZipFile, struct.error, ValueError, NotImplementedError):
         raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
-        return _Build(Package(path, archive)).project(plate)
+        return _Builder(Package(path, archive)).build(plate)
 
 
-class _Build:
+class _Builder:
     """The build of a package."""
 
     def __init__(self, package: Package) -> None:
         self._package, self._path = package, package.path
         self._start = _start_part(package)
-        self._told = _told(package)
+        self._configs = _configs(package)
         self._notes: list[str] = []
         self._unpainted: Counter[str] = Counter()
         self._placed = self._meshes = self._faces = 0
         objects = package.model(self._start).root.findall("{*}resources/{*}object")
-        if not self._told.parts:
+        if not self._configs.parts:
             objects = [element for element in objects if element.find("{*}mesh") is not None]
         self._rank = {element.get("id", ""): str(place) for place, element in enumerate(objects, start=1)}
 
-    def project(self, plate: int | None) -> Project:
+    def build(self, plate: int | None) -> Build:
         """What is printed on a plate."""
         package, notes = self._package, self._notes
         items = self._items(package.model(self._start).root.findall("{*}build/{*}item"), plate)
@@ -232,7 +232,7 @@ class _Build:
             if count
         ]
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
-        return Project(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._told.objects))
+        return Build(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._configs.objects))
 
     def _items(self, items: list[ElementTree.Element], plate: int | None) -> Iterator[ElementTree.Element]:
         """The items that are printed on a plate."""
@@ -244,33 +244,33 @@ class _Build:
         chosen = self._plate([own for own, item in zip(instances, items, strict=True) if _is_printed(item)], plate)
         for item, instance in zip(items, instances, strict=True):
             if not _is_printed(item):
-                self._leave_out(item.get("objectid", ""), "which its project does not print")
+                self._leave_out(item.get("objectid", ""), "which is switched off in its slicer")
             elif chosen is None or instance in chosen.instances:
                 yield item
-            elif not any(instance in plate.instances for plate in self._told.plates):
+            elif not any(instance in plate.instances for plate in self._configs.plates):
                 self._leave_out(item.get("objectid", ""), "which stands on none of its plates")
 
     def _plate(self, printed: list[tuple[str, int]], number: int | None) -> Plate | None:
         """The plate of a number, or the first that holds something that is printed; None: there are no plates."""
-        plates = [plate for plate in self._told.plates if plate.instances.intersection(printed)]
+        plates = [plate for plate in self._configs.plates if plate.instances.intersection(printed)]
         if number is None:
             if len(plates) > 1:
                 others = ", ".join(str(plate.number) for plate in plates[1:])
                 named = f" ({plates[0].name})" if plates[0].name else ""
-                self._notes.append(f"takes plate {plates[0].number}{named} of its project; --plate takes another: {others}")
+                self._notes.append(f"takes plate {plates[0].number}{named} of its plates; --plate takes another: {others}")
             return plates[0] if plates else None
         if not plates:
-            raise MeshError(f"{self._path}: has no plates: --plate {number} goes with a project of Bambu Studio or OrcaSlicer")
+            raise MeshError(f"{self._path}: has no plates: --plate {number} goes with a file of Bambu Studio or OrcaSlicer")
         for plate in plates:
             if plate.number == number:
                 return plate
         known = ", ".join(str(plate.number) for plate in plates)
-        empty = any(plate.number == number for plate in self._told.plates)
+        empty = any(plate.number == number for plate in self._configs.plates)
         raise MeshError(f"{self._path}: --plate {number}: its plate is {'empty' if empty else 'not there'}; there are {known}")
 
-    def _object(self, item: ElementTree.Element) -> ProjectObject | None:
+    def _object(self, item: ElementTree.Element) -> BuildObject | None:
         """What an item places; None: nothing."""
-        volumes: list[ProjectVolume] = []
+        volumes: list[BuildVolume] = []
         settings: Mapping[str, str] = {}
         heights: Sequence[tuple[float, float, Mapping[str, str]]] = ()
         pending = [self._placement(item, Placement(self._start, "", _IDENTITY))]
@@ -292,17 +292,17 @@ class _Build:
                 volumes += self._volumes(placement, model, mesh, element.get("pid", ""))
                 own = placement.identity if placement.part == self._start else ""
                 for number in (*placement.within[:1], own):
-                    settings = {**settings, **self._told.objects.get(number, Role()).settings}
-                    heights = self._told.heights.get(self._rank.get(number, ""), heights)
+                    settings = {**settings, **self._configs.objects.get(number, Role()).settings}
+                    heights = self._configs.heights.get(self._rank.get(number, ""), heights)
                 continue
             components = element.findall("{*}components/{*}component")
             self._check_understood(element, bool(components))
             pending += [self._placement(component, placement) for component in reversed(components)]
-        return ProjectObject(volumes, settings, heights) if volumes else None
+        return BuildObject(volumes, settings, heights) if volumes else None
 
     def _with_role(self, placement: Placement, element: ElementTree.Element) -> Placement:
-        """The placement with what the project says of its object."""
-        within, told = placement.within, self._told.parts
+        """The placement with the role that the slicer gives its object."""
+        within, told = placement.within, self._configs.parts
         role = told.get(((*within, placement.identity)[0], placement.identity))
         own = read_cura(element)
         if role is None and (own.kind != PART or own.settings):
@@ -311,7 +311,7 @@ class _Build:
             role = Role(kind, own.name or outer.name, {**outer.settings, **own.settings})
         return placement if role is None else Placement(placement.part, placement.identity, placement.transform, within, role)
 
-    def _volumes(self, placement: Placement, model: Model, mesh: ElementTree.Element, pid: str) -> Iterator[ProjectVolume]:
+    def _volumes(self, placement: Placement, model: Model, mesh: ElementTree.Element, pid: str) -> Iterator[BuildVolume]:
         """The volumes of an object's mesh where a placement has them."""
         if placement.identity not in model.surfaces:
             model.surfaces[placement.identity] = _mesh_surface(self._path, mesh, pid, model.palettes)
@@ -322,9 +322,9 @@ class _Build:
         surface = _transformed(self._path, surface, placement.transform, _unit_mm(self._path, model.root))
         if placement.role is None or placement.role.kind == PART:
             yield from self._painted(surface, mesh, model.painted)
-        triangles = self._told.triangles.get(placement.identity, ()) if placement.part == self._start else ()
+        triangles = self._configs.triangles.get(placement.identity, ()) if placement.part == self._start else ()
         if placement.role is not None or not triangles:
-            yield ProjectVolume(surface, placement.role or Role())
+            yield BuildVolume(surface, placement.role or Role())
             return
         rest = np.ones(len(surface.faces), dtype=np.bool_)
         for first, last, role in triangles:
@@ -332,11 +332,11 @@ class _Build:
                 of = f"object {placement.identity}, which has {len(surface.faces)}"
                 raise MeshError(f"{self._path}: volume {role.name!r} has triangles {first} to {last} of {of} (counted from 0)")
             rest[first : last + 1] = False
-            yield ProjectVolume(_piece(surface, slice(first, last + 1)), role)
+            yield BuildVolume(_piece(surface, slice(first, last + 1)), role)
         if rest.any():
-            yield ProjectVolume(_piece(surface, np.flatnonzero(rest)))
+            yield BuildVolume(_piece(surface, np.flatnonzero(rest)))
 
-    def _painted(self, surface: Surface, mesh: ElementTree.Element, painted: Sequence[str]) -> Iterator[ProjectVolume]:
+    def _painted(self, surface: Surface, mesh: ElementTree.Element, painted: Sequence[str]) -> Iterator[BuildVolume]:
         """The triangles of a mesh that are painted as a whole for something that is known here; others are counted."""
         triangles = mesh.findall("{*}triangles/{*}triangle") if painted else []
         for what in painted:
@@ -348,7 +348,7 @@ class _Build:
                     chosen.setdefault(kind or "", []).append(number)
             for kind, numbers in chosen.items():
                 if kind:
-                    yield ProjectVolume(_piece(surface, np.array(numbers)), Role(kind))
+                    yield BuildVolume(_piece(surface, np.array(numbers)), Role(kind))
 
     def _check_understood(self, element: ElementTree.Element, has_components: bool) -> None:
         """Raise MeshError for an object whose shape is told in a way that is not read."""
@@ -365,7 +365,7 @@ class _Build:
 
     def _leave_out(self, number: str, why: str) -> None:
         element = self._package.model(self._start).objects.get(number)
-        told = self._told.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
+        told = self._configs.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
         self._notes.append(f"leaves out object {told or number}, {why}")
 
 
@@ -381,14 +381,14 @@ def _is_printed(item: ElementTree.Element) -> bool:
     return item.get("printable", "1").lower() not in ("0", "false")
 
 
-def _told(package: Package) -> Told:
+def _configs(package: Package) -> Configs:
     """What the package's configs say of its objects. Raises MeshError."""
     heights = package.config(HEIGHTS, read_heights) or {}
     if (bambu := package.config((BAMBU,), read_bambu)) is not None:
         objects, parts, plates = bambu
-        return Told(objects, parts=parts, plates=plates, heights=heights)
+        return Configs(objects, parts=parts, plates=plates, heights=heights)
     objects, triangles = package.config(PRUSASLICER, read_prusaslicer) or ({}, {})
-    return Told(objects, triangles, heights=heights)
+    return Configs(objects, triangles, heights=heights)
 
 
 def _tree(content: bytes) -> ElementTree.Element:

@@ -7,7 +7,7 @@ from zipfile import is_zipfile
 from profiles.errors import ProfileError, reason
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
-from profiles.foreign.project import is_project, read_project_settings
+from profiles.foreign.slicer_file import is_slicer_file, read_slicer_settings
 
 MOST_BYTES = 256 << 20  # of a G-code file; settings stand in its last MiB, OrcaSlicer's in its first as well
 END_BYTES = 1 << 20
@@ -22,7 +22,7 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     no slicer known here, or whose presets are not named.
     """
     try:
-        if is_project(file):
+        if is_slicer_file(file):
             return _of_project(file)
         if is_zipfile(file):
             return cura.read_profile(file)
@@ -44,16 +44,16 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     if not PRUSA_KEYS & config.entries.keys():
         raise ProfileError(
             f"profile {file}: holds no settings; a config.ini, a bundle or a G-code file of PrusaSlicer or SuperSlicer, a JSON "
-            "preset of OrcaSlicer or Bambu Studio, a .curaprofile, or a project of these (.3mf) is expected"
+            "preset of OrcaSlicer or Bambu Studio, a .curaprofile, or a .3mf that one of these has saved is expected"
         )
     return config
 
 
 def _of_project(file: Path) -> Config:
-    """The settings inside a project. Raises ProfileError where it keeps none."""
-    settings = read_project_settings(file)
+    """The settings inside a slicer file. Raises ProfileError where it keeps none."""
+    settings = read_slicer_settings(file)
     if not settings.values:
-        raise ProfileError(f"profile {file}: keeps no print settings; a project that a slicer has saved with them is expected")
+        raise ProfileError(f"profile {file}: keeps no print settings; a .3mf that a slicer has saved with them is expected")
     return settings.config
 
 

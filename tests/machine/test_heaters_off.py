@@ -92,7 +92,7 @@ def in_hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch, *co
     medium = steps.on_wire(printer.medium)
     monkeypatch.setattr(at_hand, "open_port", medium.open)
     monkeypatch.setattr(at_hand, "CommandSession", partial(CommandSession, medium=medium))
-    told = type("Told", (), {"tell": steps.take, "heard": None})()
+    told = type("Configs", (), {"tell": steps.take, "heard": None})()
     person = AtPage(told)
     for command in commands:
         person.by_hand.put(command)

@@ -41,7 +41,7 @@ def decompose(request: ModelRequest) -> int:
         save_parts(outputs.folder, decomposition, figures)
     for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
         if file is not None and not _is_same(file, request.cuts.plan):
-            plan = with_meshes(decomposed.plan, file.parent)[0] if request.project else decomposed.plan
+            plan = with_meshes(decomposed.plan, file.parent) if request.project else decomposed.plan
             write_bytes(file, plan_text(plan, file.parent).encode())
     _draw(outputs, decomposition, profile)
     if outputs.html is not None:

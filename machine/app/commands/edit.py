@@ -1,11 +1,10 @@
 """The edit command: the workbench, served on this computer until Ctrl-C."""
 
-import shutil
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from machine.app.project import is_project, unpack
+from machine.app.project import is_project
 from machine.app.requests import GCODE_SUFFIXES, EditRequest
 from machine.app.serving.browser import lead_browser
 from machine.app.terminal.plain import show
@@ -13,7 +12,6 @@ from machine.app.terminal.progress import say
 from machine.app.workbench.access.lan import Lan, open_lan
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.serve import serve_workbench
-from machine.app.workbench.work.kept_work import new_folder
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import DEMO, check_file, locate, plan_beside
 from mdp.plans.plan_file import PlanFile
@@ -67,12 +65,7 @@ def _lan(request: EditRequest) -> Lan | None:
 
 async def _open(session: Session, opened: Opened) -> None:
     if opened.project:
-        folder = new_folder()
-        try:
-            await session.open_work(folder, unpack(opened.path, folder), f"open {opened.name}")
-        except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
-            raise
+        await session.open_project(opened.path, opened.name)
         return
     await session.open_model(opened.path, opened.name)
     if opened.plan is not None:

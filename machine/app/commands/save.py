@@ -7,7 +7,7 @@ from machine.app.output import check_writable, write_bytes
 from machine.app.pictures.picture import parts_together
 from machine.app.pictures.png import png_bytes
 from machine.app.pipeline.pipeline import Decomposed, decompose_model
-from machine.app.project import PICTURE_PX, STANDING, SUFFIX, Work, figures_of, project_bytes
+from machine.app.project import PICTURE_PX, STANDING, SUFFIX, Project, figures_of, project_bytes
 from machine.app.requests import Given, ModelRequest
 from machine.app.terminal.plain import show
 from mdp.model_file import DEMO
@@ -24,16 +24,16 @@ def save(request: ModelRequest, out: Path) -> int:
     decomposed = decompose_model(request)
     decomposition = decomposed.decomposition
     picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
-    write_bytes(out, project_bytes(_work(request, decomposed), decomposed.plan, decomposition.mesh, picture))
+    write_bytes(out, project_bytes(_project(request, decomposed), decomposed.plan, decomposition.mesh, picture))
     count = len(decomposed.plan.parts) + 1
     show(f"{out}: {request.name} in {count} part{'s' * (count > 1)}, with its plan and profiles\n")
     return 0
 
 
-def _work(request: ModelRequest, decomposed: Decomposed) -> Work:
+def _project(request: ModelRequest, decomposed: Decomposed) -> Project:
     decomposition, orientation = decomposed.decomposition, decomposed.plan.orientation
     names = {kind: name or DEFAULTS[kind] for kind, name in zip(DEFAULTS, request.profile_names, strict=True)}
-    return Work(
+    return Project(
         name=request.name,
         model=None if request.model.startswith(DEMO) else Path(request.model),
         given=Given(**names, settings=request.settings),

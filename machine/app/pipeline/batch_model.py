@@ -98,7 +98,7 @@ def row_of(file: Path, job: Job) -> Row:
     """Do the job with one model."""
     began, row = process_time(), Row(file.name, inputs=inputs_of(file, job))
     try:
-        row = ACTIONS[job.do](request_of(str(file), job.asked), row, job.out / file.stem)
+        row = ACTIONS[job.do](request_of(str(file), job), row, job.out / file.stem)
     except UserError as error:
         row = replace(row, status=REFUSED, sentence=_sentence(str(error), file))
     except Exception as error:  # noqa: BLE001 - a bug over one model must not end the others
@@ -108,24 +108,15 @@ def row_of(file: Path, job: Job) -> Row:
     return replace(row, core_s=round(process_time() - began, 2))
 
 
-def request_of(model: str, asked: ModelRequest) -> ModelRequest:
-    """What is asked of one model; a project says what the options of the batch leave open. Raises UserError."""
-    work = open_project(model)
-    if work is None:
-        return replace(asked, model=model)
-    machine, material, process = asked.profile_names
-    profile = ProfileOptions(machine, material, process, list(asked.settings)).over(work.given).profile()
-    return replace(
-        asked,
-        model=work.argument,
-        project=Path(model),
-        profile=with_part_settings(profile, asked.profile.parts),
-        cuts=replace(asked.cuts, plans=(work.plan,) if work.plan else ()),
-        stops=work.stops,
-        copies=work.copies,
-        plate=work.plate if asked.plate is None else asked.plate,
-        own_marks=not work.marks_in_plan,
-    )
+def request_of(model: str, job: Job) -> ModelRequest:
+    """What is asked of one model; a project decides what the options of the batch leave open. Raises UserError."""
+    project = open_project(model)
+    if project is None:
+        return replace(job.asked, model=model)
+    machine, material, process = job.asked.profile_names
+    profile = ProfileOptions(machine, material, process, list(job.asked.settings)).over(project.given).profile()
+    asked = replace(job.asked, profile=with_part_settings(profile, job.asked.profile.parts))
+    return project.applied(asked, Path(model), 1 if job.do == "decompose" else None)
 
 
 def _sentence(text: str, file: Path) -> str:
@@ -150,7 +141,7 @@ def _decompose(request: ModelRequest, row: Row, out: Path) -> Row:
     decomposition, profile = decomposed.decomposition, decomposed.profile
     figures = json_values(decomposition, joints_of(decomposition.parts, profile), decomposed.read_s, decomposed.total_s)
     save_parts(out, decomposition, figures | {"rotate_deg": profile.process.rotate_deg})
-    plan = with_meshes(decomposed.plan, out)[0] if request.project else decomposed.plan
+    plan = with_meshes(decomposed.plan, out) if request.project else decomposed.plan
     write_bytes(out / PLAN, plan_text(plan, out).encode())
     names = (*(part_file(part.index) for part in decomposition.parts), MODEL, SCENE, FIGURES, PLAN)
     row = replace(row, parts=len(decomposition.parts), files=BETWEEN.join(f"{out.name}/{name}" for name in names))

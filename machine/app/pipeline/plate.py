@@ -21,7 +21,7 @@ from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.topology.cross_section import cross_sections
-from mdp.zone import Marked, Modifier, Zone
+from mdp.zone import Marked, Modifier, Zone, in_room
 from profiles.errors import MoveError, PlanError, UserError
 from profiles.machine import Machine
 from profiles.part_settings import OF_A_PLACE, SPEEDS_OF_A_PLACE, PartSettings
@@ -195,7 +195,7 @@ def _room(mesh: Mesh) -> Zone:
 
 def _within(room: Zone, part: Part) -> Part:
     """A model's part with the boxes of its marks and the modifiers confined to the model's room."""
-    return part.with_marks(lambda mark: mark.within(room), lambda modifier: replace(modifier, room=room))
+    return part.with_marks(lambda mark: mark.within(room), lambda own: replace(own, volume=in_room(own.volume, room)))
 
 
 def _with_place_settings(part: Part, model: Decomposition, given: Sequence[PartSettings]) -> Part:
@@ -208,7 +208,7 @@ def _with_place_settings(part: Part, model: Decomposition, given: Sequence[PartS
                 f"of the plate: --set process.{key}=... sets it for all, process.complete_objects = true prints each model alone"
             )
     room = _room(model.mesh)
-    return replace(part, modifiers=(Modifier(room, process, room), *part.modifiers)) if process else part
+    return replace(part, modifiers=(Modifier(room, process), *part.modifiers)) if process else part
 
 
 def _joined(masks: Sequence[Mask | None]) -> Mask | None:

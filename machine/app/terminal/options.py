@@ -106,12 +106,12 @@ class SearchOptions:
     plate: Annotated[
         int | None,
         typer.Option(
-            "--plate", metavar="N", help="plate of a project (.3mf) that has several; else the first that holds something"
+            "--plate", metavar="N", help="plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something"
         ),
     ] = None
     settings_of_file: Annotated[
         bool,
-        typer.Option("--settings-of-file", help="print by the settings inside a slicer's project (.3mf); see profiles import"),
+        typer.Option("--settings-of-file", help="print by the settings inside a .3mf of another slicer; see profiles import"),
     ] = False
 
     @property
@@ -220,34 +220,54 @@ def check_model(model: str) -> None:
     check_file(locate(model))
 
 
-def model_request(model: str, search: SearchOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
-    """What is asked for of a model; further: other fields of the request. A project says what the options leave open.
+def model_request(
+    model: str, search: SearchOptions, given: ProfileOptions, copies: int | None = 1, **further: Any
+) -> ModelRequest:
+    """What is asked for of a model; further: other fields of the request. A project decides what the options leave open.
 
-    Raises ProfileError, and PlanError for a project that is damaged.
+    copies: None for one, or as many as a project has. Raises ProfileError, and PlanError for a project that is damaged.
     """
     from machine.app.project import open_project
 
-    plate, project = search.plate, None
-    if (work := open_project(model)) is not None:
-        if search.settings_of_file:
-            raise PlanError(f"--settings-of-file: {model} is a project of tiltprint, whose settings hold without it")
-        project, further["own_marks"] = Path(model), not work.marks_in_plan
-        plate = work.plate if plate is None else plate
-        model, given = work.argument, given.over(work.given)
-        cuts = further.get("cuts", Cuts())
-        if not cuts.plans and cuts.planes is None:
-            further["cuts"] = replace(cuts, plans=(work.plan,) if work.plan else ())
-        if "stops" in further:
-            further["stops"] = further["stops"] or work.stops
-            further["copies"] = work.copies if further["copies"] is None else further["copies"]
+    project = open_project(model)
+    if project is not None and search.settings_of_file:
+        raise PlanError(f"--settings-of-file: {model} is a project of tiltprint, whose settings hold without it")
+    if project is not None:
+        given = given.over(project.given)
     elif search.settings_of_file:
-        from machine.app.terminal.project_file import given_by
+        given = given.over(_given_by(model))
+    request = replace(
+        ModelRequest(model, given.profile(search), given.sections, search.ranker, search.orient, profile_names=given.names),
+        settings=given.given(search).settings,
+        copies=1 if copies is None else copies,
+        plate=search.plate,
+        **further,
+    )
+    return request if project is None else project.applied(request, Path(model), copies)
 
-        given = given.over(given_by(model))
-    further["copies"] = 1 if further.get("copies") is None else further["copies"]
-    profile = given.profile(search)
-    named = ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names)
-    return replace(named, settings=given.given(search).settings, plate=plate, project=project, **further)
+
+def _given_by(model: str) -> Given:
+    """The nearest shipped material and the settings inside a slicer file; a note on stderr says how many are taken.
+
+    Raises ProfileError for a model that keeps no settings.
+    """
+    from machine.app.terminal.progress import say
+    from profiles.errors import ProfileError
+    from profiles.foreign.imported import KINDS, imported
+    from profiles.foreign.read import read_config
+    from profiles.foreign.slicer_file import is_slicer_file
+
+    if not model:
+        raise ProfileError("--settings-of-file goes with one model, not with a folder of them")
+    file = Path(model)
+    if not is_slicer_file(file):
+        raise ProfileError(f"--settings-of-file: {model} is no .3mf that a slicer has saved with its settings inside")
+    config = read_config(file)
+    found = {kind: imported(config, kind, nameless=file.stem) for kind in KINDS}
+    counts = [f"{sum(row.taken for row in profile.rows)} of {len(profile.rows)} of the {kind}" for kind, profile in found.items()]
+    say(f"{file.name}: uses the settings of {config.program} inside: {', '.join(counts)}; profiles import lists them")
+    settings = tuple(setting for profile in found.values() for setting in profile.settings)
+    return Given(material=found["material"].base, settings=settings)
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
@@ -263,8 +283,7 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     for name in models if len(models) > 1 or others else ():
         if is_project(Path(named_models([name])[0])):
             raise PlanError(f"{name} is a project, which is a plate of its own: no model goes beside it; --copies N prints more")
-    plate = {"copies": program.copies, "beside": tuple(others)}
-    return model_request(first, program, given, cuts=cuts, stops=stops, **plate, **further)
+    return model_request(first, program, given, program.copies, cuts=cuts, stops=stops, beside=tuple(others), **further)
 
 
 def machine_profile(machine: str | None, settings: list[str] | None = None) -> "Profile":

@@ -169,7 +169,7 @@ def test_a_stream_is_consumed_only_as_fast_as_it_is_printed() -> None:
 
 
 def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], None]:
-    """Told of the progress of a print, does something as soon as so many commands are sent."""
+    """Configs of the progress of a print, does something as soon as so many commands are sent."""
     waiting = [act]
 
     def watch(progress: Progress) -> None:

@@ -92,14 +92,15 @@ def _immovable(volume: MeshVolume, label: str) -> str:
 
 
 def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
+    room = None if box.room is None else _moved_box(box.room, move, label)
     axes = box.along(move.turn).T  # the box's own, which go along, as rows
     low, high = (move.factor * np.array(corner) + axes @ move.shift_mm for corner in (box.min_mm, box.max_mm))
     level = np.round(axes)
     if np.abs(axes - level).max() > LEVEL:
         x, y, z = (vector_of(row) for row in axes)
-        return Zone(*_sides(low, high, label), (x, y, z))
+        return Zone(*_sides(low, high, label), (x, y, z), room)
     low, high = level.T @ low, level.T @ high
-    return Zone(*_sides(np.minimum(low, high), np.maximum(low, high), label))
+    return Zone(*_sides(np.minimum(low, high), np.maximum(low, high), label), room=room)
 
 
 def _sides(low: Floats, high: Floats, label: str) -> tuple[Vector, Vector]:

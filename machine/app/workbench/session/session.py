@@ -9,7 +9,7 @@ from typing import Any
 from weakref import finalize
 
 from machine.app.pipeline.given_plan import with_plan_settings
-from machine.app.project import Work
+from machine.app.project import Project, unpack
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import (
     Bench,
@@ -36,6 +36,7 @@ from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trials import PlaneTrials
+from machine.app.workbench.work.kept_work import new_folder
 from machine.app.workbench.work.models import Resting, Unscaled
 from machine.app.workbench.work.received import NAMES_KEPT, files_in
 from machine.app.workbench.work.worker_pool import WorkerPools
@@ -206,25 +207,37 @@ class Session(SessionBase):
         if (plan := plan_beside(name)) is not None:
             await self.open_plan(plan)
 
-    async def open_work(self, folder: Path, work: Work, word: str) -> None:
-        """Put the work in a folder on the bench, and keep it there from now on.
+    async def open_project(
+        self, path: Path, name: str, taken_over: Callable[[Project], Project] = lambda project: project
+    ) -> None:
+        """Put a project file on the bench. taken_over: makes of the project what the bench takes. Raises UserError."""
+        folder = new_folder()
+        try:
+            project = await asyncio.to_thread(unpack, path, folder)
+            await self.open_folder(folder, taken_over(project), f"open {name}")
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+
+    async def open_folder(self, folder: Path, project: Project, word: str) -> None:
+        """Put a project that lies in a folder on the bench, and keep it there from now on.
 
         Raises UserError; the folder stays as it is then.
         """
         async with self.keeping.opening(folder):
-            await self.take_given(word, lambda given: work.given)
-            path = locate(work.name) if work.model is None else self.received.new_file(work.name)
-            if work.model is not None:
-                await asyncio.to_thread(shutil.copyfile, work.model, path)
-            await self.open_model(path, work.name, anew=False, plate=work.plate)
-            marks = NO_ZONES if work.marks_in_plan else with_rotation(self.bench, work.rotation).zones
-            if work.plan is not None:
-                await self.open_plan(work.plan)
-            bench = with_rotation(self.bench, work.rotation)
-            bench = bench if work.parts else replace(bench, cuts=None)
-            locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in work.locked)
-            bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES and work.plan is not None else bench
-            self.do(word, replace(bench, locked=locked, stops=work.stops, copies=work.copies))
+            await self.take_given(word, lambda given: project.given)
+            path = locate(project.name) if project.model is None else self.received.new_file(project.name)
+            if project.model is not None:
+                await asyncio.to_thread(shutil.copyfile, project.model, path)
+            await self.open_model(path, project.name, anew=False, plate=project.plate)
+            marks = NO_ZONES if project.marks_in_plan else with_rotation(self.bench, project.rotation).zones
+            if project.plan is not None:
+                await self.open_plan(project.plan)
+            bench = with_rotation(self.bench, project.rotation)
+            bench = bench if project.parts else replace(bench, cuts=None)
+            locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
+            bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES and project.plan is not None else bench
+            self.do(word, replace(bench, locked=locked, stops=project.stops, copies=project.copies))
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""

@@ -12,11 +12,11 @@ from time import localtime, strftime
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from machine.app.project import Work, is_project, read_folder, unpack
+from machine.app.project import Project, is_project, read_folder
 from machine.app.workbench.access.limits import DEVICE, check_model_name, check_profile
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.profile_files import ProfileFiles
-from machine.app.workbench.work.kept_work import folders_kept, new_folder
+from machine.app.workbench.work.kept_work import folders_kept
 from machine.app.workbench.work.received import remove_file
 from profiles.errors import PlanError, reason
 
@@ -74,11 +74,11 @@ class Uploads:
         rows = []
         for folder in folders_kept():
             try:
-                work = read_folder(folder)
+                project = read_folder(folder)
             except PlanError:
                 rows.append({"kept": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
             else:
-                rows.append({"kept": folder.name, "name": work.name, "parts": work.parts, "written_s": work.written_s})
+                rows.append({"kept": folder.name, "name": project.name, "parts": project.parts, "written_s": project.written_s})
         return JSONResponse(rows)
 
     async def open_kept(self, session: Session, request: Request) -> Response:
@@ -87,27 +87,17 @@ class Uploads:
         folder = next((folder for folder in folders_kept() if folder.name == name), None)
         if folder is None:
             raise PlanError("this work is not kept any more, or another page has opened it")
-        work = read_folder(folder)
-        await self._open_work(session, folder, work, f"open the work of {strftime('%H:%M', localtime(work.written_s))}")
-        return JSONResponse({})
-
-    async def _open_work(self, session: Session, folder: Path, work: Work, word: str) -> None:
+        project = read_folder(folder)
+        word = f"open the work of {strftime('%H:%M', localtime(project.written_s))}"
         try:
-            given = self.profiles.copied(work.given, work.own_names)
-            await session.open_work(folder, replace(work, given=given), word)
+            await session.open_folder(folder, self._with_copies(project), word)
         except OSError as error:
             raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
+        return JSONResponse({})
 
-    async def _open_project(self, session: Session, path: Path, name: str, of_device: bool) -> None:
-        folder = new_folder()
-        try:
-            work = await asyncio.to_thread(unpack, path, folder)
-            if of_device:
-                check_model_name(work.name)
-            await self._open_work(session, folder, work, f"open {name}")
-        except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
-            raise
+    def _with_copies(self, project: Project) -> Project:
+        """The project with copies of its profiles, which benches may share. Raises OSError."""
+        return replace(project, given=self.profiles.copied(project.given, project.own_names))
 
     async def _open(
         self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]], of_device: bool = False
@@ -116,7 +106,13 @@ class Uploads:
         try:
             await fill(path)
             if is_project(path):
-                await self._open_project(session, path, name, of_device)
+
+                def taken_over(project: Project) -> Project:
+                    if of_device:
+                        check_model_name(project.name)
+                    return self._with_copies(project)
+
+                await session.open_project(path, name, taken_over)
             elif path.suffix.lower() != TEXT_SUFFIX:
                 await session.open_model(path, name)
                 taken = True

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
 
-from machine.app.project import PLAN, RECORD, Work, figures_of, write_folder
+from machine.app.project import PLAN, RECORD, Project, figures_of, write_folder
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from mdp.model_file import DEMO
 from profiles.files import lock_folder
@@ -41,11 +41,11 @@ def write_work(folder: Path, bench: Bench) -> None:
     write_folder(folder, work_of(bench), plan_of_bench(bench, PLAN) if bench.planned else None)
 
 
-def work_of(bench: Bench) -> Work:
+def work_of(bench: Bench) -> Project:
     """What lies on a bench with a model; its files are where they are."""
     model = bench.model
     assert model is not None
-    return Work(
+    return Project(
         name=model.name,
         model=None if model.name.startswith(DEMO) else model.path,
         given=bench.given,

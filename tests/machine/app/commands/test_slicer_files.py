@@ -11,7 +11,7 @@ from machine.app.cli import main
 from profiles.foreign.read import read_config
 from tests.mdp import files
 from tests.mdp.files import stl
-from tests.mdp.projects import AT_ORIGIN, Made, Object, Placed, bambu, prusaslicer
+from tests.mdp.foreign import AT_ORIGIN, Made, Object, Placed, bambu, prusaslicer
 from tests.shapes import from_manifold
 
 FAST = ["--parts", "1", "--as-is", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.3"]

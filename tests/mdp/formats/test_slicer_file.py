@@ -13,7 +13,7 @@ from mdp.read import read_model
 from mdp.zone import MeshVolume, Zone, faces_of
 from profiles.errors import MeshError
 from tests.mdp import files
-from tests.mdp.projects import AT_ORIGIN, Made, Object, Placed, affine, bambu, printed, prusaslicer
+from tests.mdp.foreign import AT_ORIGIN, Made, Object, Placed, affine, bambu, printed, prusaslicer
 from tests.shapes import from_manifold
 
 BLOCK = m3.Manifold.cube((30.0, 30.0, 20.0), True)

@@ -1,6 +1,6 @@
-"""Printed: the surfaces that a slicer's project prints, its negative volumes taken out."""
+"""Printed: the surfaces that a slicer file prints, its negative volumes subtracted."""
 
-from mdp.formats.project import NEGATIVE, PART, Project, ProjectVolume
+from mdp.formats.slicer_file import NEGATIVE, PART, Build, BuildVolume
 from mdp.formats.surface import Surface
 from mdp.repair.repair import repair
 from mdp.repair.shells import above, subtract
@@ -9,33 +9,34 @@ from profiles.errors import MeshError
 SINKING_MM = 0.001  # below the plate, by which PrusaSlicer tells an object that sinks from rounding
 
 
-def printed(project: Project) -> tuple[list[Surface], list[str]]:
-    """The surfaces that a project prints, and a sentence for each object that negative volumes or the plate take something from.
+def printed(build: Build) -> tuple[list[Surface], list[str]]:
+    """The surfaces that a slicer file prints, and a note on each object that is cut by negative volumes or by the plate.
 
-    Raises MeshError where nothing is left, and for a negative volume that is no solid."""
+    Raises MeshError where nothing is left, and for a negative volume that is no solid.
+    """
     surfaces, notes = list[Surface](), list[str]()
-    for own in project.objects:
+    for own in build.objects:
         parts, negatives = own.surfaces(PART), [volume for volume in own.volumes if volume.role.kind == NEGATIVE]
         deep_mm = -min((float(part.vertices[part.faces.ravel(), 2].min()) for part in parts), default=0.0)
-        sinks = project.on_plate and deep_mm > SINKING_MM
+        sinks = build.on_plate and deep_mm > SINKING_MM
         if not parts or not (negatives or sinks):
             surfaces += parts
             continue
         left, repairs = repair(parts)
         if negatives:
             left = subtract(left, [solid_of_volume(volume) for volume in negatives])
-            repairs.append(f"took {len(negatives)} negative volume{'s' * (len(negatives) > 1)} out of it")
+            repairs.append(f"subtracted {len(negatives)} negative volume{'s' * (len(negatives) > 1)}")
         if sinks:
             left = above(left, 0.0)
-            repairs.append(f"leaves out what lies below the plate in its project, {deep_mm:.3g} mm deep")
+            repairs.append(f"leaves out what lies below the plate in its build, {deep_mm:.3g} mm deep")
         notes += [*repairs, *([] if len(left.faces) else ["nothing is left of one of its objects"])]
         surfaces += [left] if len(left.faces) else []
     if not surfaces:
-        raise MeshError("nothing is left of it: negative volumes or the plate of its project take all")
+        raise MeshError("nothing is left of it: negative volumes or the plate of its slicer take all")
     return surfaces, notes
 
 
-def solid_of_volume(volume: ProjectVolume) -> Surface:
+def solid_of_volume(volume: BuildVolume) -> Surface:
     """A volume as a closed solid. Raises MeshError, which names it."""
     try:
         return repair([volume.surface])[0]

@@ -1,4 +1,4 @@
-"""Project: what a slicer's project file says of the objects in it: which volumes are printed, taken out of others or only marks.
+"""Slicer file: a 3MF that a slicer has saved, and the role of each volume in it: printed, subtracted from others, or only a mark.
 
 PrusaSlicer keeps all volumes of an object in one mesh and names their triangles in Slic3r_PE_model.config; Bambu Studio and
 OrcaSlicer have a component for each and say in model_settings.config what it is; Cura says it in the metadata of objects.
@@ -54,7 +54,7 @@ class Role:
 
 @dataclass(frozen=True)
 class Plate:
-    """A build plate of a project: objects by their numbers, each with the number of its instance."""
+    """A build plate: objects by their numbers, each with the number of its instance."""
 
     number: int
     name: str
@@ -62,8 +62,8 @@ class Plate:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a project says beside its model. objects: by their numbers; triangles: of an object's mesh, the first and the last of
+class Configs:
+    """What the configs of a slicer file say. objects: by their numbers; triangles: of an object's mesh, the first and the last of
     each volume; parts: by the numbers of an object and its component; heights: settings between two heights above an object's
     lowest point, mm, by the place of the object among all (PrusaSlicer: that have a mesh themselves), from 1."""
 
@@ -75,18 +75,18 @@ class Told:
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectVolume:
-    """A volume where the project has it, in mm, and what it is."""
+class BuildVolume:
+    """A volume where the file has it, in mm, and its role."""
 
     surface: Surface
     role: Role = Role()
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectObject:
+class BuildObject:
     """An object on the plate: its volumes, the settings of them all, and those between two heights above its lowest point."""
 
-    volumes: Sequence[ProjectVolume]
+    volumes: Sequence[BuildVolume]
     settings: Mapping[str, str] = field(default_factory=dict)
     heights: Sequence[tuple[float, float, Mapping[str, str]]] = ()
 
@@ -96,17 +96,17 @@ class ProjectObject:
 
 
 @dataclass(frozen=True, eq=False)
-class Project:
-    """What a file prints, and sentences about what it holds and is not taken. on_plate: its z = 0 is the build plate, below which
-    nothing is printed."""
+class Build:
+    """The objects that a file prints, and notes on what it holds and is left out. on_plate: its z = 0 is the build plate, below
+    which nothing is printed."""
 
-    objects: Sequence[ProjectObject]
+    objects: Sequence[BuildObject]
     notes: Sequence[str] = ()
     on_plate: bool = False
 
 
 def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[tuple[int, int, Role]]]]:
-    """The objects and the triangles of Told. Raises ValueError for a triangle that is no number."""
+    """Read the objects and triangles of Configs. Raises ValueError where the number of a triangle is no number."""
     objects, triangles = dict[str, Role](), dict[str, list[tuple[int, int, Role]]]()
     for element in config.iter("object"):
         number = element.get("id", "")
@@ -118,7 +118,7 @@ def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[t
 
 
 def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], Role], list[Plate]]:
-    """The objects, the parts and the plates of Told. Raises ValueError for text that is not a number."""
+    """Read the objects, parts and plates of Configs. Raises ValueError for text that is not a number."""
     objects, parts = dict[str, Role](), dict[tuple[str, str], Role]()
     for element in config.findall("object"):
         number = element.get("id", "")
@@ -135,7 +135,7 @@ def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], 
 
 
 def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[str, str]]]]:
-    """The heights of Told, of PrusaSlicer and those after it. Raises ValueError for a height that is no number."""
+    """Read the heights of Configs. Raises ValueError for a height that is not a finite number."""
     heights: dict[str, list[tuple[float, float, Mapping[str, str]]]] = {}
     for element in config.iter("object"):
         for between in element.findall("range"):
@@ -167,8 +167,8 @@ def _values(element: Element) -> dict[str, str]:
 def _role(element: Element) -> Role:
     """What an object, a volume or a part of a config is."""
     values = _values(element)
-    told = element.get("subtype") or values.get("volume_type") or values.get("part_type", "")
-    kind = VOLUME_TYPES.get(told) or (MODIFIER if values.get("modifier") == "1" else PART)
+    kind_name = element.get("subtype") or values.get("volume_type") or values.get("part_type", "")
+    kind = VOLUME_TYPES.get(kind_name) or (MODIFIER if values.get("modifier") == "1" else PART)
     return Role(kind, values.get("name", ""), _settings(values))
 
 

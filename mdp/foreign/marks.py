@@ -1,14 +1,16 @@
-"""Marks: what the volumes of a slicer's project mean that are not printed: modifiers, places with and without support."""
+"""Marks: the modifiers, support enforcers and support blockers of a slicer file, as modifiers and marks of a plan."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from math import isclose
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdp.formats.project import (
+from mdp.foreign.printed import solid_of_volume
+from mdp.formats.slicer_file import (
     MODIFIER,
     NO_SUPPORT,
     PAINT_NO_SEAM,
@@ -16,17 +18,19 @@ from mdp.formats.project import (
     PAINT_SUPPORT,
     PART,
     SUPPORT,
-    Project,
-    ProjectObject,
-    ProjectVolume,
+    Build,
+    BuildObject,
+    BuildVolume,
     Role,
 )
 from mdp.formats.surface import concatenate
 from mdp.head import corners
 from mdp.mesh import Floats, Mesh
-from mdp.projects.printed import solid_of_volume
 from mdp.zone import AnyZone, MeshVolume, Modifier, Triangles, Volume, Zone, Zones
 from profiles.errors import MeshError
+
+if TYPE_CHECKING:
+    from profiles.foreign.slicer_file import SlicerSettings
 
 MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
@@ -35,19 +39,28 @@ MOST_TOLD = 8  # settings in a sentence
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
 
-def marks(project: Project, path: Path, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
-    """The modifiers and marks of a project's volumes with each place p of its file at linear @ p + shift_mm, and a sentence for
-    each; a volume that is no solid is left out."""
-    return _Marks(project, path, linear, shift_mm).zones()
+def marks(build: Build, path: Path, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
+    """The modifiers and marks of a slicer file, with each place p of it at linear @ p + shift_mm, and a note on each.
+
+    A volume that is no solid is left out, with a note.
+    """
+    return _Marks(build, path, linear, shift_mm).zones()
 
 
 class _Marks:
-    """The marks of a project that is moved as its model is."""
+    """The marks of a slicer file, moved as its model is."""
 
-    def __init__(self, project: Project, path: Path, linear: Floats, shift_mm: Floats) -> None:
-        self._objects, self._several = project.objects, sum(bool(own.surfaces(PART)) for own in project.objects) > 1
-        self._path, self._linear, self._shift_mm, self._on_plate = path, linear, shift_mm, project.on_plate
+    def __init__(self, build: Build, path: Path, linear: Floats, shift_mm: Floats) -> None:
+        self._objects, self._several = build.objects, sum(bool(own.surfaces(PART)) for own in build.objects) > 1
+        self._path, self._linear, self._shift_mm, self._on_plate = path, linear, shift_mm, build.on_plate
         self._notes: list[str] = []
+
+    @cached_property
+    def _settings(self) -> "SlicerSettings":
+        """The settings of the whole print, read once; most models have none."""
+        from profiles.foreign.slicer_file import read_slicer_settings
+
+        return read_slicer_settings(self._path)
 
     def zones(self) -> tuple[Zones, list[str]]:
         """All marks and a sentence for each."""
@@ -69,7 +82,7 @@ class _Marks:
                     self._notes.append(f"{role.kind} on {len(corners_mm)} of its triangles is taken as [[{PAINTED[role.kind]}]]")
         return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), self._notes
 
-    def _of_object(self, own: ProjectObject) -> Iterator[Modifier]:
+    def _of_object(self, own: BuildObject) -> Iterator[Modifier]:
         """The settings of an object and those between two heights of it."""
         low, high = _bounds(own) + np.array([[-BESIDE_MM], [BESIDE_MM]])
         if own.settings and (process := self._process("the object", own.settings)):
@@ -81,16 +94,14 @@ class _Marks:
                 yield Modifier(self._box([*low[:2], base + least], [*high[:2], base + most]), process)
 
     def _process(self, what: str, settings: Mapping[str, str]) -> dict[str, Any]:
-        """What settings become, which a sentence tells."""
-        from profiles.foreign.project import read_project_settings  # most models have none
-
-        process, left = read_project_settings(self._path).of_place(settings)
-        told = ", ".join(f"{key} = {value}" for key, value in process.items())
+        """The keys of a process that settings become, with a note on them."""
+        process, left = self._settings.of_place(settings)
+        taken = ", ".join(f"{key} = {value}" for key, value in process.items())
         rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
-        self._notes.append(f"{what} " + (f"is taken as [[modifier]]: {told}" if told else "changes nothing here") + rest)
+        self._notes.append(f"{what} " + (f"is taken as [[modifier]]: {taken}" if taken else "changes nothing here") + rest)
         return process
 
-    def _place(self, volume: ProjectVolume, own: ProjectObject) -> Volume | None:
+    def _place(self, volume: BuildVolume, own: BuildObject) -> Volume | None:
         """Where a volume lies, within the box of its object if there are others; None for one that is no solid, with a note.
 
         Where an object is nothing but marks, as in Cura, they hold for all.
@@ -105,7 +116,7 @@ class _Marks:
         box = _box_at(mesh.vertices)
         if box is None or not isclose(float(np.prod(np.subtract(box.max_mm, box.min_mm))), mesh.volume_mm3, rel_tol=SAME):
             return MeshVolume(self._path, mesh, room)
-        return replace(box, room=room)
+        return _within(box, room)
 
     def _box(self, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Zone:
         """A box of the file where it lies now."""
@@ -123,11 +134,22 @@ def _named(role: Role) -> str:
     return f"{role.kind} {role.name!r}" if role.name else f"a {role.kind}"
 
 
-def _bounds(own: ProjectObject) -> Floats:
+def _bounds(own: BuildObject) -> Floats:
     """(2, 3) least and greatest coordinates of what is printed of an object."""
     surface = concatenate(own.surfaces(PART))
     used = surface.vertices[surface.faces.ravel()]
     return np.stack([used.min(axis=0), used.max(axis=0)])
+
+
+def _within(box: Zone, room: Zone | None) -> Zone:
+    """The part of a box within its room, a box of its own where both are level."""
+    if room is None or box.axes is not None or room.axes is not None:
+        return replace(box, room=room)
+    low, high = np.maximum(box.min_mm, room.min_mm), np.minimum(box.max_mm, room.max_mm)
+    if not (low < high).all():
+        return replace(box, room=room)
+    (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
+    return Zone((x0, y0, z0), (x1, y1, z1))
 
 
 def _box_at(points: Floats) -> Zone | None:

@@ -1,4 +1,4 @@
-"""Project: the settings inside the project files (.3mf) of PrusaSlicer, Bambu Studio, OrcaSlicer and Cura."""
+"""Slicer file: the settings inside a .3mf saved by PrusaSlicer, Bambu Studio, OrcaSlicer or Cura."""
 
 import json
 import lzma
@@ -22,8 +22,8 @@ OF_CURA = "cura/"
 
 
 @dataclass(frozen=True)
-class ProjectSettings:
-    """The settings of a project under its program's names. of_values: makes a configuration of such."""
+class SlicerSettings:
+    """The settings of a slicer file under its program's names. of_values: makes a configuration of such."""
 
     values: Mapping[str, str]
     of_values: Callable[[Mapping[str, str]], Config]
@@ -38,34 +38,34 @@ class ProjectSettings:
         return settings_of_place(self.of_values({**self.values, **own}), own.keys()) if own else ({}, [])
 
 
-def is_project(file: Path) -> bool:
-    """Whether a file is a project by its name and kind."""
+def is_slicer_file(file: Path) -> bool:
+    """Whether a file may be one, by its name and kind."""
     return file.suffix.lower() == ".3mf" and is_zipfile(file)
 
 
-def read_project_settings(file: Path) -> ProjectSettings:
-    """The settings of a project, none where it keeps none. Raises ProfileError for such that are damaged."""
+def read_slicer_settings(file: Path) -> SlicerSettings:
+    """The settings of a slicer file, none where it keeps none. Raises ProfileError for such that are damaged."""
     try:
         with ZipFile(file) as archive:
             entries = {name.lower(): name for name in archive.namelist()}
             prusaslicers = next((entries[name] for name in OF_PRUSASLICER if name in entries), None)
             if prusaslicers is not None:
-                return ProjectSettings(prusaslicer.gcode_settings(_text(archive, prusaslicers)), prusaslicer.of_gcode)
+                return SlicerSettings(prusaslicer.gcode_settings(_text(archive, prusaslicers)), prusaslicer.of_gcode)
             if OF_ORCASLICER in entries:
                 document = json.loads(_text(archive, entries[OF_ORCASLICER]))
                 if not isinstance(document, dict):
                     raise ValueError("no table of settings")
-                return ProjectSettings(orcaslicer.values_of(document), orcaslicer.of_values)
+                return SlicerSettings(orcaslicer.values_of(document), orcaslicer.of_values)
             if OBJECTS_OF_ORCASLICER in entries:
-                return ProjectSettings({}, orcaslicer.of_values)
+                return SlicerSettings({}, orcaslicer.of_values)
             if any(name.startswith("metadata/slic3r") for name in entries):
-                return ProjectSettings({}, prusaslicer.of_gcode)
+                return SlicerSettings({}, prusaslicer.of_gcode)
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
     except (BadZipFile, zlib.error, lzma.LZMAError, EOFError, ValueError, NotImplementedError, RuntimeError) as error:
         raise ProfileError(f"profile {file}: its settings are damaged ({str(error).splitlines()[0]})") from None
     kept = any(name.startswith(OF_CURA) for name in entries)
-    return ProjectSettings(cura.read_values(file)[0] if kept else {}, cura.of_values)
+    return SlicerSettings(cura.read_values(file)[0] if kept else {}, cura.of_values)
 
 
 def _text(archive: ZipFile, name: str) -> str:
