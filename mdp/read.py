@@ -151,7 +151,7 @@ def _read_build(path: Path, plate: int | None = None) -> Build:
 
             return read_build(path, plate)
         if plate is not None:
-            raise MeshError(f"{path}: has no plates: --plate {plate} goes with a .3mf that Bambu Studio or OrcaSlicer has saved")
+            raise MeshError(f"{path}: has no plates: --plate {plate} goes with a file of Bambu Studio or OrcaSlicer (.3mf)")
         return Build([BuildObject([BuildVolume(surface) for surface in READERS[path.suffix.lower()](path)])])
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from None

@@ -8,13 +8,16 @@ file is a 3MF of the model as it lies, which any slicer opens, with a picture an
 import hashlib
 import io
 import json
+import os
 import re
 import shutil
 import zipfile
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
+from time import time
 from typing import Any
 
 import numpy as np
@@ -32,7 +35,7 @@ from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
 from profiles.errors import PlanError, SliceError, reason
-from profiles.files import whole_file, write_whole
+from profiles.files import lock_folder, remove_locked, whole_file, write_whole
 from profiles.frozen import Vector
 from profiles.places import KINDS, PARENT, is_file_name, own, shipped
 from profiles.toml_text import read_toml
@@ -51,12 +54,14 @@ LONGEST_NAME = 255  # bytes of a file's name on any disk
 MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
 BAD_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError, SliceError)
 DAMAGED: tuple[type[Exception], ...] = (*DAMAGES, *BAD_RECORD, OSError)
-_unpacked: list[tuple[TemporaryDirectory[str], str]] = []  # folders of the projects that were opened, and their files
+PREFIX = "tiltprint-project-"  # of temporary folders
+BEGUN_S = 60.0  # a folder as new as this may belong to a program that has not locked it yet
+_unpacked: list[tuple[TemporaryDirectory[str], str, int | None]] = []  # projects that were opened: folder, file, lock
 
 
 def without_folders(text: str) -> str:
     """A sentence that names a project where it named its temporary folder."""
-    for folder, model in _unpacked:
+    for folder, model, _ in _unpacked:
         text = text.replace(f"{folder.name}/.model/", "").replace(folder.name, model)
     return text
 
@@ -64,7 +69,10 @@ def without_folders(text: str) -> str:
 def close_projects() -> None:
     """Remove the folders of all projects that were opened; else that is done when the program ends."""
     while _unpacked:
-        _unpacked.pop()[0].cleanup()
+        folder, _, lock = _unpacked.pop()
+        if lock is not None:
+            os.close(lock)
+        folder.cleanup()
 
 
 @dataclass(frozen=True)
@@ -283,16 +291,24 @@ def figures_of(row: FrontRow | None) -> dict[str, float]:
 
 
 def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
-    """The content of a project file: mesh is the model as it lies, picture a PNG. Raises OSError."""
+    """The content of a project file: mesh is the model as it lies, picture a PNG.
+
+    Raises OSError, and PlanError for what could not be opened again.
+    """
     _check_alone(project.model)
+    try:
+        _check_name(project.name)
+    except ValueError:
+        raise PlanError(f"{project.name!r}: a project cannot keep a model of this name: rename its file") from None
     content = io.BytesIO()
-    with TemporaryDirectory(prefix="tiltprint-project-") as name:
+    with TemporaryDirectory(prefix=PREFIX) as name:
         folder = Path(name)
         write_folder(folder, project, plan)
         model = model_xml([(mesh, project.name)], {"Title": project.name, "Application": PROGRAM})
         digest = hashlib.sha256(model.encode()).hexdigest().encode()
-        _check_name(project.name)
         own_files = [(INSIDE + path.name, path.read_bytes()) for path in sorted(folder.iterdir())]
+        if len(own_files) > MOST_FILES or sum(len(file) for _, file in own_files) + len(model) > LARGEST_BYTES:
+            raise PlanError(f"{project.name}: a project holds at most {MOST_FILES} files and {LARGEST_BYTES} bytes")
         write_package(content, model, [(THUMBNAIL, picture), (INSIDE + MESH_DIGEST, digest), *own_files])
     return content.getvalue()
 
@@ -312,14 +328,24 @@ def open_project(model: str) -> Project | None:
     """A project file, unpacked for as long as the program runs; None for any other MODEL. Raises PlanError."""
     if model.startswith(DEMO) or not is_project(Path(model)):
         return None
-    folder = TemporaryDirectory(prefix="tiltprint-project-", ignore_cleanup_errors=True)
-    _unpacked.append((folder, model))
+    _tidy()
+    folder = TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True)
+    lock = lock_folder(Path(folder.name))  # for as long as the program runs
+    _unpacked.append((folder, model, lock))
     project = unpack(Path(model), Path(folder.name))
     if project.model is None:
         return project
     named = Path(folder.name) / ".model" / Path(project.name).name  # messages and G-code say the name that the model had
     named.parent.mkdir()
     return replace(project, model=project.model.rename(named))
+
+
+def _tidy() -> None:
+    """Remove the folders of programs that were killed while they had a project open."""
+    for folder in Path(gettempdir()).glob(f"{PREFIX}*"):
+        with suppress(OSError):
+            if time() - folder.stat().st_mtime > BEGUN_S and (lock := lock_folder(folder, surely=True)) is not None:
+                remove_locked(folder, lock)
 
 
 def unpack(path: Path, folder: Path) -> Project:

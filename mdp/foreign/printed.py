@@ -28,11 +28,11 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
             repairs.append(f"subtracted {len(negatives)} negative volume{'s' * (len(negatives) > 1)}")
         if sinks:
             left = above(left, 0.0)
-            repairs.append(f"leaves out what lies below the plate in its build, {deep_mm:.3g} mm deep")
+            repairs.append(f"leaves out what lies below the plate, {deep_mm:.3g} mm deep")
         notes += [*repairs, *([] if len(left.faces) else ["nothing is left of one of its objects"])]
         surfaces += [left] if len(left.faces) else []
     if not surfaces:
-        raise MeshError("nothing is left of it: negative volumes or the plate of its slicer take all")
+        raise MeshError("nothing is left of it: negative volumes or the plate cut all of it away")
     return surfaces, notes
 
 

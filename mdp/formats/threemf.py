@@ -257,7 +257,7 @@ class _Builder:
             if len(plates) > 1:
                 others = ", ".join(str(plate.number) for plate in plates[1:])
                 named = f" ({plates[0].name})" if plates[0].name else ""
-                self._notes.append(f"takes plate {plates[0].number}{named} of its plates; --plate takes another: {others}")
+                self._notes.append(f"prints plate {plates[0].number}{named}; --plate prints another: {others}")
             return plates[0] if plates else None
         if not plates:
             raise MeshError(f"{self._path}: has no plates: --plate {number} goes with a file of Bambu Studio or OrcaSlicer")

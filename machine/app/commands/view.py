@@ -19,7 +19,7 @@ from profiles.errors import GcodeError, OutputError, ProfileError
 
 def view(request: ModelRequest, open_browser: bool = False) -> int:
     """Write the page, and show it in the browser where asked; what the dry run finds is shown in it and stops nothing."""
-    path = request.outputs.html or _default_page(request.name)
+    path = request.outputs.html or _default_page(request.project.name if request.project else request.name)
     check_writable(path)
     check_model_files(request, () if request.outputs.html else (("page", path),))
     if request.compare and request.is_gcode:

@@ -13,7 +13,7 @@ from mdp.read import read_model
 from mdp.zone import MeshVolume, Zone, faces_of
 from profiles.errors import MeshError
 from tests.mdp import files
-from tests.mdp.foreign import AT_ORIGIN, Made, Object, Placed, affine, bambu, printed, prusaslicer
+from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, Placed, affine, bambu, printed, prusaslicer
 from tests.shapes import from_manifold
 
 BLOCK = m3.Manifold.cube((30.0, 30.0, 20.0), True)
@@ -169,7 +169,7 @@ def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
     wide = m3.Manifold.cube((100.0, 5.0, 5.0), True)
     objects = [Object([Made(BLOCK), Made(wide, "modifier", {"perimeters": "4"})], [AT_ORIGIN]), Object([Made(BLOCK)], [beside])]
     (modifier,) = read_model(prusaslicer(tmp_path / "a.3mf", objects)).zones.modifiers
-    assert modifier.volume.room == Zone((-35.0, -15.0, 0.0), (-5.0, 15.0, 20.0))
+    assert (modifier.volume.min_mm[0], modifier.volume.max_mm[0]) == (-35.0, -5.0)  # no farther than its own object
 
 
 def test_older_projects_name_a_modifier_by_a_key(tmp_path: Path) -> None:
@@ -222,8 +222,8 @@ def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(t
     objects = [Object([Made(BLOCK)], at[:2]), Object([Made(BOX)], at[2:])]
     path = bambu(tmp_path / "a.3mf", objects, np.random.default_rng(0))
     assert read_model(path).notes == (
-        "takes plate 2 of its project; --plate takes another: 3",
-        "leaves out object b, which its project does not print",
+        "prints plate 2; --plate prints another: 3",
+        "leaves out object b, which is switched off in its slicer",
     )
     with pytest.raises(MeshError, match="--plate 1: its plate is empty; there are 2, 3"):
         read_model(path, plate=1)
@@ -232,11 +232,11 @@ def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(t
     check(read_model(path, plate=3).mesh, BOX)
     change(path, "Metadata/model_settings.config", '"instance_id" value="1"', '"instance_id" value="7"')
     assert read_model(path).notes == (
-        "leaves out object b, which its project does not print",
+        "leaves out object b, which is switched off in its slicer",
         "leaves out object b, which stands on none of its plates",
     )
     for other in (prusaslicer(tmp_path / "b.3mf", objects), files.written(tmp_path / "b.stl", from_manifold(BLOCK))):
-        with pytest.raises(MeshError, match="has no plates: --plate 1 goes with a project of Bambu Studio or OrcaSlicer"):
+        with pytest.raises(MeshError, match="has no plates: --plate 1 goes with a file of Bambu Studio or OrcaSlicer"):
             read_model(other, plate=1)
 
 
@@ -246,7 +246,7 @@ def test_what_lies_below_the_plate_of_a_project_is_not_printed(tmp_path: Path, d
     model = read_model(written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK), Made(BOX, "support")], [sunk])]))
     check(model.mesh, BLOCK.trim_by_plane((0.0, 0.0, 1.0), -6.0))
     np.testing.assert_allclose(model.zones.support[0].corners[:, 2].min(), -15.0 + 6.0, atol=1e-9)
-    assert model.notes[0] == "leaves out what lies below the plate in its project, 4 mm deep"
+    assert model.notes[0] == "leaves out what lies below the plate, 4 mm deep"
 
 
 @pytest.mark.parametrize("kind", ["support", "solidsupport", "other"])
@@ -262,11 +262,11 @@ def test_objects_that_are_no_models_are_left_out(tmp_path: Path, kind: str) -> N
 def test_a_project_that_prints_nothing_is_refused(tmp_path: Path) -> None:
     hidden = Placed(AT_ORIGIN.transform, printable=False)
     assert files.refusal(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [hidden])])) == (
-        "its build places no mesh that is printed: it leaves out object b, which its project does not print"
+        "its build places no mesh that is printed: it leaves out object b, which is switched off in its slicer"
     )
     nothing = Object([Made(BOX), Made(BLOCK.scale((2.0, 2.0, 4.0)), "negative")], [AT_ORIGIN])
     assert files.refusal(prusaslicer(tmp_path / "b.3mf", [nothing])) == (
-        "nothing is left of it: negative volumes or the plate of its project take all"
+        "nothing is left of it: negative volumes or the plate cut all of it away"
     )
 
 

@@ -118,11 +118,11 @@ def _shown(zone: AnyZone) -> AnyZone:
 
 def _modifier(modifier: Modifier) -> dict[str, Any]:
     """The box of a modifier, that around one that is a mesh, and its settings in words."""
-    volume, told = modifier.volume, ", ".join(f"{key} = {value}" for key, value in modifier.process.items())
+    volume, settings = modifier.volume, ", ".join(f"{key} = {value}" for key, value in modifier.process.items())
     if isinstance(volume, Zone):
-        return {"min_mm": volume.min_mm, "max_mm": volume.max_mm, "axes": volume.axes, "told": told}
+        return {"min_mm": volume.min_mm, "max_mm": volume.max_mm, "axes": volume.axes, "settings": settings}
     low, high = volume.mesh.bounds_mm.tolist()
-    return {"min_mm": low, "max_mm": high, "axes": None, "told": f"{volume.file.name}: {told}"}
+    return {"min_mm": low, "max_mm": high, "axes": None, "settings": f"{volume.file.name}: {settings}"}
 
 
 def _model(model: Model, names: tuple[str, ...]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from machine.app.cli import main
 from profiles.foreign.read import read_config
 from tests.mdp import files
 from tests.mdp.files import stl
-from tests.mdp.foreign import AT_ORIGIN, Made, Object, Placed, bambu, prusaslicer
+from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, Placed, bambu, prusaslicer
 from tests.shapes import from_manifold
 
 FAST = ["--parts", "1", "--as-is", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.3"]
@@ -123,7 +123,7 @@ def test_a_project_is_printed_by_its_own_settings_where_asked(kind: str, capsys:
     assert "; process.walls = 4\n" in text
     assert "; process.infill_density = 0.2\n" in text  # what --set says holds over them
     assert "S231" in text
-    assert f"a.3mf: takes its own settings, of {kind}: " in capsys.readouterr().err
+    assert f"a.3mf: uses the settings of {kind} inside: " in capsys.readouterr().err
 
 
 def test_what_keeps_no_settings_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
@@ -133,7 +133,7 @@ def test_what_keeps_no_settings_is_refused(capsys: pytest.CaptureFixture[str]) -
     for models, sentence in (
         (["a.3mf"], "profile a.3mf: keeps no print settings"),
         ([damaged.name], "profile b.3mf: its settings are damaged"),
-        (["a.stl"], "--settings-of-file: a.stl is no project of a slicer (.3mf)"),
+        (["a.stl"], "--settings-of-file: a.stl is no .3mf that a slicer has saved"),
         (["a.3mf", "a.stl"], "--settings-of-file goes with one model, and several are given: a.3mf, a.stl"),
     ):
         assert main(["export", *models, "-o", "out.gcode", "--settings-of-file", *FAST]) == 1

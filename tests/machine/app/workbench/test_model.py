@@ -25,7 +25,7 @@ from mdp.save import stl
 from mdp.zone import Modifier, Zone, Zones
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
-from tests.mdp.foreign import AT_ORIGIN, Made, Object, prusaslicer
+from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import ball, tee
 
 

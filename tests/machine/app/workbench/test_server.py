@@ -18,7 +18,7 @@ from websockets.exceptions import InvalidStatus
 from machine.app.cli import main
 from mdp.save import stl
 from tests.machine.workbench import PATIENCE_S, QUICK, Running, is_there, workbench
-from tests.mdp.foreign import AT_ORIGIN, Made, Object, prusaslicer
+from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import box, tee
 
 

@@ -14,7 +14,7 @@ const MARK_KINDS = {
   keep: { word: "no cut", colour: [118, 66, 214] }, no_seam: { word: "no seam", colour: [0, 128, 122] }, no_support: { word: "no support", colour: [196, 24, 126] },
   support: { word: "support", colour: [196, 128, 0] },
 };
-const MODIFIER = { word: "modifier", colour: [84, 92, 104] }; // told by a plan: it is shown, not changed
+const MODIFIER = { word: "modifier", colour: [84, 92, 104] }; // of a plan or a model file: shown, not changed
 const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a face's byte
 const BOX_SIDES = [0, 1, 2].flatMap((axis) => [{ axis, end: "min_mm", name: `least ${"xyz"[axis]}` }, { axis, end: "max_mm", name: `greatest ${"xyz"[axis]}` }]);
 const BEYOND_MM = 3; // of the model's box, to which modifiers without sides are drawn
@@ -168,7 +168,7 @@ function boxDrawn(zone, chosen) {
   return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: [...colour, 255] }]), over: chosen }];
 }
 
-const modifierRow = ({ told }) => made("tr", {}, made("td", {}, swatch(`rgb(${MODIFIER.colour})`), MODIFIER.word), made("td", { text: told, colSpan: 2 }));
+const modifierRow = ({ settings }) => made("tr", {}, made("td", {}, swatch(`rgb(${MODIFIER.colour})`), MODIFIER.word), made("td", { text: settings, colSpan: 2 }));
 
 function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
