@@ -61,7 +61,10 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
 def read_model(
     path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0), plate: int | None = None
 ) -> ReadModel:
-    """The same with the marks of a build. plate: of its plates; None: the first that holds something. Raises MeshError."""
+    """The same with the marks that the file brings along.
+
+    plate: of a slicer file with several; None: the first that holds something. Raises MeshError.
+    """
     with np.errstate(all="ignore"):  # what overflows is no finite number, or too large: both are said in a sentence below
         build = _read_build(path, plate)
     try:
@@ -72,14 +75,14 @@ def read_model(
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
         mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
-        zones, told = marks(build, path, scale * turn, shift_mm)
+        zones, mark_notes = marks(build, path, scale * turn, shift_mm)
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     left_out = (note for surface in surfaces for note in surface.notes)
     size = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
-    notes = (*build.notes, *taken, *told, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
+    notes = (*build.notes, *taken, *mark_notes, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
     return ReadModel(mesh, notes, zones)
 
 

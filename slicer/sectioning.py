@@ -217,7 +217,7 @@ def section_part(
 
 
 def _with_base(outlines: list[Polygons], mesh: Mesh, cuts_mm: Floats, process: Process) -> list[Polygons]:
-    """Returns the outlines; the lowest layer also holds the area where the mesh touches the plate."""
+    """The outlines; the lowest layer also holds the area where the mesh touches the plate."""
     base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
     lowest = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM))
     return lay_on_plate(outlines, lowest, base, process.line_width_mm)

@@ -31,7 +31,7 @@ Plastic = tuple[EdgeIndex, Floats]  # the middle lines of beads, and for each se
 def hold_ends(
     beads: Sequence[Bead], below: Sequence[Bead], section: Polygons, section_below: Polygons, width_mm: float
 ) -> list[Bead]:
-    """Returns the beads of a layer; skin strokes end on the plastic of the layer below where the model is there or near.
+    """The beads of a layer, whose skin strokes end on the plastic of the layer below where the model is there or near.
 
     below: the beads of the layer below; section, section_below: the model's sections in this layer and in the one below.
     """
@@ -55,7 +55,7 @@ def hold_ends(
 def _held_beads(
     beads: Sequence[Bead], loose: dict[int, list[int]], plastic: Plastic, outline: EdgeIndex, width_mm: float
 ) -> list[Bead]:
-    """Returns the beads with their loose ends held; loose: by the number of a bead, what its beginning and its end need."""
+    """The beads with their loose ends held; loose: by the number of a bead, what its beginning and its end need."""
     out, cut = list[Bead](), False  # cut: the bead that the next one would follow is left out
     for k, bead in enumerate(beads):
         points = bead.points
@@ -98,7 +98,7 @@ def _first_held(points: Floats, plastic: Plastic, width_mm: float, most_mm: floa
 
 
 def _held(points: Floats, plastic: Plastic, outline: EdgeIndex, width_mm: float, need: int) -> Floats:
-    """Begins a stroke (n, 2) on plastic; returns no points where it may be cut and has no plastic below. need: EXTEND or CUT."""
+    """A stroke (n, 2) that begins on plastic; no points where it may be cut and has no plastic below. need: EXTEND or CUT."""
     along = points[0] - points[1]
     onward = along * (ONWARD * width_mm / max(float(np.hypot(*along)), 1e-9))
     way = _first_held(np.stack([points[0], points[0] + onward]), plastic, width_mm, ONWARD * width_mm)
