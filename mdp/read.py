@@ -1,6 +1,7 @@
 """Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,12 +41,13 @@ class SizeError(MeshError):
 
 @dataclass(frozen=True, eq=False)
 class ReadModel:
-    """A model as its file has it: its solid, a short sentence for every repair and for what else a person must know, and the
-    marks that a slicer file brings along, where they lie on the solid."""
+    """A model as its file has it: its solid, a short sentence for every repair and for what else a person must know, the marks
+    that a slicer file brings along, where they lie on the solid, and the names of its plates by their numbers."""
 
     mesh: Mesh
     notes: tuple[str, ...] = ()
     zones: Zones = NO_ZONES
+    plates: Mapping[int, str] = field(default_factory=dict)
 
 
 def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0)) -> tuple[Mesh, tuple[str, ...]]:
@@ -83,7 +85,7 @@ def read_model(
     left_out = (note for surface in surfaces for note in surface.notes)
     size = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
     notes = (*build.notes, *taken, *mark_notes, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
-    return ReadModel(mesh, notes, zones)
+    return ReadModel(mesh, notes, zones, {own.number: own.name for own in build.plates})
 
 
 def read_in_place(path: Path) -> Mesh:

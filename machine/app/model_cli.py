@@ -15,7 +15,7 @@ from machine.app.terminal.option_groups import with_option_groups
 def decompose(
     model: options.Model,
     *,
-    search: options.SearchOptions,
+    search: options.FileOptions,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="folder for part-NN.stl, 3MF, JSON")] = None,
     plan: Annotated[
         Path | None, typer.Option("--plan", metavar="FILE", help="where FILE exists: cut by it without a search; else write it")

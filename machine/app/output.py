@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Iterable
-from os.path import exists, isdir, isfile, islink  # pathlib's raise for a name that is too long
+from os.path import exists, isdir, isfile, islink, splitext  # pathlib's raise for a name that is too long
 from pathlib import Path
 from typing import Any
 from unicodedata import normalize
@@ -13,7 +13,7 @@ from machine.app.requests import STDOUT, Outputs
 from profiles.errors import OutputError, reason
 from profiles.files import PRIVATE, SHARED, write_whole
 
-LONGEST_NAME = 150  # bytes
+LONGEST_NAME, LONGEST_SUFFIX = 150, 20  # bytes, which a disk counts
 
 
 def plain_name(name: str) -> str:
@@ -21,9 +21,13 @@ def plain_name(name: str) -> str:
 
     >>> plain_name("Kätzchen 猫/2")
     'Kätzchen_猫_2'
+    >>> plain_name(200 * "a" + ".stl")[-6:]
+    'aa.stl'
     """
     plain = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in normalize("NFC", name))
-    return plain.encode()[:LONGEST_NAME].decode(errors="ignore")  # a disk counts bytes
+    stem, suffix = splitext(plain)
+    kept = suffix if len(suffix.encode()) <= LONGEST_SUFFIX else ""
+    return (stem if kept else plain).encode()[: LONGEST_NAME - len(kept.encode())].decode(errors="ignore") + kept
 
 
 def check_writable(path: Path) -> None:

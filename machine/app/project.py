@@ -83,7 +83,7 @@ class Project:
     them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
     parts: 0 where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the
     print waits for a person; marks_in_plan: the plan has the marks that the model's own file has, too; figures: of the print,
-    for people and other programs; plate: of the model where that is another slicer's project.
+    for people and other programs; plate: of the model where that is a slicer file.
     """
 
     name: str
@@ -104,9 +104,12 @@ class Project:
     def applied(self, asked: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
         """A request for the model inside: the project decides what the command line leaves open.
 
-        file: the project; copies: as the user has given it, None for as many as the project has.
+        file: the project; copies: as the user has given it, None for as many as the project has. Raises PlanError for options
+        that do not go with its plan.
         """
         own_plan = self.plan if not asked.cuts.plans and asked.cuts.planes is None else None
+        if own_plan is not None:
+            self._check_plan_goes_with(asked, file)
         return replace(
             asked,
             model=self.argument,
@@ -117,6 +120,13 @@ class Project:
             copies=self.copies if copies is None else copies,
             plate=self.plate if asked.plate is None else asked.plate,
         )
+
+    def _check_plan_goes_with(self, asked: ModelRequest, file: Path) -> None:
+        if asked.orient or (asked.orient is False and self.rotation != STANDING):
+            option = "--orient" if asked.orient else "--as-is"
+            raise PlanError(f"{option}: the project {file} says how its model lies; decompose the model itself to change that")
+        if (record := asked.outputs.record) is not None:
+            raise PlanError(f"--record {record}: the project {file} has its parts, so nothing is searched that could be recorded")
 
     @property
     def argument(self) -> str:
@@ -258,7 +268,7 @@ def _project_of(folder: Path, record: dict[str, Any]) -> Project:
     given, name = record["given"], str(record["name"])
     _check_name(name)
     rows = np.array(record["rotation"], dtype=np.float64)
-    if rows.shape != (3, 3) or not np.allclose(rows @ rows.T, np.eye(3), atol=1e-6):
+    if rows.shape != (3, 3) or not np.allclose(rows @ rows.T, np.eye(3), atol=1e-6) or np.linalg.det(rows) < 0:
         raise ValueError(f"rotation {record['rotation']!r}")
     if not 1 <= int(record["copies"]) <= MOST_COPIES:
         raise ValueError(f"copies {record['copies']!r}")
@@ -301,7 +311,7 @@ def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) 
     except ValueError:
         raise PlanError(f"{project.name!r}: a project cannot keep a model of this name: rename its file") from None
     content = io.BytesIO()
-    with TemporaryDirectory(prefix=PREFIX) as name:
+    with TemporaryDirectory(prefix="tiltprint-save-") as name:
         folder = Path(name)
         write_folder(folder, project, plan)
         model = model_xml([(mesh, project.name)], {"Title": project.name, "Application": PROGRAM})

@@ -1,6 +1,6 @@
 """Requests: what a person asks a command for, as values: the command line makes them, the commands take them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from profiles.profile import Profile
 
 STDOUT = Path("-")  # stands for standard output where a file is asked for
+PLACING = ("process.scale", "process.rotate_deg", "process.place_mm")  # how a model lies and stands
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
 UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
@@ -74,7 +75,7 @@ class ModelRequest:
     go on although the dry run found errors. profile_names, settings: machine, material and process as the user has given them,
     names or files, and KEY=VALUE over them. project: the project file that the model comes from; own_marks: the marks of the
     model's own file count beside those of the plan. stops: where the print waits for a person. copies: the number of each
-    model on the plate; beside: the other models there. plate: of each model's project; None: the first that holds something.
+    model on the plate; beside: the other models there. plate: of each model's slicer file; None: the first that holds something.
     """
 
     model: str
@@ -126,6 +127,22 @@ class Given:
     material: str = "pla"
     process: str = "standard"
     settings: tuple[str, ...] = ()
+
+    def replaced(self, names: Sequence[str | None], settings: Sequence[str]) -> "Given":
+        """The same with other profiles, where a machine, a material or a process is named, and with further settings.
+
+        A setting goes with the profile that is replaced; how the model lies and stands stays.
+        """
+        kinds = ("machine", "material", "process")
+        changed = {kind: name for kind, name in zip(kinds, names, strict=True) if name is not None}
+        stay = (text for text in self.settings if _kind(text) not in changed or text.partition("=")[0].strip() in PLACING)
+        return Given(**{kind: getattr(self, kind) for kind in kinds} | changed, settings=(*stay, *settings))
+
+
+def _kind(setting: str) -> str:
+    """Which profile a KEY=VALUE setting belongs to; those of the search go with the process."""
+    section = setting.partition(".")[0].strip()
+    return "process" if section == "search" else section
 
 
 @dataclass(frozen=True)

@@ -98,11 +98,12 @@ class BuildObject:
 @dataclass(frozen=True, eq=False)
 class Build:
     """The objects that a file prints, and notes on what it holds and is left out. on_plate: its z = 0 is the build plate, below
-    which nothing is printed."""
+    which nothing is printed; plates: all that hold something."""
 
     objects: Sequence[BuildObject]
     notes: Sequence[str] = ()
     on_plate: bool = False
+    plates: Sequence[Plate] = ()
 
 
 def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[tuple[int, int, Role]]]]:

@@ -211,6 +211,7 @@ class _Builder:
         self._start = _start_part(package)
         self._configs = _configs(package)
         self._notes: list[str] = []
+        self._plates: list[Plate] = []  # that hold something that is printed
         self._unpainted: Counter[str] = Counter()
         self._placed = self._meshes = self._faces = 0
         objects = package.model(self._start).root.findall("{*}resources/{*}object")
@@ -232,7 +233,7 @@ class _Builder:
             if count
         ]
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
-        return Build(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._configs.objects))
+        return Build(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._configs.objects), plates=self._plates)
 
     def _items(self, items: list[ElementTree.Element], plate: int | None) -> Iterator[ElementTree.Element]:
         """The items that are printed on a plate."""
@@ -241,7 +242,9 @@ class _Builder:
         for item in items:
             instances.append((item.get("objectid", ""), counts[item.get("objectid", "")]))
             counts[item.get("objectid", "")] += 1
-        chosen = self._plate([own for own, item in zip(instances, items, strict=True) if _is_printed(item)], plate)
+        printed = {own for own, item in zip(instances, items, strict=True) if _is_printed(item)}
+        self._plates = [own for own in self._configs.plates if own.instances & printed]
+        chosen = self._plate(plate)
         for item, instance in zip(items, instances, strict=True):
             if not _is_printed(item):
                 self._leave_out(item.get("objectid", ""), "which is switched off in its slicer")
@@ -250,9 +253,9 @@ class _Builder:
             elif not any(instance in plate.instances for plate in self._configs.plates):
                 self._leave_out(item.get("objectid", ""), "which stands on none of its plates")
 
-    def _plate(self, printed: list[tuple[str, int]], number: int | None) -> Plate | None:
+    def _plate(self, number: int | None) -> Plate | None:
         """The plate of a number, or the first that holds something that is printed; None: there are no plates."""
-        plates = [plate for plate in self._configs.plates if plate.instances.intersection(printed)]
+        plates = self._plates
         if number is None:
             if len(plates) > 1:
                 others = ", ".join(str(plate.number) for plate in plates[1:])

@@ -12,6 +12,7 @@ import numpy as np
 from mdp.mesh import parse_colour
 from mdp.plane import unit_direction
 from mdp.plans.plan_file import (
+    BOX_KEYS,
     KEYS,
     MESH_ZONES,
     MODIFIER_KEYS,
@@ -36,7 +37,7 @@ from profiles.toml_text import read_toml
 
 MOST_BYTES = 10_000_000  # far more than the workbench writes; a file as large is refused unread
 MOST_ZONES = 1000  # of a kind: every face is asked for each
-MODIFIER_VOLUMES = {"a box": {"min_mm", "max_mm", "axes"}, "a height range z_mm": {"z_mm"}, "a mesh": {"mesh"}}
+MODIFIER_VOLUMES = {"a box": set(BOX_KEYS), "a height range z_mm": {"z_mm"}, "a mesh": {"mesh"}}
 MOST_MODIFIERS = 100  # each of them makes another pass over the layers
 
 
@@ -147,7 +148,17 @@ class _Reader:
         low, high = (self._vector(values.get(corner), where + corner) for corner in ("min_mm", "max_mm"))
         if not all(least < most for least, most in zip(low, high, strict=True)):
             raise self._error(f"{where}min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
-        return Zone(low, high, self._rotation(values, f"{where}axes") if "axes" in values else None)
+        axes = self._rotation(values, f"{where}axes") if "axes" in values else None
+        return Zone(low, high, axes, self._room(values["room"], f"{where}room ") if "room" in values else None)
+
+    def _room(self, values: Any, where: str) -> Zone:
+        """A box outside of which another does not count."""
+        if not isinstance(values, dict):
+            raise self._error(
+                f"{where.strip()} is {_show(values)}: a box is expected, as {{min_mm = [0, 0, 0], max_mm = [9, 9, 9]}}"
+            )
+        self._only(values, BOX_KEYS, where)
+        return self._box(values, where)
 
     def _modifiers(self, table: dict[str, Any]) -> tuple[Modifier, ...]:
         modifiers = []

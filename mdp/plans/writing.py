@@ -46,7 +46,8 @@ def _zone_values(zone: AnyZone, folder: Path | None) -> dict[str, Any]:
         return {"mesh": _path_from(folder, zone.file)}
     assert isinstance(zone, Zone)  # triangles are only what a model's own file marks
     leaning = {} if zone.axes is None else {"axes": [list(axis) for axis in zone.axes]}
-    return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm), **leaning}
+    room = {} if zone.room is None else {"room": _inline(_zone_values(zone.room, folder))}
+    return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm), **leaning, **room}
 
 
 def _modifier_table(modifier: Modifier, folder: Path | None) -> tomlkit.items.Table:
@@ -58,7 +59,7 @@ def _modifier_table(modifier: Modifier, folder: Path | None) -> tomlkit.items.Ta
 
 
 def _is_height_range(box: Zone) -> bool:
-    return box.axes is None and (*box.min_mm[:2], *box.max_mm[:2]) == (-MOST_MM, -MOST_MM, MOST_MM, MOST_MM)
+    return (box.axes, box.room) == (None, None) and (*box.min_mm[:2], *box.max_mm[:2]) == (-MOST_MM, -MOST_MM, MOST_MM, MOST_MM)
 
 
 def _path_from(folder: Path | None, file: Path) -> str:

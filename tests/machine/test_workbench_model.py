@@ -1,5 +1,9 @@
 """The model on the workbench in a real browser: turned by its rings, scaled, and told where the machine does not reach it."""
 
+import json
+from pathlib import Path
+
+import manifold3d as m3
 import numpy as np
 import pytest
 
@@ -7,6 +11,7 @@ from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.test_workbench_page import drag_slider, find_as_it_lies, open_model
 from tests.machine.workbench import Running
+from tests.mdp.slicer_files import Made, Object, Placed, bambu
 from tests.shapes import tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
@@ -55,6 +60,29 @@ def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser
     browser.click("#undo")
     browser.wait("$('undo').getAttribute('aria-label').startsWith('undo: open')")
     browser.wait("parseFloat($('overhang').textContent) === 300")
+
+
+def test_plates_and_settings_of_a_slicer_file_are_taken_by_buttons(browser: Browser, bench: Running, tmp_path: Path) -> None:
+    def cube(side_mm: float, x_mm: float, plate: int) -> Object:
+        transform = np.vstack([np.eye(3), [x_mm, 0.0, 0.0]])
+        return Object([Made(m3.Manifold.cube(3 * (side_mm,), True))], [Placed(transform, plate)])
+
+    inside = {"Metadata/project_settings.config": json.dumps({"wall_loops": "5", "sparse_infill_density": "33%"})}
+    bambu(tmp_path / "two.3mf", [cube(20.0, 0.0, 1), cube(30.0, 300.0, 2)], np.random.default_rng(0), inside)
+    open_model(browser, bench, "two.3mf", (tmp_path / "two.3mf").read_bytes())
+    browser.click("#tab-model")
+    assert browser.value("$('size-x').value") == "20.00"
+    assert "another can be taken below: 2" in browser.value("$('model-notes').textContent")
+    browser.click("#plates button:nth-child(2)")
+    browser.wait("$('size-x').value === '30.00' && $('plates').children[1].disabled")
+    browser.click("#file-settings")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: take the settings of two.3mf'")
+    browser.wait("$('file-settings-told').textContent.startsWith('two.3mf: uses the settings of OrcaSlicer inside: ')")
+    with bench.line() as line:
+        settings = line.until(lambda state: state["model"]["plates"][1]["taken"])["given"]["settings"]
+    assert {"process.walls=5", "process.infill_density=0.33"} <= set(settings)
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    assert browser.value("$('plates').childElementCount === 0 && $('inside').hidden && $('file-settings-told').hidden")
 
 
 def test_a_click_on_the_edge_between_two_faces_meets_one_of_them(browser: Browser, bench: Running) -> None:

@@ -43,4 +43,5 @@ def _project(request: ModelRequest, decomposed: Decomposed) -> Project:
         copies=request.copies,
         figures=figures_of(decomposition.chosen),
         plate=request.plate,
+        marks_in_plan=not request.own_marks,
     )

@@ -15,7 +15,6 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
 from machine.app.project import close_projects, open_project, with_meshes, without_folders
 from machine.app.requests import ModelRequest
-from machine.app.terminal.options import ProfileOptions
 from machine.app.terminal.plain import plain_line
 from machine.dryrun.dryrun import summary
 from machine.planning.fit import check_parts
@@ -25,7 +24,8 @@ from mdp.plans.writing import plan_text
 from mdp.ranking import SUFFIX
 from mdp.save import json_values, part_file
 from profiles.errors import UserError
-from profiles.profile import Profile, with_part_settings
+from profiles.places import is_file_name
+from profiles.profile import Profile, load, with_part_settings
 from slicer.estimate.estimate import estimate
 
 DONE, REFUSED, FAILED = STATUSES = ("done", "refused", "failed")
@@ -76,10 +76,10 @@ def job_of(do: str, asked: ModelRequest, out: Path) -> Job:
         ranker,
         asked.orient,
         asked.cuts.parts,
-        asked.plate,
         named,
     )
-    return Job(do, asked, out, sha256(repr(words).encode()).hexdigest())
+    names = (str(Path(name).resolve()) if name and is_file_name(name) else name for name in asked.profile_names)
+    return Job(do, replace(asked, profile_names=tuple(names)), out, sha256(repr(words).encode()).hexdigest())
 
 
 def inputs_of(file: Path, job: Job) -> str:
@@ -113,8 +113,8 @@ def request_of(model: str, job: Job) -> ModelRequest:
     project = open_project(model)
     if project is None:
         return replace(job.asked, model=model)
-    machine, material, process = job.asked.profile_names
-    profile = ProfileOptions(machine, material, process, list(job.asked.settings)).over(project.given).profile()
+    given = project.given.replaced(job.asked.profile_names, job.asked.settings)
+    profile = load(given.machine, given.material, given.process, given.settings)
     asked = replace(job.asked, profile=with_part_settings(profile, job.asked.profile.parts))
     return project.applied(asked, Path(model), 1 if job.do == "decompose" else None)
 

@@ -27,7 +27,6 @@ def _names_of(kind: str) -> Callable[[str], list[str]]:
     return complete
 
 
-PLACING = ("process.scale", "process.rotate_deg", "process.place_mm")
 OF_FILE = "; else the project's or G-code file's own, else {}"
 
 
@@ -103,6 +102,18 @@ class SearchOptions:
         list[str] | None,
         typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
     ] = None
+
+    @property
+    def settings(self) -> list[str]:
+        """Those of the profile that are given as options of their own."""
+        values = {"beam_width": self.beam_width, "method": self.search, "time_limit_s": self.time_limit}
+        return [f"search.{key}={value}" for key, value in values.items() if value is not None]
+
+
+@dataclass(frozen=True)
+class FileOptions(SearchOptions):
+    """The same for one model, and what of its file is taken."""
+
     plate: Annotated[
         int | None,
         typer.Option(
@@ -114,15 +125,9 @@ class SearchOptions:
         typer.Option("--settings-of-file", help="print by the settings inside a .3mf of another slicer; see profiles import"),
     ] = False
 
-    @property
-    def settings(self) -> list[str]:
-        """Those of the profile that are given as options of their own."""
-        values = {"beam_width": self.beam_width, "method": self.search, "time_limit_s": self.time_limit}
-        return [f"search.{key}={value}" for key, value in values.items() if value is not None]
-
 
 @dataclass(frozen=True)
-class ProgramOptions(SearchOptions):
+class ProgramOptions(FileOptions):
     """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
 
     plan: PlansGiven = None
@@ -164,15 +169,8 @@ class ProfileOptions:
 
     def over(self, given: Given) -> "ProfileOptions":
         """These options over what a project was made with."""
-        machine, material, process = self.machine or given.machine, self.material or given.material, self.process or given.process
-        kept = [setting for setting in given.settings if not self._replaces(setting)]
-        return ProfileOptions(machine, material, process, [*kept, *(self.settings or ())])
-
-    def _replaces(self, setting: str) -> bool:
-        """Whether a project's setting goes with a profile that the user has replaced; how the model lies and stands stays."""
-        key = setting.partition("=")[0].strip()
-        section = {"search": "process"}.get(key.partition(".")[0], key.partition(".")[0])
-        return getattr(self, section, None) is not None and key not in PLACING
+        new = given.replaced(self.names, self.settings or ())
+        return ProfileOptions(new.machine, new.material, new.process, list(new.settings))
 
     @property
     def sections(self) -> frozenset[str]:
@@ -229,45 +227,37 @@ def model_request(
     """
     from machine.app.project import open_project
 
+    file = search if isinstance(search, FileOptions) else FileOptions()
     project = open_project(model)
-    if project is not None and search.settings_of_file:
+    if project is not None and file.settings_of_file:
         raise PlanError(f"--settings-of-file: {model} is a project of tiltprint, whose settings hold without it")
     if project is not None:
         given = given.over(project.given)
-    elif search.settings_of_file:
+    elif file.settings_of_file:
         given = given.over(_given_by(model))
     request = replace(
         ModelRequest(model, given.profile(search), given.sections, search.ranker, search.orient, profile_names=given.names),
         settings=given.given(search).settings,
         copies=1 if copies is None else copies,
-        plate=search.plate,
+        plate=file.plate,
         **further,
     )
     return request if project is None else project.applied(request, Path(model), copies)
 
 
 def _given_by(model: str) -> Given:
-    """The nearest shipped material and the settings inside a slicer file; a note on stderr says how many are taken.
-
-    Raises ProfileError for a model that keeps no settings.
-    """
+    """The settings inside a slicer file; a note on stderr says how many are used. Raises ProfileError for a model without."""
+    from machine.app.file_settings import settings_inside
     from machine.app.terminal.progress import say
     from profiles.errors import ProfileError
-    from profiles.foreign.imported import KINDS, imported
-    from profiles.foreign.read import read_config
-    from profiles.foreign.slicer_file import is_slicer_file
 
-    if not model:
-        raise ProfileError("--settings-of-file goes with one model, not with a folder of them")
     file = Path(model)
-    if not is_slicer_file(file):
-        raise ProfileError(f"--settings-of-file: {model} is no .3mf that a slicer has saved with its settings inside")
-    config = read_config(file)
-    found = {kind: imported(config, kind, nameless=file.stem) for kind in KINDS}
-    counts = [f"{sum(row.taken for row in profile.rows)} of {len(profile.rows)} of the {kind}" for kind, profile in found.items()]
-    say(f"{file.name}: uses the settings of {config.program} inside: {', '.join(counts)}; profiles import lists them")
-    settings = tuple(setting for profile in found.values() for setting in profile.settings)
-    return Given(material=found["material"].base, settings=settings)
+    try:
+        given, note = settings_inside(file, file.name)
+    except ProfileError as error:
+        raise ProfileError(f"--settings-of-file: {error}") from None
+    say(note)
+    return given
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:

@@ -12,8 +12,10 @@ import trimesh
 from manifold3d import Manifold
 
 from machine.app.cli import main
-from machine.app.project import INSIDE, RECORD, close_projects, is_project
+from machine.app.project import INSIDE, RECORD, STANDING, Project, close_projects, is_project, open_project, project_bytes
+from machine.app.requests import Given
 from mdp.cut import mesh_of
+from mdp.plans.plan_file import PlanFile
 from mdp.read import read_mesh
 from mdp.save import MODEL_PART, stl
 from tests.shapes import tee
@@ -98,6 +100,43 @@ def test_other_programs_read_the_model_as_it_lies_and_a_picture() -> None:
     with zipfile.ZipFile("tee.3mf") as archive:
         assert archive.read("Metadata/thumbnail.png")[:8] == b"\x89PNG\r\n\x1a\n"
         assert b"Metadata/thumbnail.png" in archive.read("_rels/.rels")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_project_of_the_workbench_that_is_saved_again_still_says_that_its_plan_has_all_marks() -> None:
+    project = Project("tee.stl", Path("tee.stl"), Given(), parts=1, marks_in_plan=True)
+    plan = PlanFile("tee.stl", orientation=STANDING)
+    Path("bench.3mf").write_bytes(project_bytes(project, plan, tee(), b""))
+    run("save", "bench.3mf", "-o", "again.3mf")
+    project_again = open_project("again.3mf")
+    assert project_again is not None
+    assert project_again.marks_in_plan
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_mark_s_mesh_with_a_long_name_is_read_again_from_the_project() -> None:
+    name = 100 * "ü" + ".stl"
+    shutil.copy("insert.stl", name)
+    Path("plan.toml").write_text(PLAN.replace("insert.stl", name))
+    run("save", "tee.stl", *FAST, "--plan", "plan.toml", "-o", "long.3mf")
+    run("decompose", "long.3mf", "-o", "parts")
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--orient",), "--orient: the project tee.3mf says how its model lies; decompose the model itself to change that"),
+        (("--record", "r"), "--record r: the project tee.3mf has its parts, so nothing is searched that could be recorded"),
+    ],
+)
+def test_options_that_a_project_leaves_no_room_for_are_refused_by_its_name(
+    options: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    capsys.readouterr()
+    assert main(["decompose", "tee.3mf", *options]) == 1
+    assert capsys.readouterr().err.strip().endswith(sentence)
 
 
 def changed(path: Path, name: str, content: bytes | None) -> None:
@@ -208,13 +247,6 @@ def test_a_batch_has_its_options_over_a_project_as_export_has() -> None:
     run("batch", "models", "-o", "out", "--process", "draft", "--workers", "1")
     run("export", "models/tee.3mf", "--process", "draft", "-o", "one.gcode")
     assert Path("out/tee.gcode").read_bytes() == Path("one.gcode").read_bytes()
-
-
-@pytest.mark.usefixtures("folder")
-def test_how_a_project_lies_is_not_asked_for_twice(capsys: pytest.CaptureFixture[str]) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
-    assert main(["decompose", "tee.3mf", "--orient"]) == 1
-    assert "--orient: the plan tee.3mf/plan.toml says how the model lies" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("models", [("tee.3mf", "tee.stl"), ("tee.stl", "tee.3mf"), ("tee.3mf:2",)])

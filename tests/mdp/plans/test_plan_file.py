@@ -1,5 +1,6 @@
 """Plan files: what is written is read again, and what cannot be a plan is refused in one sentence."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,8 @@ ROWS = st.builds(PlannedRow, st.lists(WHOLE, max_size=3).map(tuple), st.floats(0
 CORNERS = st.tuples(*[st.floats(-9e4, 9e4)] * 3)
 TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 AXES = st.none() | st.just(TURNED)
-ZONES = st.builds(lambda low, axes: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0), axes), CORNERS, AXES)
+BOXES = st.builds(lambda low, axes: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0), axes), CORNERS, AXES)
+ZONES = st.builds(lambda box, room: replace(box, room=room), BOXES, st.none() | BOXES)
 GROWN = st.builds(Grown, CORNERS, st.floats(0.0, 180.0))
 MODIFIERS = st.builds(
     Modifier,
@@ -81,6 +83,14 @@ REFUSED = [
     ("version = 1\norientation = [[1, 0, 0], [0, 1, 0]]", "a rotation is expected, three rows of three numbers"),
     ("version = 1\norientation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]", "a rotation is expected, three rows of three numbers"),
     ("version = 1\norientation = 7", "orientation is 7: 3 numbers in brackets are expected"),
+    (
+        "version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 1, 1]\nroom = 5",
+        "keep 1: room is 5: a box is expected, as {min_mm =",
+    ),
+    (
+        "version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 1, 1]\nroom = {min_mm = [0, 0, 0], max_mm = [0, 1, 1]}",
+        "keep 1: room min_mm is [0.0, 0.0, 0.0] and max_mm [0.0, 1.0, 1.0]: each number of min_mm must be less",
+    ),
     (f"{FIRST}process = 4", "part 1: process is 4: keys and values are expected, as {walls = 4}"),
     ("version = 1\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 5", "part 1 stands on the platform and has no plane"),
     (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is no key of a plan: normal, offset_mm, limbs_mm, process are allowed"),
@@ -128,9 +138,9 @@ REFUSED = [
     ("version = 1\n[[modifier]]\nmesh = ''\nprocess = {walls = 4}", "mesh is '': the name of a model's file is expected"),
     (
         "version = 1\n[[modifier]]\ncolour = '#ff0000'",
-        "modifier 1: 'colour' is no key of a plan: min_mm, max_mm, axes, z_mm,",
+        "modifier 1: 'colour' is no key of a plan: min_mm, max_mm, axes, room, z_mm,",
     ),
-    ("version = 1\n[[keep]]\nmesh = 'a.stl'", "keep 1: 'mesh' is no key of a plan: min_mm, max_mm, axes, colour,"),
+    ("version = 1\n[[keep]]\nmesh = 'a.stl'", "keep 1: 'mesh' is no key of a plan: min_mm, max_mm, axes, room, colour,"),
     ("version = 1\n[[support]]\nmesh = 'a.stl'\ncolour = '#ff0000'", "support 1: has a mesh and colour: one of them is allowed"),
     ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
     ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),

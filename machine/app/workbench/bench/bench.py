@@ -106,7 +106,8 @@ class History:
         """A further step, none for the same bench; pauses go with their parts, and what was undone is forgotten."""
         if bench is self.now.bench:
             return self
-        stops, gone = renumbered_stops(bench.stops, self.now.bench.cuts or (), bench.cuts or ())
+        before = self.now.bench if _have_one_model(self.now.bench, bench) else bench
+        stops, gone = renumbered_stops(bench.stops, before.cuts or (), bench.cuts or ())
         after = bench if stops == bench.stops else replace(bench, stops=stops)
         lost = [(stop.part, stop.option) for stop in gone] + [
             (own.part, f"--part {option(own)}") for own in _gone(self.now.bench, bench)
@@ -143,9 +144,13 @@ def _nearest_steps(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     return steps
 
 
+def _have_one_model(before: Bench, after: Bench) -> bool:
+    return before.model is not None and after.model is not None and before.model.path == after.model.path
+
+
 def _gone(before: Bench, after: Bench) -> list[PartSettings]:
     """The settings of single parts that are not there any more where the same model is turned or cut otherwise."""
-    if before.model is None or after.model is None or before.model.path != after.model.path:
+    if not _have_one_model(before, after):
         return []
     if (before.cuts, before.rotation) == (after.cuts, after.rotation):
         return []  # a person has taken them back

@@ -1,10 +1,11 @@
 """Model: a model as it is read. Its triangles are in a file, so that they go through no pipe and lie in no memory for longer than
 they are worked with."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_hex
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from profiles.frozen import Vector
 class Model:
     """A model as it is read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for every repair. key:
     what tells it from every other reading; a page asks for its triangles by it. zones: the boxes that its file marks; plate:
-    of another slicer's project, None: the first that holds something.
+    of a slicer file, None: the first of `plates`, which are their names by their numbers; has_settings: its file keeps some.
     """
 
     name: str
@@ -33,9 +34,13 @@ class Model:
     key: str = field(default_factory=lambda: token_hex(8))
     zones: Zones = NO_ZONES
     plate: int | None = None
+    plates: Mapping[int, str] = field(default_factory=dict)
+    has_settings: bool = False
 
     @classmethod
-    def stored(cls, name: str, path: Path, read: ReadModel, mesh_file: Path, plate: int | None = None) -> "Model":
+    def stored(
+        cls, name: str, path: Path, read: ReadModel, mesh_file: Path, plate: int | None = None, has_settings: bool = False
+    ) -> "Model":
         """One whose mesh is written to a file first; of its marks boxes alone are kept, which move with it."""
         mesh, zones = read.mesh, read.zones
         with mesh_file.open("wb") as file:
@@ -45,7 +50,8 @@ class Model:
         if left := zones.count - kept.count:
             verb, it = ("is", "it") if left == 1 else ("are", "them")
             notes += (f"{left} of these marks {verb} no box and left out here: the command line has {it}",)
-        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes, zones=kept, plate=plate)
+        more: dict[str, Any] = {"zones": kept, "plate": plate, "plates": read.plates, "has_settings": has_settings}
+        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes, **more)
 
     def mesh(self) -> Mesh:
         """Its triangles, read anew."""

@@ -31,6 +31,13 @@ def with_setting(given: Given, key: str, value: str | None) -> Given:
     return replace(given, settings=others if value is None else (*others, f"{key}={_in_one_line(value)}"))
 
 
+def with_given(given: Given, inside: Given) -> Given:
+    """The same with the material and the settings of another, which stand in place of its own."""
+    keys = {setting.partition("=")[0].strip() for setting in inside.settings}
+    others = (setting for setting in given.settings if setting.partition("=")[0].strip() not in keys)
+    return replace(given, material=inside.material, settings=(*others, *inside.settings))
+
+
 def with_typed(given: Given, key: str, value: str | None, before: Profile) -> Given:
     """The same for what a person types: what the profile has without it is no change. Raises ProfileError."""
     changed, unchanged = (with_setting(given, key, new) for new in (value, None))

@@ -107,6 +107,8 @@ def _too_early(asked: Asked) -> str:
 COMMANDS: dict[str, Command] = {
     "demo": Command(Need.NOTHING, lambda session, asked: session.open_demo(str(asked.get("name")))),
     "unit": Command(Need.NOTHING, lambda session, asked: session.open_in_unit(asked.get("unit"))),
+    "plate": Command(Need.MODEL, lambda session, asked: session.open_plate(asked.get("plate"))),
+    "file_settings": Command(Need.MODEL, lambda session, asked: session.take_settings_inside()),
     "dismiss": Command(Need.NOTHING, lambda session, asked: None),
     "undo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.undo())),
     "redo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.redo())),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 from weakref import finalize
 
+from machine.app.file_settings import settings_inside
 from machine.app.pipeline.given_plan import with_plan_settings
 from machine.app.project import Project, unpack
 from machine.app.requests import Given
@@ -25,7 +26,7 @@ from machine.app.workbench.bench.bench import (
 )
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.bench.settings import check_block, profile_as_given, with_typed
+from machine.app.workbench.bench.settings import check_block, profile_as_given, with_given, with_typed
 from machine.app.workbench.session.base import LONGEST_SENTENCE, SessionBase, asking
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.finding import Finding
@@ -84,7 +85,8 @@ class _UnscaledError(MeshError):
 
 class Session(SessionBase):
     """A bench with all work on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
-    this one too; unscaled: the model that waits for its unit."""
+    this one too; unscaled: the model that waits for its unit; told_settings: key of a model, and the note on those taken from
+    its file."""
 
     def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
         super().__init__(Bench(profile, given=given), pools)
@@ -101,6 +103,7 @@ class Session(SessionBase):
         self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
         self.unscaled: OfUnknownUnit | None = None
+        self.told_settings = ("", "")
         self._named: tuple[str, ...] = ()
 
     @property
@@ -142,7 +145,7 @@ class Session(SessionBase):
 
     async def open_model(self, path: Path, name: str, anew: bool = True, plate: int | None = None) -> None:
         """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it;
-        plate: of another slicer's project.
+        plate: of a slicer file.
 
         Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
         """
@@ -199,6 +202,27 @@ class Session(SessionBase):
         self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
         self._begin_ranking(model)
 
+    async def open_plate(self, plate: object) -> None:
+        """Put another plate of the slicer file on the bench there. Raises UserError."""
+        model = self.bench.model
+        numbers = [] if model is None else list(model.plates)
+        if model is None or not isinstance(plate, int) or plate not in numbers:
+            raise PlanError(
+                f"plate is {plate!r}: {', '.join(map(str, numbers)) or 'nothing, for the model has no plates,'} is allowed"
+            )
+        await self.open_model(model.path, model.name, anew=False, plate=plate)
+
+    async def take_settings_inside(self) -> None:
+        """Print by the settings that the slicer file on the bench keeps; what was set before stays where it says nothing.
+
+        Raises UserError.
+        """
+        model = self.bench.model
+        assert model is not None
+        inside, note = await asyncio.to_thread(settings_inside, model.path, model.name)
+        await self.take_given(f"take the settings of {model.name}", lambda given: with_given(given, inside))
+        self.told_settings = model.key, note
+
     async def open_demo(self, name: str) -> None:
         """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""
         if not name.startswith("demo:"):
@@ -225,28 +249,38 @@ class Session(SessionBase):
         Raises UserError; the folder stays as it is then.
         """
         async with self.keeping.opening(folder):
-            await self.take_given(word, lambda given: project.given)
+            bench = await self._bench_of(project)
+            self.do(word, bench)
+        if bench.model is not None:
+            self._begin_ranking(bench.model)
+
+    async def _bench_of(self, project: Project) -> Bench:
+        """A bench with a project on it. Raises UserError."""
+        self.hear_name(project.name)
+        self.readiness.load()
+        profile = profile_as_given(project.given, self.bench.profile.of_all_parts)
+        check_block(profile, "")
+        plan = None if project.plan is None else _read_plan(project.plan)
+        with self.waiting(f"reading {project.name}"):
             path = locate(project.name) if project.model is None else self.received.new_file(project.name)
             if project.model is not None:
                 await asyncio.to_thread(shutil.copyfile, project.model, path)
-            await self.open_model(path, project.name, anew=False, plate=project.plate)
-            marks = NO_ZONES if project.marks_in_plan else with_rotation(self.bench, project.rotation).zones
-            if project.plan is not None:
-                await self.open_plan(project.plan)
-            bench = with_rotation(self.bench, project.rotation)
-            bench = bench if project.parts else replace(bench, cuts=None)
-            locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
-            bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES and project.plan is not None else bench
-            self.do(word, replace(bench, locked=locked, stops=project.stops, copies=project.copies))
+            model = await self._read(path, project.name, profile, project.plate)
+            uncut = with_model(Bench(profile, given=project.given), model)
+            bench = with_rotation(uncut, project.rotation)
+            if plan is not None:
+                marks = NO_ZONES if project.marks_in_plan else bench.zones
+                rows = await self.quick.run("measure_plan", uncut, plan)
+                bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
+                bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
+        bench = bench if project.parts else replace(bench, cuts=None)
+        locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
+        return replace(bench, locked=locked, stops=project.stops, copies=project.copies)
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""
         self.hear_name(str(path))
-        try:
-            plan = read_plan(path)
-        except PlanError as error:
-            raise PlanError(str(error).replace(str(path), path.name)) from None
-        await self.take_plan(plan)
+        await self.take_plan(_read_plan(path))
 
     async def take_plan(self, plan: PlanFile) -> None:
         """The same for a plan that is read already."""
@@ -348,6 +382,14 @@ class Session(SessionBase):
         await self.readiness.wait()
         resting = await self.quick.run("rank_resting", model, self.bench.profile.of_all_parts)
         self.resting = model.key, resting
+
+
+def _read_plan(path: Path) -> PlanFile:
+    """The plan in a file. Raises PlanError, which names the file alone."""
+    try:
+        return read_plan(path)
+    except PlanError as error:
+        raise PlanError(str(error).replace(str(path), path.name)) from None
 
 
 def _reads(profile: Profile) -> tuple[object, ...]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.bench.page_words import in_page_words, with_page_words
+from machine.app.workbench.bench.page_words import in_page_words, page_words, with_page_words
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.commands import Need, lacking
 from machine.app.workbench.session.session import Session
@@ -49,7 +49,7 @@ def _state(session: Session) -> dict[str, Any]:
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": history.now.word if history.before else "",
         "redo": history.undone[-1].word if history.undone else "",
-        "model": None if bench.model is None else _model(bench.model, session.names),
+        "model": None if bench.model is None else _model(bench.model, session),
         "rotation": bench.rotation,
         "scale": bench.profile.process.scale,
         "standing": standing and {"size_mm": standing.size_mm, "problem": standing.problem},
@@ -125,14 +125,19 @@ def _modifier(modifier: Modifier) -> dict[str, Any]:
     return {"min_mm": low, "max_mm": high, "axes": None, "settings": f"{volume.file.name}: {settings}"}
 
 
-def _model(model: Model, names: tuple[str, ...]) -> dict[str, Any]:
+def _model(model: Model, session: Session) -> dict[str, Any]:
+    plate = model.plate or next(iter(model.plates), None)
+    key, told = session.told_settings
     return {
         "key": model.key,
         "name": model.name,
         "faces": model.faces,
         "size_mm": model.size_mm,
         "volume_mm3": model.volume_mm3,
-        "notes": in_page_words(model.notes, names),
+        "notes": in_page_words(model.notes, session.names),
+        "plates": [{"number": number, "name": name, "taken": number == plate} for number, name in model.plates.items()],
+        "has_settings": model.has_settings,
+        "settings_told": page_words(told, session.names) if key == model.key else "",
         "drawn": model.faces <= MOST_FACES,
     }
 

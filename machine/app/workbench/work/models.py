@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from machine.app.file_settings import has_settings
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.marks import named_faces
@@ -51,7 +52,7 @@ def read_model(
         return Unscaled(sentence, question, error.units)
     except MeshError as error:
         raise MeshError(str(error).replace(str(path), name)) from None
-    return Model.stored(name, path, read, mesh_file, plate)
+    return Model.stored(name, path, read, mesh_file, plate, has_settings(path))
 
 
 def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, ...]:

@@ -12,6 +12,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from machine.app.project import Project, project_bytes
 from machine.app.requests import Given
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.session.commands import obey
@@ -21,8 +22,10 @@ from machine.app.workbench.work.models import read_model
 from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.mesh import Mesh
+from mdp.plans.plan_file import PlanFile
 from mdp.save import stl
 from mdp.zone import Modifier, Zone, Zones
+from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
 from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
@@ -108,6 +111,41 @@ def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more
         return undone, file.is_file()
 
     assert read(forget, tmp_path / "tee.stl") == (True, False)
+
+
+def project(path: Path, mesh: Mesh, given: Given, plan: PlanFile | None = None) -> Path:
+    """A project file of a model beside it."""
+    (path.parent / "own.stl").write_bytes(stl(mesh))
+    made = Project("own.stl", path.parent / "own.stl", given, parts=1)
+    path.write_bytes(project_bytes(made, plan or PlanFile("own.stl"), mesh, b""))
+    return path
+
+
+def test_a_project_opens_whatever_lies_on_the_bench_and_in_one_step(tmp_path: Path) -> None:
+    (tmp_path / "large.stl").write_bytes(stl(Mesh(tee().vertices * 10.0, tee().faces)))  # 400 mm, 10 m at the project's scale
+    path = project(tmp_path / "p.3mf", Mesh(tee().vertices / 25.4, tee().faces), Given(settings=("process.scale=25.4",)))
+
+    async def work(session: Session) -> Any:
+        await session.open_project(path, "p.3mf")
+        return the_model(session).size_mm, [step.word for step in session.history.before]
+
+    size_mm, before = read(work, tmp_path / "large.stl")
+    assert size_mm == pytest.approx((40.0, 10.0, 40.0), abs=1e-4)
+    assert before == ["", "open large.stl"]
+
+
+def test_a_project_with_a_damaged_plan_leaves_the_bench_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+    wrong = PlanFile("own.stl", zones=Zones(support=(Zone((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),)))
+    path = project(tmp_path / "p.3mf", tee(), Given(settings=("process.walls=5",)), wrong)
+
+    async def work(session: Session) -> Any:
+        before = session.bench
+        with pytest.raises(PlanError, match="support 1: min_mm is"):
+            await session.open_project(path, "p.3mf")
+        return session.bench is before
+
+    assert read(work, tmp_path / "tee.stl")
 
 
 def test_the_boxes_that_a_project_marks_lie_on_the_bench_and_meshes_are_left_out_with_a_note(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import { $ } from "../../../../view/template/page.js";
 import { offer, takeFiles } from "./benches.js";
-import { alike, fill, listen, listIn, mm2, tellIn } from "./elements.js";
+import { alike, button, fill, listen, listIn, mm2, sayIn, tellIn } from "./elements.js";
 import { send } from "./line.js";
 import { unitButtons } from "./problem.js";
 import { onNew, onState, store, subscribe, update } from "./store.js";
@@ -35,6 +35,7 @@ export function modelPanel() {
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
     listIn("model-notes", model.notes);
     tellTiny(state);
+    tellFile(model);
     if (area !== null) $("overhang").textContent = mm2(area);
   });
   subscribe(tellModel);
@@ -53,6 +54,16 @@ function tellTiny({ model }) {
     if (GLTF.test(model.name)) send({ do: "set", key: "process.rotate_deg", value: "[90, 0, 0]" });
     send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) });
   });
+}
+
+/** The plates of a slicer file to choose from, and whether it keeps settings. */
+function tellFile({ plates, has_settings: has, settings_told: told }) {
+  const shown = plates.length > 1 ? plates : [];
+  if ($("plates").dataset.shown !== JSON.stringify(shown)) $("plates").replaceChildren(...shown.map(({ number, name, taken }) =>
+    button(`Plate ${number}${name && ` (${name})`}`, () => send({ do: "plate", plate: number }), { ariaPressed: String(taken), disabled: taken })));
+  $("plates").dataset.shown = JSON.stringify(shown);
+  $("inside").hidden = !has;
+  sayIn("file-settings-told", told);
 }
 
 const scaleBy = (factor) => String(Number((store.state.scale * factor).toPrecision(9)));

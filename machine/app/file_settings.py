@@ -1,0 +1,34 @@
+"""File settings: the material and the process that a slicer file holds beside its models."""
+
+from pathlib import Path
+
+from machine.app.requests import Given
+from profiles.errors import ProfileError
+from profiles.foreign.imported import KINDS, imported
+from profiles.foreign.read import read_config
+from profiles.foreign.slicer_file import is_slicer_file, read_slicer_settings
+
+
+def has_settings(file: Path) -> bool:
+    """Whether a model's file is one of another slicer that keeps print settings, damaged ones included."""
+    if not is_slicer_file(file):
+        return False
+    try:
+        return bool(read_slicer_settings(file).values)
+    except ProfileError:
+        return True
+
+
+def settings_inside(file: Path, name: str) -> tuple[Given, str]:
+    """The nearest shipped material with the settings inside a slicer file, and a note on how many of them are used.
+
+    name: of the file where its user has it. Raises ProfileError for a file that keeps none, or damaged ones.
+    """
+    if not is_slicer_file(file):
+        raise ProfileError(f"{file} is no .3mf that a slicer has saved with its settings inside")
+    config = read_config(file)
+    found = {kind: imported(config, kind, nameless=Path(name).stem) for kind in KINDS}
+    counts = [f"{sum(row.taken for row in profile.rows)} of {len(profile.rows)} of the {kind}" for kind, profile in found.items()]
+    settings = tuple(setting for profile in found.values() for setting in profile.settings)
+    note = f"{name}: uses the settings of {config.program} inside: {', '.join(counts)}; profiles import lists them"
+    return Given(material=found["material"].base, settings=settings), note
