@@ -24,36 +24,35 @@ import numpy as np
 
 from machine.app.output import plain_name
 from machine.app.profile_file import profile_text
-from machine.app.requests import MOST_COPIES, Given, ModelRequest
-from machine.planning.stops import Stop, parse_stops
+from machine.app.project_record import RECORD, VERSION, GivenRecord, NewerError, Record, is_file_name_anywhere, read_record
+from machine.app.requests import Given, ModelRequest
+from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
 from mdp.formats.threemf import DAMAGES
 from mdp.mesh import Mesh
 from mdp.model_file import DEMO
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile
+from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
-from profiles.errors import PlanError, SliceError, reason
+from profiles.errors import PlanError, reason
 from profiles.files import lock_folder, remove_locked, whole_file, write_whole
 from profiles.frozen import Vector
 from profiles.places import KINDS, PARENT, is_file_name, own, shipped
 from profiles.toml_text import read_toml
 
-VERSION = 1
 STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
-RECORD, PLAN = "work.json", "plan.toml"
+PLAN = "plan.toml"
 INSIDE, THUMBNAIL = "Metadata/tiltprint/", "Metadata/thumbnail.png"
 PICTURE_PX = (256, 256)
 MESH_DIGEST = "mesh.sha256"  # of the 3MF's model part, to see whether another program has changed it
 PROGRAM = f"tiltprint {version('tiltprint')}"
 SUFFIX = ".3mf"
 FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: in no other folder, on any disk
-ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-[0-9a-f]{{12}}-")  # to the names of a project's files
-LONGEST_NAME = 255  # bytes of a file's name on any disk
+ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-([0-9a-f]{{12}})-")  # to the names of a project's files
 MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
-BAD_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError, SliceError)
-DAMAGED: tuple[type[Exception], ...] = (*DAMAGES, *BAD_RECORD, OSError)
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGES, OSError)  # of a zip archive
 PREFIX = "tiltprint-project-"  # of temporary folders
 BEGUN_S = 60.0  # a folder as new as this may belong to a program that has not locked it yet
 _unpacked: list[tuple[TemporaryDirectory[str], str, int | None]] = []  # projects that were opened: folder, file, lock
@@ -143,25 +142,26 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
         write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
-    record = {
-        "version": VERSION,
-        "program": PROGRAM,
-        "name": project.name,
-        "model": model,
-        "given": {**asdict(project.given), **profiles},
-        "own_profiles": {kind: _bare_name(Path(getattr(project.given, kind))) for kind in profiles},
-        "rotation": project.rotation,
-        "plan": plan is not None,
-        "parts": project.parts,
-        "locked": project.locked,
-        "pauses": [stop.option.partition(" ")[2] for stop in project.stops if not stop.change],
-        "changes": [stop.option.partition(" ")[2] for stop in project.stops if stop.change],
-        "copies": project.copies,
-        "plate": project.plate,
-        "marks_in_plan": project.marks_in_plan,
-        "figures": project.figures,
-    }
-    write_whole(folder / RECORD, json.dumps(record).encode())
+    given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
+    record = Record(
+        version=VERSION,
+        program=PROGRAM,
+        name=project.name,
+        model=model,
+        given=GivenRecord(**given),
+        own_profiles={kind: _bare_name(Path(getattr(project.given, kind))) for kind in profiles},
+        rotation=[list(row) for row in project.rotation],
+        plan=plan is not None,
+        parts=project.parts,
+        locked=list(project.locked),
+        pauses=[stop.option.partition(" ")[2] for stop in project.stops if not stop.change],
+        changes=[stop.option.partition(" ")[2] for stop in project.stops if stop.change],
+        copies=project.copies,
+        plate=project.plate,
+        marks_in_plan=project.marks_in_plan,
+        figures=project.figures,
+    )
+    write_whole(folder / RECORD, record.model_dump_json().encode())
     for file in folder.glob("model-*"):
         if file.name != model:
             file.unlink()
@@ -203,6 +203,12 @@ def _check_alone(model: Path | None) -> None:
             raise PlanError(f"{model}: refers to the file {file}, and a project holds one model file: save it as .glb first")
 
 
+def _digest(file: Path) -> str:
+    """What tells the content of a file from others, as its name in a project has it."""
+    with file.open("rb") as source:
+        return hashlib.file_digest(source, "sha256").hexdigest()[:12]
+
+
 def _bare_name(file: Path) -> str:
     """The name of a file as it was before it became one of a project."""
     return ADDED.sub("", file.name)
@@ -210,9 +216,7 @@ def _bare_name(file: Path) -> str:
 
 def _copied(file: Path, folder: Path, role: str) -> str:
     """The name in a folder of a copy of a file, which is made where it is not there yet."""
-    with file.open("rb") as source:
-        digest = hashlib.file_digest(source, "sha256").hexdigest()
-    name = f"{role}-{digest[:12]}-{plain_name(_bare_name(file))}"
+    name = f"{role}-{_digest(file)}-{plain_name(_bare_name(file))}"
     if not (folder / name).exists():
         with file.open("rb") as source, whole_file(folder / name) as copy:
             shutil.copyfileobj(source, copy)
@@ -222,76 +226,77 @@ def _copied(file: Path, folder: Path, role: str) -> str:
 def read_folder(folder: Path) -> Project:
     """The project in a folder. Raises PlanError with a sentence where it cannot be read, or not by this version."""
     try:
-        return _read(folder, f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}")
+        return _project_of(folder, read_record(folder))
+    except NewerError:
+        raise PlanError(f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}") from None
+    except PlanError as error:
+        raise PlanError(f"what is kept in {folder} is no work of a workbench, or damaged: {error}") from None
     except OSError as error:
         raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
-    except BAD_RECORD:
-        raise PlanError(f"what is kept in {folder} is no work of a workbench, or damaged") from None
 
 
-def _read(folder: Path, newer: str) -> Project:
-    """The project; newer: the sentence for one of a newer version."""
-    record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-    if not isinstance(record["version"], int) or record["version"] < 1:
-        raise ValueError(f"version {record['version']!r}")
-    if record["version"] > VERSION:
-        raise PlanError(newer)
-    return _project_of(folder, record)
-
-
-def _check_name(name: str) -> None:
-    """Raise ValueError for a model's name that no file can have."""
-    control = any(ord(letter) < 32 for letter in name)
-    if Path(name).name != name or name in ("", "..") or control or len(name.encode()) > LONGEST_NAME:
-        raise ValueError(f"name {name!r}")
+def _project_of(folder: Path, record: Record) -> Project:
+    given, own_names = record.given, {str(kind): Path(name).name for kind, name in record.own_profiles.items()}
+    files = {kind: str(folder / Path(getattr(given, kind)).name) for kind in own_names}
+    x, y, z = record.rotation
+    return Project(
+        name=record.name,
+        model=folder / Path(record.model).name if record.model else None,
+        given=Given(**{**given.model_dump(), **files, "settings": tuple(given.settings)}),
+        rotation=((x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])),
+        plan=folder / PLAN if record.plan else None,
+        parts=record.parts,
+        locked=tuple(record.locked),
+        stops=record.stops,
+        copies=record.copies,
+        marks_in_plan=record.marks_in_plan,
+        plate=record.plate,
+        own_names=own_names,
+        figures=record.figures,
+        written_s=(folder / RECORD).stat().st_mtime,
+    )
 
 
 def _check_inside(folder: Path, project: Project) -> None:
-    """Raise ValueError where a project names files that are not in it."""
-    if project.model is not None and not project.model.is_file():
-        raise ValueError(f"model {project.model.name!r}")
+    """Raise PlanError where the files of an unpacked project are not those that it names, or not as they were saved."""
+    if project.model is None and not project.name.startswith(DEMO):
+        raise PlanError(f"{RECORD}: model is missing")
+    named = [project.model, *(Path(getattr(project.given, kind)) for kind in project.own_names), folder / PLAN]
+    for file in named:
+        if file is not None and not file.is_file():
+            raise PlanError(f"its file {file.name or RECORD} is missing")
+    for file in folder.iterdir():
+        if (digest := ADDED.match(file.name)) is not None and digest[2] != _digest(file):
+            raise PlanError(f"its file {file.name} is not as it was saved")
     for kind in KINDS:
         name = getattr(project.given, kind)
-        if kind not in project.own_names:
-            outside = is_file_name(name)
-        else:
-            outside = is_file_name(str(read_toml(Path(name).read_text(encoding="utf-8")).get(PARENT, shipped(kind)[0])))
-        if outside:
-            raise ValueError(f"{kind} {name!r}")
-    plan = {} if project.plan is None else read_toml(project.plan.read_text(encoding="utf-8"))
-    for table in (table for key in (*ZONE_KINDS, "modifier") for table in plan.get(key, [])):
-        if (mesh := table.get("mesh")) is not None and Path(str(mesh)).name != mesh:
-            raise ValueError(f"mesh {mesh!r}")
+        if kind in project.own_names:
+            name = str(_toml(Path(name)).get(PARENT, shipped(kind)[0]))
+        if is_file_name(name):
+            raise PlanError(f"{kind} is {name!r}: a profile that ships with the program, or a file of the project, is expected")
+    if project.plan is None:
+        raise PlanError(f"{RECORD}: plan is false: a project has one")
+    text = _toml(project.plan)
+    lists = (text[key] for key in (*ZONE_KINDS, "modifier") if isinstance(text.get(key), list))
+    for mesh in (table["mesh"] for tables in lists for table in tables if isinstance(table, dict) and "mesh" in table):
+        if Path(str(mesh)).name != mesh:
+            raise PlanError(f"{PLAN}: mesh is {mesh!r}: a file of the project is expected")
+    try:
+        plan = read_plan(project.plan)
+    except PlanError as error:
+        raise PlanError(str(error).replace(f"{folder}{os.sep}", "")) from None
+    if max(project.parts, 1) != len(plan.parts) + 1:
+        raise PlanError(f"{RECORD}: parts is {project.parts}: {PLAN} has {len(plan.parts) + 1}")
+    if not np.allclose(plan.orientation or STANDING, project.rotation, atol=1e-9):
+        raise PlanError(f"{RECORD}: rotation is {project.rotation}, which is not the orientation of {PLAN}")
 
 
-def _project_of(folder: Path, record: dict[str, Any]) -> Project:
-    given, name = record["given"], str(record["name"])
-    _check_name(name)
-    rows = np.array(record["rotation"], dtype=np.float64)
-    if rows.shape != (3, 3) or not np.allclose(rows @ rows.T, np.eye(3), atol=1e-6) or np.linalg.det(rows) < 0:
-        raise ValueError(f"rotation {record['rotation']!r}")
-    if not 1 <= int(record["copies"]) <= MOST_COPIES:
-        raise ValueError(f"copies {record['copies']!r}")
-    if not all(isinstance(given[kind], str) for kind in KINDS):
-        raise ValueError(f"profiles {given!r}")
-    own_names = {str(kind): Path(name).name for kind, name in record["own_profiles"].items()}
-    files = {kind: str(folder / Path(given[kind]).name) for kind in own_names}
-    return Project(
-        name=name,
-        model=folder / Path(record["model"]).name if record["model"] else None,
-        given=Given(**{**given, **files, "settings": tuple(map(str, given["settings"]))}),
-        rotation=tuple((float(x), float(y), float(z)) for x, y, z in record["rotation"]),
-        plan=folder / PLAN if record["plan"] else None,
-        parts=int(record["parts"]),
-        locked=tuple(map(int, record["locked"])),
-        stops=parse_stops(record["pauses"], record["changes"]),
-        copies=int(record["copies"]),
-        marks_in_plan=bool(record.get("marks_in_plan", True)),
-        plate=None if record.get("plate") is None else int(record["plate"]),
-        own_names=own_names,
-        figures={str(key): float(value) for key, value in record.get("figures", {}).items()},
-        written_s=(folder / RECORD).stat().st_mtime,
-    )
+def _toml(file: Path) -> dict[str, Any]:
+    """The tables of a TOML file. Raises PlanError."""
+    try:
+        return read_toml(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise PlanError(f"its file {file.name} is no TOML: {error}") from None
 
 
 def figures_of(row: FrontRow | None) -> dict[str, float]:
@@ -306,10 +311,8 @@ def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) 
     Raises OSError, and PlanError for what could not be opened again.
     """
     _check_alone(project.model)
-    try:
-        _check_name(project.name)
-    except ValueError:
-        raise PlanError(f"{project.name!r}: a project cannot keep a model of this name: rename its file") from None
+    if not is_file_name_anywhere(project.name):
+        raise PlanError(f"{project.name!r}: a project cannot keep a model of this name: rename its file")
     content = io.BytesIO()
     with TemporaryDirectory(prefix="tiltprint-save-") as name:
         folder = Path(name)
@@ -329,7 +332,7 @@ def is_project(path: Path) -> bool:
         return False
     try:
         with zipfile.ZipFile(path) as archive:
-            return INSIDE + RECORD in archive.namelist()
+            return any(name.startswith(INSIDE) for name in archive.namelist())
     except DAMAGED:
         return False
 
@@ -362,25 +365,38 @@ def unpack(path: Path, folder: Path) -> Project:
     """A project file, unpacked into an empty folder. Raises PlanError for one that is damaged or was changed."""
     try:
         with zipfile.ZipFile(path) as archive:
-            entries = [entry for entry in archive.infolist() if entry.filename.startswith(INSIDE)]
-            read = [*entries, archive.getinfo(MODEL_PART)]
-            if len(entries) > MOST_FILES or sum(entry.file_size for entry in read) > LARGEST_BYTES:
-                raise PlanError(f"{path}: unpacks to more than {MOST_FILES} files or {LARGEST_BYTES} bytes")
-            for entry in entries:
-                if not FILE_NAME.fullmatch(entry.filename.removeprefix(INSIDE)):
-                    raise ValueError(f"file name {entry.filename!r}")
-                with archive.open(entry) as source, (folder / Path(entry.filename).name).open("xb") as copy:
-                    shutil.copyfileobj(source, copy)
-            changed = hashlib.sha256(archive.read(MODEL_PART)).hexdigest() != archive.read(INSIDE + MESH_DIGEST).decode()
-        project = _read(folder, f"{path}: this project was saved by a newer tiltprint, which can open it")
+            changed = _extract(archive, folder)
+        project = _project_of(folder, read_record(folder))
         _check_inside(folder, project)
-    except PlanError:
-        raise
+    except NewerError:
+        raise PlanError(f"{path}: this project was saved by a newer tiltprint, which can open it") from None
+    except PlanError as error:
+        raise PlanError(f"{path}: this project is damaged: {error}") from None
     except DAMAGED as error:
-        raise PlanError(f"{path}: this project is damaged ({error})".replace(str(folder), str(path))) from None
+        raise PlanError(f"{path}: this project is damaged: it is no whole zip archive ({type(error).__name__})") from None
     if changed:
         raise PlanError(
             f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
             " from there as STL, and decompose that"
         )
     return project
+
+
+def _extract(archive: zipfile.ZipFile, folder: Path) -> bool:
+    """Unpack a project's files; whether its model for other slicers has been changed. Raises PlanError."""
+    entries = [entry for entry in archive.infolist() if entry.filename.startswith(INSIDE)]
+    names = {entry.filename for entry in archive.infolist()}
+    for name in (MODEL_PART, INSIDE + MESH_DIGEST, INSIDE + RECORD):
+        if name not in names:
+            raise PlanError(f"{name} is missing")
+    read = [*entries, archive.getinfo(MODEL_PART)]
+    if len(entries) > MOST_FILES or sum(entry.file_size for entry in read) > LARGEST_BYTES:
+        raise PlanError(f"it unpacks to more than {MOST_FILES} files or {LARGEST_BYTES} bytes")
+    for entry in entries:
+        name = entry.filename.removeprefix(INSIDE)
+        if not FILE_NAME.fullmatch(name) or (folder / name).exists():
+            raise PlanError(f"{entry.filename!r} is no name of a file of a project, or there twice")
+        with archive.open(entry) as source, (folder / name).open("xb") as copy:
+            shutil.copyfileobj(source, copy)
+    digest = hashlib.sha256(archive.read(MODEL_PART)).hexdigest()
+    return digest.encode() != archive.read(INSIDE + MESH_DIGEST)

@@ -232,17 +232,32 @@ def model_request(
     if project is not None and file.settings_of_file:
         raise PlanError(f"--settings-of-file: {model} is a project of tiltprint, whose settings hold without it")
     if project is not None:
-        given = given.over(project.given)
-    elif file.settings_of_file:
-        given = given.over(_given_by(model))
+        given, profile = _over_project(given, project.given, search, model)
+    else:
+        given = given.over(_given_by(model)) if file.settings_of_file else given
+        profile = given.profile(search)
     request = replace(
-        ModelRequest(model, given.profile(search), given.sections, search.ranker, search.orient, profile_names=given.names),
+        ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names),
         settings=given.given(search).settings,
         copies=1 if copies is None else copies,
         plate=file.plate,
         **further,
     )
     return request if project is None else project.applied(request, Path(model), copies)
+
+
+def _over_project(
+    given: ProfileOptions, of_project: Given, search: SearchOptions, model: str
+) -> "tuple[ProfileOptions, Profile]":
+    """The options over what a project was made with, and their profile. Raises ProfileError, which names whose fault it is."""
+    from profiles.errors import ProfileError
+
+    given.profile(search)
+    both = given.over(of_project)
+    try:
+        return both, both.profile(search)
+    except ProfileError as error:
+        raise ProfileError(f"{model}: {error}") from None
 
 
 def _given_by(model: str) -> Given:
@@ -271,6 +286,8 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
         several = ", ".join(dict.fromkeys((first, *others)))
         raise PlanError(f"--settings-of-file goes with one model, and several are given: {several}")
     for name in models if len(models) > 1 or others else ():
+        if len(models) == 1 and is_project(Path(first)):
+            raise PlanError(f"{name}: {first} is a project, which is a plate of its own: --copies N prints more")
         if is_project(Path(named_models([name])[0])):
             raise PlanError(f"{name} is a project, which is a plate of its own: no model goes beside it; --copies N prints more")
     return model_request(first, program, given, program.copies, cuts=cuts, stops=stops, beside=tuple(others), **further)

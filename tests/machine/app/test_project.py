@@ -12,7 +12,8 @@ import trimesh
 from manifold3d import Manifold
 
 from machine.app.cli import main
-from machine.app.project import INSIDE, RECORD, STANDING, Project, close_projects, is_project, open_project, project_bytes
+from machine.app.project import INSIDE, STANDING, Project, close_projects, is_project, open_project, project_bytes
+from machine.app.project_record import RECORD
 from machine.app.requests import Given
 from mdp.cut import mesh_of
 from mdp.plans.plan_file import PlanFile
@@ -157,7 +158,9 @@ def changed(path: Path, name: str, content: bytes | None) -> None:
     [
         (MODEL_PART, b"<model/>", "another program has changed the model in this project"),
         (MODEL_PART, None, "this project is damaged"),
-        (INSIDE + RECORD, b'{"version": 1, "na', "this project is damaged"),
+        (INSIDE + RECORD, b'{"version": 1, "na', "this project is damaged: work.json is not JSON"),
+        (INSIDE + RECORD, None, "this project is damaged: Metadata/tiltprint/work.json is missing"),
+        (INSIDE + "plan.toml", None, "this project is damaged: its file plan.toml is missing"),
         (INSIDE + RECORD, b'{"version": 99}', "was saved by a newer tiltprint, which can open it"),
         (INSIDE + "..", b"x", "this project is damaged"),
         (INSIDE + 300 * "a", b"x", "this project is damaged"),
@@ -219,24 +222,74 @@ def test_a_name_with_letters_of_all_kinds_is_kept() -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
+    ("key", "value", "sentence"),
     [
-        ("rotation", [[1, 0, 0], [0, 1, 0]]),
-        ("rotation", [[2, 0, 0], [0, 1, 0], [0, 0, 1]]),
-        ("copies", -4),
-        ("parts", float("inf")),
-        ("given", {"machine": "/etc/passwd", "material": "pla", "process": "standard", "settings": []}),
-        ("given", {"machine": 3, "material": "pla", "process": "standard", "settings": []}),
+        (
+            "rotation",
+            [[1, 0, 0], [0, 1, 0]],
+            "rotation is [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]: it must be three rows of a rotation",
+        ),
+        ("rotation", [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "it must be three rows of a rotation"),
+        ("rotation", [[-1, 0, 0], [0, 1, 0], [0, 0, 1]], "it must be three rows of a rotation"),
+        ("rotation", [[1, 0, 0], [0, 0, -1], [0, 1, 0]], "which is not the orientation of plan.toml"),
+        ("copies", -4, "work.json: copies is -4: it must be a whole number from 1 to 1000"),
+        ("copies", True, "work.json: copies is true: it must be a whole number from 1 to 1000"),
+        ("parts", float("inf"), "work.json is not JSON"),
+        ("parts", -3.5, "parts is -3.5: it must be a whole number from 0 to"),
+        ("parts", 2, "work.json: parts is 2: plan.toml has 1"),
+        ("locked", [1], "locked is [1]: it must be places of the 0 planes, from 0"),
+        ("pauses", ["7:3"], "pauses and changes name part 7: there are 1"),
+        ("changes", ["a"], "pauses and changes: a: PART:LAYER or PART:HEIGHTmm is expected"),
+        ("model", None, "model is null: it must be a text"),
+        ("model", "", "work.json: model is missing"),
+        ("plan", False, "work.json: plan is false: a project has one"),
+        ("marks_in_plan", 3, "marks_in_plan is 3: it must be true or false"),
+        (
+            "given",
+            {"machine": "/etc/passwd", "material": "pla", "process": "standard", "settings": []},
+            "machine is '/etc/passwd'",
+        ),
+        (
+            "given",
+            {"machine": 3, "material": "pla", "process": "standard", "settings": []},
+            "given.machine is 3: it must be a text",
+        ),
     ],
 )
 @pytest.mark.usefixtures("folder")
-def test_a_record_that_no_project_has_is_damage(key: str, value: object, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_record_that_no_project_has_is_damage(
+    key: str, value: object, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     with zipfile.ZipFile("tee.3mf") as archive:
         record = json.loads(archive.read(INSIDE + RECORD))
     changed(Path("tee.3mf"), INSIDE + RECORD, json.dumps(record | {key: value}).encode())
     assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
-    assert "this project is damaged" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith("tiltprint: tee.3mf: this project is damaged: ")
+    assert sentence in said
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_project_whose_model_was_replaced_is_damage(capsys: pytest.CaptureFixture[str]) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    with zipfile.ZipFile("tee.3mf") as archive:
+        (model,) = (name for name in archive.namelist() if name.startswith(INSIDE + "model-"))
+    changed(Path("tee.3mf"), model, Path("insert.stl").read_bytes())
+    assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
+    assert f"this project is damaged: its file {model.removeprefix(INSIDE)} is not as it was saved" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_machine_that_is_not_known_is_named_with_the_project_that_asks_for_it(capsys: pytest.CaptureFixture[str]) -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    given = {"machine": "nosuch", "material": "pla", "process": "standard", "settings": []}
+    with zipfile.ZipFile("tee.3mf") as archive:
+        record = json.loads(archive.read(INSIDE + RECORD))
+    changed(Path("tee.3mf"), INSIDE + RECORD, json.dumps(record | {"given": given}).encode())
+    capsys.readouterr()
+    assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
+    assert capsys.readouterr().err.startswith("tiltprint: tee.3mf: 'nosuch' is no machine profile")
 
 
 @pytest.mark.usefixtures("folder")

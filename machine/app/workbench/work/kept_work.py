@@ -12,7 +12,8 @@ from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
 
-from machine.app.project import PLAN, RECORD, Project, figures_of, write_folder
+from machine.app.project import PLAN, Project, figures_of, write_folder
+from machine.app.project_record import RECORD
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from mdp.model_file import DEMO
 from profiles.files import lock_folder

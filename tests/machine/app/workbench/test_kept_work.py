@@ -11,7 +11,8 @@ from threading import Event
 
 import pytest
 
-from machine.app.project import RECORD, read_folder
+from machine.app.project import read_folder
+from machine.app.project_record import RECORD
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.session import keeping
