@@ -336,7 +336,7 @@ def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profil
         yield f"{'G2' if clockwise > 0 else 'G3'}{words}\n"
         done = last
     if done < len(flat) - 1:
-        yield _straight(points_mm[done:], filament_mm[done:], speed_mm_s, pen)
+        yield _straight(points_mm[done:], filament_mm[done:], speed_mm_s, profile, pen)
 
 
 def _straight(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profile: Profile, pen: Pen) -> str:

@@ -83,7 +83,9 @@ def test_a_stroke_that_rounding_shortens_is_slowed_only_where_its_filament_is_to
 
 def test_texts_stand_before_their_paths_and_behind_the_last() -> None:
     points: Floats = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]])
-    two = Paths(points, np.array([0, 0.5, 0, 0.5]), np.array([0, 2, 4]), np.array([0, 0], np.int8), np.full(2, 20.0), np.full(2, 1e9))
+    two = Paths(
+        points, np.array([0, 0.5, 0, 0.5]), np.array([0, 2, 4]), np.array([0, 0], np.int8), np.full(2, 20.0), np.full(2, 1e9)
+    )
     text = path_text(two, texts(";first\n", ";second\n", ";end\n"), words(), known(), np.zeros(1))
     assert text.splitlines() == [";first", "G1 X1.000 E0.50000 F1200", ";second", "G1 X2.000 E0.50000", ";end"]
 
