@@ -23,13 +23,15 @@ STEPS = 20  # a short stroke that must go slower does so by twentieths, or the s
 
 class Paths(NamedTuple):
     """Moves to write. points_mm: (n, 3) as the file calls them; filament_mm: (n,) pushed on the way to each; starts: (m + 1,)
-    where the points of each path begin; does: (m,) PUSHING, TRAVELLING or STANDING; speed: (m,) units/s."""
+    where the points of each path begin; does: (m,) PUSHING, TRAVELLING or STANDING; speed: (m,) units/s; most_mm_s: (m,) of
+    filament as planned, RICHER times that is the most that the lines ask for."""
 
     points_mm: Floats
     filament_mm: Floats
     starts: Indices
     does: NDArray[np.int8]
     speed: Floats
+    most_mm_s: Floats
 
 
 class Texts(NamedTuple):
@@ -82,7 +84,9 @@ def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_
             at += 1
             continue
         pushing = paths.does[path] == PUSHING
-        more, slower = _stretch(paths.points_mm, paths.filament_mm, first, end) if pushing else (0.0, 1.0)
+        more, densest = _stretch(paths.points_mm, paths.filament_mm, first, end) if pushing else (0.0, 0.0)
+        too_fast = paths.speed[path] * densest / (paths.most_mm_s[path] * RICHER) if pushing else 0.0
+        slower = ceil(too_fast * STEPS) / STEPS if too_fast > 1.0 else 1.0
         written, base, pushed = False, filament_mm[0], 0.0
         for k in range(first + 1, end):
             if pushing:
@@ -108,19 +112,20 @@ def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_
 
 @helper
 def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tuple[float, float]:
-    """Factor that scales the filament of each step, in proportion to its written length, so that the sum stays; and the factor by
-    which the path is slowed. A factor of 0: nothing is redistributed.
+    """Factor that scales the filament of each step, in proportion to its written length, so that the sum stays; and the most
+    filament for a millimetre as written. A factor of 0: nothing is redistributed.
 
     Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed.
     """
-    whole = shared = 0.0
+    whole = shared = densest = 0.0
     for k in range(first + 1, end):
         whole += filament_mm[k]
         shared += _step_mm(points_mm, filament_mm, k, 1.0)
+        exact_mm = _exact_mm(points_mm, k)
+        densest = max(densest, abs(filament_mm[k]) / exact_mm) if exact_mm > 1e-9 else densest
     if shared == 0.0:
-        return 0.0, 1.0
-    more = whole / shared
-    return more, ceil(more * STEPS) / STEPS if more > RICHER else 1.0
+        return 0.0, 0.0
+    return whole / shared, densest * whole / shared
 
 
 @no_nrt
@@ -128,11 +133,19 @@ def _step_mm(points_mm: Floats, filament_mm: Floats, k: int, more: float) -> flo
     """Filament of the step to point k as it is written; more: factor on the shared filament; 0: each step keeps its own."""
     if more == 0.0:
         return float(filament_mm[k])
-    exact = written = 0.0
+    written = 0.0
     for axis in range(3):
-        exact += (points_mm[k, axis] - points_mm[k - 1, axis]) ** 2
         written += ((np.rint(points_mm[k, axis] * 1000.0) - np.rint(points_mm[k - 1, axis] * 1000.0)) / 1000.0) ** 2
-    return float(filament_mm[k] * np.sqrt(written) / max(np.sqrt(exact), 1e-12) * more)
+    return float(filament_mm[k] * np.sqrt(written) / max(_exact_mm(points_mm, k), 1e-12) * more)
+
+
+@no_nrt
+def _exact_mm(points_mm: Floats, k: int) -> float:
+    """Length of the step to point k before it is rounded."""
+    squared = 0.0
+    for axis in range(3):
+        squared += (points_mm[k, axis] - points_mm[k - 1, axis]) ** 2
+    return float(np.sqrt(squared))
 
 
 @no_nrt

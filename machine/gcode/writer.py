@@ -15,6 +15,7 @@ from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, Texts,
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, turn
 from machine.gcode.settings import totals_comment
 from machine.gcode.words import PAUSE_REMARK
+from machine.planning.limits import stroke_filament_mm_s, wipe_filament_mm_s
 from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, straight_moves
 from machine.planning.timing import move_times
 from mdp.mesh import Floats, Indices
@@ -259,12 +260,13 @@ def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int]
     filament_mm = program.filament_mm[begin : program.starts[end]]
     starts, what = program.starts[first : end + 1] - begin, program.what[first:end]
     does = np.select([what < TRAVEL, what == TRAVEL, what == WIPE], [PUSHING, TRAVELLING, PUSHING], STANDING).astype(np.int8)
+    most = np.where(what == WIPE, wipe_filament_mm_s(profile.machine), stroke_filament_mm_s(profile))
     speed, curved = program.speed[first:end], _curved(points, starts, what, profile.machine)
     texts, done = list[str](), 0
 
     def write(until: int) -> str:
         pieces = [text.encode() for text in texts]
-        paths = Paths(points, filament_mm, starts[done : until + 1], does[done:until], speed[done:until])
+        paths = Paths(points, filament_mm, starts[done : until + 1], does[done:until], speed[done:until], most[done:until])
         return pen.paths(paths, Texts(np.frombuffer(b"".join(pieces), np.uint8), np.cumsum([0, *map(len, pieces)])))
 
     after = ""
@@ -282,7 +284,7 @@ def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int]
         if k in curved:
             yield write(k)
             a, b = starts[k], starts[k + 1]
-            yield from _with_arcs(points[a:b], filament_mm[a + 1 : b], float(speed[k]), profile.machine.arc_tolerance_mm, pen)
+            yield from _with_arcs(points[a:b], filament_mm[a + 1 : b], float(speed[k]), profile, pen)
             texts, done = [], k + 1
     texts.append(after)
     yield write(end - first)
@@ -319,14 +321,14 @@ def _curved(points_mm: Floats, starts: Indices, what: NDArray[np.int8], machine:
     return {k for k in many if np.ptp(points_mm[starts[k] : starts[k + 1], 2]) < 1e-9}
 
 
-def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, tolerance_mm: float, pen: Pen) -> Iterator[str]:
+def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profile: Profile, pen: Pen) -> Iterator[str]:
     """A stroke (n, 3) in one plane with arcs where they keep to it; filament_mm: (n - 1,)."""
     flat = np.rint(points_mm[:, :2] * 1000.0) / 1000.0
-    runs, arcs = fit_arcs(flat, filament_mm, tolerance_mm - ROUNDING_MM)
+    runs, arcs = fit_arcs(flat, filament_mm, profile.machine.arc_tolerance_mm - ROUNDING_MM)
     done = 0
     for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
         if first > done:
-            yield _straight(points_mm[done : first + 1], filament_mm[done:first], speed_mm_s, pen)
+            yield _straight(points_mm[done : first + 1], filament_mm[done:first], speed_mm_s, profile, pen)
         pushed = pen.filament(float(filament_mm[first:last].sum()))
         pen.known[:Z] = np.rint(points_mm[last, :2] * 1000.0).astype(np.int64)
         end, centre = pen.place_mm, (x - flat[first, 0], y - flat[first, 1])
@@ -334,13 +336,14 @@ def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, tolera
         yield f"{'G2' if clockwise > 0 else 'G3'}{words}\n"
         done = last
     if done < len(flat) - 1:
-        yield _straight(points_mm[done:], filament_mm[done:], speed_mm_s, pen)
+        yield _straight(points_mm[done:], filament_mm[done:], speed_mm_s, profile, pen)
 
 
-def _straight(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> str:
+def _straight(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profile: Profile, pen: Pen) -> str:
     """A single path of straight moves."""
     starts, does = np.array([0, len(points_mm)]), np.array([PUSHING], dtype=np.int8)
-    paths = Paths(np.ascontiguousarray(points_mm), np.append(0.0, filament_mm), starts, does, np.array([speed_mm_s]))
+    speed, most = np.array([speed_mm_s]), np.array([stroke_filament_mm_s(profile)])
+    paths = Paths(np.ascontiguousarray(points_mm), np.append(0.0, filament_mm), starts, does, speed, most)
     return pen.paths(paths, Texts(as_bytes(""), np.zeros(3, dtype=np.int64)))
 
 

@@ -59,12 +59,11 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
     Filament by volume (a stroke's flow holds the material's); the speed lowered to what axes, extruder and hot end can do.
     """
     profile, counts = tip.profile, np.diff(layer.starts)
-    machine, material = profile.machine, profile.material
+    material = profile.material
     filament_mm2 = pi * material.diameter_mm**2 / 4.0
     area_mm2 = bead_area_mm2(layer.width_mm, layer.height_mm) * layer.flow
-    most_mm3_s = min(material.volumetric_limit_mm3_s, stroke_filament_mm_s(machine) * filament_mm2)
     with np.errstate(divide="ignore"):
-        fastest = most_mm3_s / np.maximum(area_mm2, 0.0)
+        fastest = stroke_filament_mm_s(profile) * filament_mm2 / np.maximum(area_mm2, 0.0)
     accelerations = stroke_accelerations(profile, on_plate)
     by_kind = np.array([inf if accelerations is None else accelerations[kind] for kind in KINDS])
     speeds = path_speeds(points, layer.starts, np.minimum(layer.speed_mm_s, fastest), tip.speeds.axes_mm_s)
@@ -130,7 +129,7 @@ def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> fl
         return 0.0
     seen, taken_mm = layer.is_of(*SEEN), 0.0
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
-    fastest = min(profile.material.volumetric_limit_mm3_s / filament_mm2, stroke_filament_mm_s(profile.machine))
+    fastest = stroke_filament_mm_s(profile)
     needed_mm = bead_area_mm2(layer.width_mm, layer.height_mm) * profile.material.flow / filament_mm2  # for a millimetre
     ends = np.cumsum(strokes.rows[:, POINTS].astype(np.int64))
     for k in np.flatnonzero(~seen | seen.all()).tolist():

@@ -1,6 +1,6 @@
 """Limits: what every axis allows; a program outside is refused before any text is written, a speed is lowered to fit."""
 
-from math import inf
+from math import inf, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -84,9 +84,15 @@ def speeds_of(profile: Profile) -> Speeds:
     )
 
 
-def stroke_filament_mm_s(machine: Machine) -> float:
-    """The greatest speed of the filament that a stroke may plan with: the text may round its ends to a little more."""
+def wipe_filament_mm_s(machine: Machine) -> float:
+    """The greatest speed of the filament that a path may plan with: the text may round its ends to a little more."""
     return machine.extruder_speed_mm_s / RICHER
+
+
+def stroke_filament_mm_s(profile: Profile) -> float:
+    """The same of a stroke, whose plastic the hot end has to melt."""
+    filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
+    return min(profile.material.volumetric_limit_mm3_s / filament_mm2, wipe_filament_mm_s(profile.machine))
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning.limits import Speeds, path_speed, path_speeds, speeds_of, stroke_filament_mm_s
+from machine.planning.limits import Speeds, path_speed, path_speeds, speeds_of, wipe_filament_mm_s
 from machine.planning.moves import MARK, REORIENT, RETRACT, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
 from mdp.clearance import Standing, highest_in_cells
 from mdp.decomposition import Part
@@ -164,7 +164,7 @@ def retract(tip: Tip) -> None:
     if len(way) < 2 or float(np.linalg.norm(way[0] - tip.at_mm)) > STANDING_MM:
         tip.move(RETRACT, tip.at_mm[None], -amount, speeds.filament_mm_s)
         return
-    filament_mm_s = min(speeds.filament_mm_s, stroke_filament_mm_s(tip.profile.machine))
+    filament_mm_s = min(speeds.filament_mm_s, wipe_filament_mm_s(tip.profile.machine))
     speed = min(speeds.travel_mm_s, float(length.sum()) * filament_mm_s / amount)
     (speed,) = path_speeds(way, np.array([0, len(way)]), np.array([speed]), speeds.axes_mm_s)
     tip.move(WIPE, way, np.append(0.0, -length * (amount / length.sum())), speed)

@@ -22,6 +22,7 @@ BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_spe
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
+LEAST_STEP_GAIN_S = 0.1  # nor is one between a slower and a faster one, which saves less: a step on the way from one to the other
 FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
 
 
@@ -51,9 +52,10 @@ def speeds_mm_s(
 
 @kernel
 def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
-    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or less.
+    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or LEAST_STEP_GAIN_S or less.
 
-    A stretch of one speed that is faster than those before and after it takes the faster one of theirs; none gets faster.
+    A stretch of one speed that is faster than those before and after it takes the faster one of theirs, a step between a slower
+    and a faster one the slower one; none gets faster.
     """
     steadied, changes = speeds.copy(), True
     while changes:
@@ -63,9 +65,11 @@ def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
             while end < len(steadied) and steadied[end] == steadied[begin]:
                 length_mm += lengths_mm[end]
                 end += 1
-            beside = max(steadied[begin - 1] if begin > 0 else 0.0, steadied[end] if end < len(steadied) else 0.0)
-            if 0.0 < beside < steadied[begin] and length_mm * (1.0 / beside - 1.0 / steadied[begin]) < LEAST_GAIN_S:
-                steadied[begin:end] = beside
+            before, after = steadied[begin - 1] if begin > 0 else 0.0, steadied[end] if end < len(steadied) else 0.0
+            step = before > 0.0 and after > 0.0 and max(before, after) > steadied[begin]
+            slower, least_s = (min(before, after), LEAST_STEP_GAIN_S) if step else (max(before, after), LEAST_GAIN_S)
+            if 0.0 < slower < steadied[begin] and length_mm * (1.0 / slower - 1.0 / steadied[begin]) < least_s:
+                steadied[begin:end] = slower
                 changes = True
             begin = end
     return steadied

@@ -26,9 +26,10 @@ def texts(*lines: str) -> Texts:
     return Texts(as_bytes("".join(lines)), np.cumsum([0, *map(len, lines)]))
 
 
-def path(rows: list[Point], does: int, speed: float = 20.0) -> Paths:
+def path(rows: list[Point], does: int, speed: float = 20.0, most_mm_s: float = 1e9) -> Paths:
     table = np.array(rows)
-    return Paths(table[:, :3].copy(), table[:, 3].copy(), np.array([0, len(rows)]), np.array([does], np.int8), np.array([speed]))
+    starts, kinds = np.array([0, len(rows)]), np.array([does], np.int8)
+    return Paths(table[:, :3].copy(), table[:, 3].copy(), starts, kinds, np.array([speed]), np.array([most_mm_s]))
 
 
 def by_python(rows: list[Point]) -> list[str]:
@@ -72,9 +73,19 @@ def test_a_retraction_is_a_line_of_filament_alone() -> None:
     )
 
 
+@pytest.mark.parametrize(("most_mm_s", "feed"), [(0.7, 1200), (0.6, 1143)])
+def test_a_stroke_that_rounding_shortens_is_slowed_only_where_its_filament_is_too_fast(most_mm_s: float, feed: int) -> None:
+    """0.0124 mm with 0.03 mm of filament a mm are written as 0.012 mm: 20 mm/s ask for 0.62 mm/s of filament, not 0.6."""
+    rows = [(0.0, 0.0, 0.0, 0.0), (0.0124, 0.0, 0.0, 0.03 * 0.0124)]
+    (line,) = path_text(path(rows, PUSHING, 20.0, most_mm_s), texts(*NO_TEXT), words(), known(), np.zeros(1)).splitlines()
+    assert line.split(" F")[1] == str(feed)
+
+
 def test_texts_stand_before_their_paths_and_behind_the_last() -> None:
     points: Floats = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]])
-    two = Paths(points, np.array([0, 0.5, 0, 0.5]), np.array([0, 2, 4]), np.array([0, 0], np.int8), np.array([20.0, 20.0]))
+    two = Paths(
+        points, np.array([0, 0.5, 0, 0.5]), np.array([0, 2, 4]), np.array([0, 0], np.int8), np.full(2, 20.0), np.full(2, 1e9)
+    )
     text = path_text(two, texts(";first\n", ";second\n", ";end\n"), words(), known(), np.zeros(1))
     assert text.splitlines() == [";first", "G1 X1.000 E0.50000 F1200", ";second", "G1 X2.000 E0.50000", ";end"]
 
@@ -82,7 +93,7 @@ def test_texts_stand_before_their_paths_and_behind_the_last() -> None:
 def test_a_path_of_which_nothing_is_written_leaves_the_speed_that_the_firmware_knows() -> None:
     points: Floats = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]])
     speed = np.array([20.0, 50.0, 20.0])
-    three = Paths(points, np.zeros(6), np.array([0, 2, 4, 6]), np.array([1, 1, 1], np.int8), speed)
+    three = Paths(points, np.zeros(6), np.array([0, 2, 4, 6]), np.array([1, 1, 1], np.int8), speed, np.full(3, 1e9))
     lines = path_text(three, texts("", "", "", ""), words(), known(), np.zeros(1)).splitlines()
     assert lines == ["G0 X1.000 F1200", "G0 X2.000"]
 
