@@ -27,7 +27,6 @@ from machine.app.profile_file import profile_text
 from machine.app.requests import MOST_COPIES, Given, ModelRequest
 from machine.planning.stops import Stop, parse_stops
 from mdp.decomposition import FrontRow
-from mdp.formats.threemf import DAMAGES
 from mdp.mesh import Mesh
 from mdp.model_file import DEMO
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile
@@ -35,7 +34,7 @@ from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
 from profiles.errors import PlanError, SliceError, reason
-from profiles.files import lock_folder, remove_locked, whole_file, write_whole
+from profiles.files import DAMAGED_ZIP, lock_folder, remove_locked, whole_file, write_whole
 from profiles.frozen import Vector
 from profiles.places import KINDS, PARENT, is_file_name, own, shipped
 from profiles.toml_text import read_toml
@@ -53,7 +52,7 @@ ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-[0-9a-f]{{12}}-")  # t
 LONGEST_NAME = 255  # bytes of a file's name on any disk
 MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
 BAD_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError, SliceError)
-DAMAGED: tuple[type[Exception], ...] = (*DAMAGES, *BAD_RECORD, OSError)
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, *BAD_RECORD, OSError)
 PREFIX = "tiltprint-project-"  # of temporary folders
 BEGUN_S = 60.0  # a folder as new as this may belong to a program that has not locked it yet
 _unpacked: list[tuple[TemporaryDirectory[str], str, int | None]] = []  # projects that were opened: folder, file, lock

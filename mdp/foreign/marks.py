@@ -27,7 +27,7 @@ from mdp.formats.surface import concatenate
 from mdp.head import corners
 from mdp.mesh import Floats, Mesh
 from mdp.zone import AnyZone, MeshVolume, Modifier, Triangles, Volume, Zone, Zones
-from profiles.errors import MeshError
+from profiles.errors import MeshError, ProfileError
 
 if TYPE_CHECKING:
     from profiles.foreign.slicer_file import SlicerSettings
@@ -56,11 +56,16 @@ class _Marks:
         self._notes: list[str] = []
 
     @cached_property
-    def _settings(self) -> "SlicerSettings":
-        """The settings of the whole print, read once; most models have none."""
+    def _settings(self) -> "SlicerSettings | None":
+        """The settings of the whole print, read once; most models have none. None, with a note: they are damaged."""
         from profiles.foreign.slicer_file import read_slicer_settings
 
-        return read_slicer_settings(self._path)
+        try:
+            return read_slicer_settings(self._path)
+        except ProfileError as error:
+            said = str(error).removeprefix(f"profile {self._path}: ")
+            self._notes.append(f"{said}: those of its objects, modifiers and height ranges are left out")
+            return None
 
     def zones(self) -> tuple[Zones, list[str]]:
         """All marks and a sentence for each."""
@@ -95,6 +100,8 @@ class _Marks:
 
     def _process(self, what: str, settings: Mapping[str, str]) -> dict[str, Any]:
         """The keys of a process that settings become, with a note on them."""
+        if self._settings is None:
+            return {}
         process, left = self._settings.of_place(settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
         rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""

@@ -1,15 +1,14 @@
 """Slicer file: the settings inside a .3mf saved by PrusaSlicer, Bambu Studio, OrcaSlicer or Cura."""
 
 import json
-import lzma
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile, is_zipfile
+from zipfile import ZipFile
 
-from profiles.errors import ProfileError, reason
+from profiles.errors import ProfileError, first_line, reason
+from profiles.files import DAMAGED_ZIP, is_zip
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
 from profiles.foreign.imported import settings_of_place
@@ -40,7 +39,7 @@ class SlicerSettings:
 
 def is_slicer_file(file: Path) -> bool:
     """Whether a file may be one, by its name and kind."""
-    return file.suffix.lower() == ".3mf" and is_zipfile(file)
+    return file.suffix.lower() == ".3mf" and is_zip(file)
 
 
 def read_slicer_settings(file: Path) -> SlicerSettings:
@@ -62,8 +61,8 @@ def read_slicer_settings(file: Path) -> SlicerSettings:
                 return SlicerSettings({}, prusaslicer.of_gcode)
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
-    except (BadZipFile, zlib.error, lzma.LZMAError, EOFError, ValueError, NotImplementedError, RuntimeError) as error:
-        raise ProfileError(f"profile {file}: its settings are damaged ({str(error).splitlines()[0]})") from None
+    except (*DAMAGED_ZIP, ProfileError) as error:
+        raise ProfileError(f"profile {file}: its settings are damaged ({first_line(error)})") from None
     kept = any(name.startswith(OF_CURA) for name in entries)
     return SlicerSettings(cura.read_values(file)[0] if kept else {}, cura.of_values)
 

@@ -293,6 +293,17 @@ def test_a_damaged_project_is_refused_with_a_sentence(tmp_path: Path, part: str,
     assert words in files.refusal(path)
 
 
+@pytest.mark.parametrize("text", ["", "[", "[" * 100_000, "[1]"])
+def test_damaged_settings_leave_a_sound_mesh_readable_with_a_note(tmp_path: Path, text: str) -> None:
+    objects = [Object([Made(BLOCK), Made(BOX, "modifier", {"wall_loops": "4"})], [AT_ORIGIN], {"wall_loops": "3"})]
+    model = read_model(written(tmp_path / "a.3mf", "bambu", objects, further={"Metadata/project_settings.config": text}))
+    check(model.mesh, BLOCK)
+    assert model.zones.modifiers == ()
+    (note,) = model.notes
+    assert note.startswith("its settings are damaged (")
+    assert note.endswith("): those of its objects, modifiers and height ranges are left out")
+
+
 def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "support")], [AT_ORIGIN])])
     change(path, "3D/3dmodel.model", "</triangles>", '<triangle v1="0" v2="1" v3="2"/></triangles>')
