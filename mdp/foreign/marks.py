@@ -28,6 +28,7 @@ from mdp.head import corners
 from mdp.mesh import Floats, Mesh
 from mdp.zone import AnyZone, MeshVolume, Modifier, Triangles, Volume, Zone, Zones
 from profiles.errors import MeshError, ProfileError
+from profiles.frozen import Vector
 
 if TYPE_CHECKING:
     from profiles.foreign.slicer_file import SlicerSettings
@@ -36,6 +37,7 @@ MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
 SAME = 1e-6  # cosine of a right angle, and share of a box's size by which its corners may lie off
 MOST_TOLD = 8  # settings in a sentence
+THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
 
@@ -89,14 +91,19 @@ class _Marks:
 
     def _of_object(self, own: BuildObject) -> Iterator[Modifier]:
         """The settings of an object and those between two heights of it."""
-        low, high = _bounds(own) + np.array([[-BESIDE_MM], [BESIDE_MM]])
+        lowest, highest = _bounds(own)
+        low, high = lowest - BESIDE_MM, highest + BESIDE_MM
         if own.settings and (process := self._process("the object", own.settings)):
             yield Modifier(self._box(low, high), process)
+        base = max(lowest[2], 0.0) if self._on_plate else lowest[2]
+        tall_mm = highest[2] - base
         for least, most, settings in own.heights:
-            process = self._process(f"the height range {least:g} to {most:g} mm", settings)
-            if process and least < most:
-                base = max(low[2] + BESIDE_MM, 0.0) if self._on_plate else low[2] + BESIDE_MM
-                yield Modifier(self._box([*low[:2], base + least], [*high[:2], base + most]), process)
+            what, first, last = f"the height range {least:g} to {most:g} mm", max(least, 0.0), min(most, tall_mm + BESIDE_MM)
+            box = self._box([*low[:2], base + first], [*high[:2], base + last])
+            if not (first < min(last, tall_mm) and np.subtract(box.max_mm, box.min_mm).min() >= THINNEST_MM):
+                self._notes.append(f"{what} is left out: it holds nothing of its object, which is {tall_mm:.4g} mm tall")
+            elif process := self._process(what, settings):
+                yield Modifier(box, process)
 
     def _process(self, what: str, settings: Mapping[str, str]) -> dict[str, Any]:
         """The keys of a process that settings become, with a note on them."""
@@ -125,12 +132,17 @@ class _Marks:
             return MeshVolume(self._path, mesh, room)
         return _within(box, room)
 
+    @cached_property
+    def _axes(self) -> tuple[Vector, Vector, Vector] | None:
+        """The axes of what is level in the file, where it lies now; None: it is level there, too."""
+        cube = _box_at(corners((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) @ self._linear.T)
+        assert cube is not None  # a rotation and a scale of one size leave it one
+        return cube.axes
+
     def _box(self, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Zone:
         """A box of the file where it lies now."""
         points = np.array([[*low], [*high]])
-        box = _box_at(self._moved(corners(*map(tuple, points.tolist()))))
-        assert box is not None  # a rotation and a scale leave it one
-        return box
+        return _box_along(self._axes, self._moved(corners(*map(tuple, points.tolist()))))
 
     def _moved(self, places: Floats) -> Floats:
         moved: Floats = places @ self._linear.T + self._shift_mm
@@ -178,12 +190,16 @@ def _box_at(points: Floats) -> Zone | None:
     axes = axes[np.argsort([int(np.argmax(np.abs(axis))) for axis in axes], kind="stable")]
     axes *= np.sign(axes[np.arange(3), np.argmax(np.abs(axes), axis=1)])[:, None]
     axes[2] *= np.sign(np.linalg.det(axes))
-    level = np.allclose(axes, np.eye(3), rtol=0.0, atol=SAME)
-    own = points if level else points @ axes.T
-    low, high = own.min(axis=0), own.max(axis=0)
-    near = np.minimum(np.abs(own - low), np.abs(own - high)).max()
-    if near > SAME * lengths[-1] or len(np.unique(own > 0.5 * (low + high), axis=0)) < 8:
-        return None
-    (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
     rows = [(x, y, z) for x, y, z in axes.tolist()]
-    return Zone((x0, y0, z0), (x1, y1, z1), None if level else (rows[0], rows[1], rows[2]))
+    level = np.allclose(axes, np.eye(3), rtol=0.0, atol=SAME)
+    box = _box_along(None if level else (rows[0], rows[1], rows[2]), points)
+    own, low, high = box.along(points), np.array(box.min_mm), np.array(box.max_mm)
+    near = np.minimum(np.abs(own - low), np.abs(own - high)).max()
+    return box if near <= SAME * lengths[-1] and len(np.unique(own > 0.5 * (low + high), axis=0)) == 8 else None
+
+
+def _box_along(axes: tuple[Vector, Vector, Vector] | None, points: Floats) -> Zone:
+    """The smallest box around some points with these axes; None: those of the frame."""
+    own = points if axes is None else points @ np.array(axes).T
+    (x0, y0, z0), (x1, y1, z1) = own.min(axis=0).tolist(), own.max(axis=0).tolist()
+    return Zone((x0, y0, z0), (x1, y1, z1), axes)

@@ -164,6 +164,36 @@ def test_settings_between_two_heights_count_from_the_lowest_point_of_their_objec
     np.testing.assert_allclose(corners, [(34.0, -16.0, 7.0), (66.0, 16.0, 10.0)], atol=1e-9)
 
 
+@pytest.mark.parametrize("rotate_deg", [(0.0, 0.0, 0.0), (30.0, 20.0, 10.0)])
+@pytest.mark.parametrize(
+    ("between", "span_mm"),
+    [
+        (("0", "1e200"), (0.0, 21.0)),
+        (("-1e200", "5"), (0.0, 5.0)),
+        (("0", "1e-10"), None),
+        (("8", "5"), None),
+        (("-5", "0"), None),
+        (("20", "1e200"), None),
+        (("0", "1e-300"), None),
+    ],
+)
+def test_a_height_range_ends_just_above_its_object_and_one_that_holds_nothing_is_left_out(
+    tmp_path: Path, between: tuple[str, str], span_mm: tuple[float, float] | None, rotate_deg: tuple[float, float, float]
+) -> None:
+    option = '<option opt_key="perimeters">6</option>'
+    ranges = f'<objects><object id="1"><range min_z="{between[0]}" max_z="{between[1]}">{option}</range></object></objects>'
+    further = {"Metadata/Prusa_Slicer_layer_config_ranges.xml": ranges}
+    model = read_model(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [AT_ORIGIN])], further), rotate_deg=rotate_deg)
+    if span_mm is None:
+        assert model.zones.modifiers == ()
+        assert "is left out: it holds nothing of its object, which is 20 mm tall" in model.notes[0]
+        return
+    (modifier,) = model.zones.modifiers
+    assert isinstance(modifier.volume, Zone)
+    sizes = np.sort(np.subtract(modifier.volume.max_mm, modifier.volume.min_mm))
+    np.testing.assert_allclose(sizes, np.sort([32.0, 32.0, span_mm[1] - span_mm[0]]), atol=1e-9)
+
+
 def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
     beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 10.0]]))
     wide = m3.Manifold.cube((100.0, 5.0, 5.0), True)
