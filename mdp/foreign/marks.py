@@ -26,8 +26,9 @@ from mdp.formats.slicer_file import (
 from mdp.formats.surface import concatenate
 from mdp.head import corners
 from mdp.mesh import Floats, Mesh
+from mdp.repair.colours import NONE, triangle_of
 from mdp.zone import AnyZone, MeshVolume, Modifier, Triangles, Volume, Zone, Zones
-from profiles.errors import MeshError, ProfileError
+from profiles.errors import MeshError, ProfileError, counted
 from profiles.frozen import Vector
 
 if TYPE_CHECKING:
@@ -41,19 +42,22 @@ THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
 
-def marks(build: Build, path: Path, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
+def marks(build: Build, path: Path, mesh: Mesh, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
     """The modifiers and marks of a slicer file, with each place p of it at linear @ p + shift_mm, and a note on each.
+
+    mesh: the solid of what the file prints, which lies so.
 
     A volume that is no solid is left out, with a note.
     """
-    return _Marks(build, path, linear, shift_mm).zones()
+    return _Marks(build, path, mesh, linear, shift_mm).zones()
 
 
 class _Marks:
     """The marks of a slicer file, moved as its model is."""
 
-    def __init__(self, build: Build, path: Path, linear: Floats, shift_mm: Floats) -> None:
+    def __init__(self, build: Build, path: Path, mesh: Mesh, linear: Floats, shift_mm: Floats) -> None:
         self._objects, self._several = build.objects, sum(bool(own.surfaces(PART)) for own in build.objects) > 1
+        self._corners_mm = mesh.vertices[mesh.faces]
         self._path, self._linear, self._shift_mm, self._on_plate = path, linear, shift_mm, build.on_plate
         self._notes: list[str] = []
 
@@ -72,6 +76,7 @@ class _Marks:
     def zones(self) -> tuple[Zones, list[str]]:
         """All marks and a sentence for each."""
         modifiers, kinds = list[Modifier](), {kind: list[AnyZone]() for kind in ("no_seam", "no_support", "support")}
+        painted = dict[str, list[Floats]]()
         for own in self._objects:
             modifiers += self._of_object(own) if own.surfaces(PART) else ()
             for volume in own.volumes:
@@ -84,9 +89,9 @@ class _Marks:
                     kinds[MARKED[role.kind]].append(place)
                     self._notes.append(f"{_named(role)} is taken as [[{MARKED[role.kind]}]]")
                 elif role.kind in PAINTED:
-                    corners_mm = volume.surface.vertices[volume.surface.faces]
-                    kinds[PAINTED[role.kind]].append(Triangles(self._moved(corners_mm)))
-                    self._notes.append(f"{role.kind} on {len(corners_mm)} of its triangles is taken as [[{PAINTED[role.kind]}]]")
+                    painted.setdefault(role.kind, []).append(self._moved(volume.surface.vertices[volume.surface.faces]))
+        for kind, corners_mm in painted.items():
+            kinds[PAINTED[kind]] += self._painted(kind, np.concatenate(corners_mm))
         return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), self._notes
 
     def _of_object(self, own: BuildObject) -> Iterator[Modifier]:
@@ -114,6 +119,18 @@ class _Marks:
         rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
         self._notes.append(f"{what} " + (f"is taken as [[modifier]]: {taken}" if taken else "changes nothing here") + rest)
         return process
+
+    def _painted(self, kind: str, corners_mm: Floats) -> list[Triangles]:
+        """The faces of the solid that lie on (k, 3, 3) painted triangles, with a note on how many of these have any."""
+        row = triangle_of(corners_mm, self._corners_mm)
+        found, lost = len(np.unique(row[row != NONE])), "not on the surface of what is printed"
+        rest = len(corners_mm) - found
+        if not found:
+            self._notes.append(f"{kind} is left out: its {counted(rest, 'triangle')} {'is' if rest == 1 else 'are'} {lost}")
+            return []
+        others = f"; {counted(rest, 'other')} {'is' if rest == 1 else 'are'} {lost}" if rest else ""
+        self._notes.append(f"{kind} on {found} of its triangles is taken as [[{PAINTED[kind]}]]{others}")
+        return [Triangles(self._corners_mm[row != NONE])]
 
     def _place(self, volume: BuildVolume, own: BuildObject) -> Volume | None:
         """Where a volume lies, within the box of its object if there are others; None for one that is no solid, with a note.

@@ -334,6 +334,16 @@ def test_damaged_settings_leave_a_sound_mesh_readable_with_a_note(tmp_path: Path
     assert note.endswith("): those of its objects, modifiers and height ranges are left out")
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_mark_farther_than_any_number_is_left_out_without_warnings(tmp_path: Path) -> None:
+    far = from_manifold(BOX).vertices[0, 0]
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "support")], [AT_ORIGIN])])
+    change(path, "3D/3dmodel.model", f'x="{float(far)!r}"', 'x="1e200"')
+    model = read_model(path)
+    assert model.zones.support == ()
+    assert "it is left out" in model.notes[0]
+
+
 def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "support")], [AT_ORIGIN])])
     change(path, "3D/3dmodel.model", "</triangles>", '<triangle v1="0" v2="1" v3="2"/></triangles>')
@@ -371,6 +381,61 @@ def test_whole_triangles_that_are_painted_are_marked_wherever_the_model_lies(
         "paint against support on 1 of its triangles is taken as [[no_support]]",
         "paint for support on 1 of its triangles is taken as [[support]]",
     ]
+
+
+def paint(path: Path, rows: Sequence[int], attributes: str) -> None:
+    """Give some triangles of the model part attributes."""
+    part = "3D/3dmodel.model"
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read(part).decode()
+    pieces = text.split("<triangle ")
+    change(
+        path, part, text, "<triangle ".join(f"{attributes} {piece}" if k - 1 in rows else piece for k, piece in enumerate(pieces))
+    )
+
+
+@pytest.mark.parametrize("rotate_deg", [(0.0, 0.0, 0.0), (30.0, 20.0, 10.0)])
+@pytest.mark.parametrize("second", ["part", "negative"])
+def test_paint_follows_what_is_left_of_a_face_and_a_note_counts_what_is_lost(
+    tmp_path: Path, second: str, rotate_deg: tuple[float, float, float]
+) -> None:
+    pole, seed = (
+        m3.Manifold.cube((10.0, 8.0, 40.0), True).translate((3.1, 2.3, 0.0)),
+        BOX.scale((0.1, 0.1, 0.1)).translate((-9, 0, 0)),
+    )
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(seed), Made(pole, second)], [AT_ORIGIN])])
+    top = np.flatnonzero(from_manifold(BLOCK).normals[:, 2] > 0.9)
+    paint(path, [*top, *range(12, 24)], 'slic3rpe:custom_supports="4"')
+    model = read_model(path, rotate_deg=rotate_deg)
+    (zone,) = model.zones.support
+    assert not isinstance(zone, Zone)
+    assert model.mesh.areas_mm2[faces_of(model.mesh, zone)].sum() == pytest.approx(30.0 * 30.0 - 10.0 * 8.0)
+    lost = "12 others are not on the surface of what is printed"
+    assert f"paint for support on 2 of its triangles is taken as [[support]]; {lost}" in model.notes
+
+
+def test_paint_on_nothing_that_is_printed_is_left_out_with_a_note(tmp_path: Path) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX.scale((0.1, 0.1, 0.1)))], [AT_ORIGIN])])
+    paint(path, [12], 'paint_seam="8"')
+    model = read_model(path)
+    assert model.zones.no_seam == ()
+    assert "paint against seams is left out: its 1 triangle is not on the surface of what is printed" in model.notes
+
+
+@pytest.mark.parametrize(("second", "deep_mm"), [("negative", 0.0), ("part", 4.0), ("part", 0.0)])
+def test_colours_follow_what_negative_volumes_and_the_plate_leave_of_their_faces(
+    tmp_path: Path, second: str, deep_mm: float
+) -> None:
+    pole = m3.Manifold.cube((10.0, 8.0, 40.0), True).translate((3.1, 2.3, 20.0))
+    at = Placed(np.vstack([np.eye(3), [0.0, 0.0, 10.0 - deep_mm]]))
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(pole, second)], [at])])
+    top = np.flatnonzero(from_manifold(BLOCK).normals[:, 2] > 0.9)
+    paint(path, top, 'pid="9" p1="0"')
+    group = '<basematerials id="9"><base name="red" displaycolor="#FF0000"/></basematerials>'
+    change(path, "3D/3dmodel.model", "<resources>", f"<resources>{group}")
+    mesh = read_model(path).mesh
+    assert mesh.colours is not None
+    assert mesh.areas_mm2[mesh.colours == 0xFF0000].sum() == pytest.approx(30.0 * 30.0 - 10.0 * 8.0)
 
 
 def test_colours_painted_on_triangles_are_told(tmp_path: Path) -> None:
