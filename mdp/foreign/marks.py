@@ -45,9 +45,7 @@ BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyon
 def marks(build: Build, path: Path, mesh: Mesh, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
     """The modifiers and marks of a slicer file, with each place p of it at linear @ p + shift_mm, and a note on each.
 
-    mesh: the solid of what the file prints, which lies so.
-
-    A volume that is no solid is left out, with a note.
+    mesh: the solid of what the file prints, which lies so. A volume that is no solid is left out, with a note.
     """
     return _Marks(build, path, mesh, linear, shift_mm).zones()
 

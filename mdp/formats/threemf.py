@@ -170,11 +170,6 @@ class Placement:
     role: Role | None = None
 
 
-def read(path: Path) -> list[Surface]:
-    """One surface for every mesh that the build prints, in mm; see read_build."""
-    return [surface for built in read_build(path).objects for surface in built.surfaces(PART)]
-
-
 def read_build(path: Path, plate: int | None = None) -> Build:
     """The objects that the build prints on one plate; None: the first that holds something.
 

@@ -8,6 +8,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.formats.readers import READERS
 from mdp.mesh import Floats, Mesh
 from mdp.read import read_model
 from mdp.zone import MeshVolume, Zone, faces_of
@@ -238,6 +239,12 @@ def test_a_negative_volume_inside_leaves_a_void(tmp_path: Path) -> None:
     mesh = read_model(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(ball, "negative")], [AT_ORIGIN])])).mesh
     check(mesh, BLOCK - ball)
     assert mesh.volume_mm3 < BLOCK.volume() - 480.0
+
+
+def test_the_family_of_readers_tells_parts_of_a_slicer_file_from_negative_volumes(tmp_path: Path) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "negative")], [AT_ORIGIN])])
+    (built,) = READERS[".3mf"](path, None).objects
+    assert [volume.role.kind for volume in built.volumes] == ["part", "negative volume"]
 
 
 def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -> None:
