@@ -1,4 +1,4 @@
-"""Project files of other slicers: what is printed of them, on which plate, and what their other volumes become."""
+"""Slicer files: what is printed of them, on which plate, and what their other volumes become."""
 
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -55,7 +55,7 @@ def drawn(rng: np.random.Generator, plates: int) -> list[Object]:
 
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("seed", range(30))
-def test_what_is_read_is_what_the_project_was_made_of(tmp_path: Path, dialect: str, seed: int) -> None:
+def test_what_is_read_is_what_the_slicer_file_was_made_of(tmp_path: Path, dialect: str, seed: int) -> None:
     rng = np.random.default_rng([seed, len(dialect)])
     plates = int(rng.integers(1, 4)) if dialect == "bambu" else 1
     objects = drawn(rng, plates)
@@ -203,7 +203,7 @@ def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
     assert (modifier.volume.min_mm[0], modifier.volume.max_mm[0]) == (-35.0, -5.0)  # no farther than its own object
 
 
-def test_older_projects_name_a_modifier_by_a_key(tmp_path: Path) -> None:
+def test_older_slicer_files_name_a_modifier_by_a_key(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "modifier", {"perimeters": "4"})], [AT_ORIGIN])])
     change(path, "Metadata/Slic3r_PE_model.config", 'key="volume_type" value="ParameterModifier"', 'key="modifier" value="1"')
     model = read_model(path)
@@ -254,7 +254,7 @@ def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -
     assert read_model(prusaslicer(tmp_path / "a.3mf", objects)).mesh.volume_mm3 == pytest.approx(36000.0 - 30.0 * 25.0)
 
 
-def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
+def test_a_slicer_file_says_which_plate_is_taken_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
     at = [Placed(np.vstack([np.eye(3), [100.0 * plate, 0.0, 20.0]]), plate, plate != 1) for plate in (1, 2, 3)]
     objects = [Object([Made(BLOCK)], at[:2]), Object([Made(BOX)], at[2:])]
     path = bambu(tmp_path / "a.3mf", objects, np.random.default_rng(0))
@@ -278,7 +278,7 @@ def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(t
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_what_lies_below_the_plate_of_a_project_is_not_printed(tmp_path: Path, dialect: str) -> None:
+def test_what_lies_below_the_plate_of_a_slicer_file_is_not_printed(tmp_path: Path, dialect: str) -> None:
     sunk = Placed(np.vstack([np.eye(3), [0.0, 0.0, 6.0]]))
     model = read_model(written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK), Made(BOX, "support")], [sunk])]))
     check(model.mesh, BLOCK.trim_by_plane((0.0, 0.0, 1.0), -6.0))
@@ -296,7 +296,7 @@ def test_objects_that_are_no_models_are_left_out(tmp_path: Path, kind: str) -> N
     assert model.notes == (f"leaves out object pole, an object of type {kind}, which is not printed",)
 
 
-def test_a_project_that_prints_nothing_is_refused(tmp_path: Path) -> None:
+def test_a_slicer_file_that_prints_nothing_is_refused(tmp_path: Path) -> None:
     hidden = Placed(AT_ORIGIN.transform, printable=False)
     assert files.refusal(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [hidden])])) == (
         "its build places no mesh that is printed: it leaves out object b, which is switched off in its slicer"
@@ -324,7 +324,7 @@ CONFIG = "Metadata/Slic3r_PE_model.config"
         ("_rels/.rels", "3dmodel.model", "other.model", "its part 3D/other.model is missing or malformed"),
     ],
 )
-def test_a_damaged_project_is_refused_with_a_sentence(tmp_path: Path, part: str, old: str, new: str, words: str) -> None:
+def test_a_damaged_slicer_file_is_refused_with_a_sentence(tmp_path: Path, part: str, old: str, new: str, words: str) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "negative")], [AT_ORIGIN])])
     change(path, part, old, new)
     assert words in files.refusal(path)
