@@ -75,7 +75,7 @@ def read_model(
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
         mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
-        zones, mark_notes = marks(build, path, mesh, scale * turn, shift_mm)
+        zones, mark_notes = marks(build, path, mesh, scale, turn, shift_mm)
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:

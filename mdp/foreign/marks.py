@@ -42,21 +42,21 @@ THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
 
-def marks(build: Build, path: Path, mesh: Mesh, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
-    """The modifiers and marks of a slicer file, with each place p of it at linear @ p + shift_mm, and a note on each.
+def marks(build: Build, path: Path, mesh: Mesh, scale: float, turn: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
+    """The modifiers and marks of a slicer file, with each place p of it at turn @ scale p + shift_mm, and a note on each.
 
     mesh: the solid of what the file prints, which lies so. A volume that is no solid is left out, with a note.
     """
-    return _Marks(build, path, mesh, linear, shift_mm).zones()
+    return _Marks(build, path, mesh, scale, turn, shift_mm).zones()
 
 
 class _Marks:
     """The marks of a slicer file, moved as its model is."""
 
-    def __init__(self, build: Build, path: Path, mesh: Mesh, linear: Floats, shift_mm: Floats) -> None:
+    def __init__(self, build: Build, path: Path, mesh: Mesh, scale: float, turn: Floats, shift_mm: Floats) -> None:
         self._objects, self._several = build.objects, sum(bool(own.surfaces(PART)) for own in build.objects) > 1
         self._corners_mm = mesh.vertices[mesh.faces]
-        self._path, self._linear, self._shift_mm, self._on_plate = path, linear, shift_mm, build.on_plate
+        self._path, self._scale, self._turn, self._shift_mm, self._on_plate = path, scale, turn, shift_mm, build.on_plate
         self._notes: list[str] = []
 
     @cached_property
@@ -150,8 +150,8 @@ class _Marks:
     @cached_property
     def _axes(self) -> tuple[Vector, Vector, Vector] | None:
         """The axes of what is level in the file, where it lies now; None: it is level there, too."""
-        cube = _box_at(corners((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) @ self._linear.T)
-        assert cube is not None  # a rotation and a scale of one size leave it one
+        cube = _box_at(corners((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) @ self._turn.T)
+        assert cube is not None  # a rotation leaves it one
         return cube.axes
 
     def _box(self, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Zone:
@@ -160,7 +160,7 @@ class _Marks:
         return _box_along(self._axes, self._moved(corners(*map(tuple, points.tolist()))))
 
     def _moved(self, places: Floats) -> Floats:
-        moved: Floats = places @ self._linear.T + self._shift_mm
+        moved: Floats = (places * self._scale) @ self._turn.T + self._shift_mm  # rounded as the solid is
         return moved
 
 

@@ -33,9 +33,9 @@ def triangle_of(corners: Floats, wanted: Floats) -> Indices:
     """(m,) for (m, 3, 3) faces of a repaired solid which of (k, 3, 3) triangles of its file each is, or lies on with its middle;
     NONE: it is none of them."""
     row = _same_corners(corners, wanted)
-    rest = np.flatnonzero(row == NONE)
-    if len(rest) and len(corners):
-        row[rest] = _pieces(corners, wanted[rest])
+    rest, cut = np.flatnonzero(row == NONE), np.setdiff1d(np.arange(len(corners)), row)
+    if len(rest) and len(cut):  # what is there as a whole is there in no pieces
+        row[rest] = np.append(cut, NONE)[_pieces(corners[cut], wanted[rest])]
     return row
 
 

@@ -16,6 +16,7 @@ from profiles.foreign.config import Config, Entry, finite
 
 PROGRAM = "Cura"
 SLICER_FILE = re.compile(r"Cura/.*\.inst\.cfg$")  # members of a .3mf that have a person's settings
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, configparser.Error)
 MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
 PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
 KEYS = {
@@ -167,7 +168,7 @@ def read_values(file: Path) -> tuple[Mapping[str, str], str]:
                 values |= own if first else {}
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
-    except (*DAMAGED_ZIP, configparser.Error) as error:
+    except DAMAGED as error:
         raise ProfileError(f"profile {file}: is no profile of Cura ({first_line(error)})") from None
     return values, name
 

@@ -13,6 +13,7 @@ from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
 from profiles.foreign.imported import settings_of_place
 
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, ProfileError)
 MOST_BYTES = 16 << 20  # of the settings, which have some 100 kB
 OF_PRUSASLICER = ("metadata/slic3r_pe.config", "metadata/slic3r.config", "metadata/superslicer.config")
 OF_ORCASLICER = "metadata/project_settings.config"
@@ -61,7 +62,7 @@ def read_slicer_settings(file: Path) -> SlicerSettings:
                 return SlicerSettings({}, prusaslicer.of_gcode)
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
-    except (*DAMAGED_ZIP, ProfileError) as error:
+    except DAMAGED as error:
         raise ProfileError(f"profile {file}: its settings are damaged ({first_line(error)})") from None
     kept = any(name.startswith(OF_CURA) for name in entries)
     return SlicerSettings(cura.read_values(file)[0] if kept else {}, cura.of_values)
