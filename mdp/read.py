@@ -10,7 +10,7 @@ from mdp.directions.turns import turned_by
 from mdp.foreign.marks import marks
 from mdp.foreign.printed import printed
 from mdp.formats.readers import READERS
-from mdp.formats.slicer_file import Build, BuildObject, BuildVolume
+from mdp.formats.slicer_file import Build
 from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import check_file
@@ -77,7 +77,7 @@ def read_model(
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
         mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
-        zones, mark_notes = marks(build, path, scale * turn, shift_mm)
+        zones, mark_notes = marks(build, path, mesh, scale, turn, shift_mm)
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
@@ -151,13 +151,7 @@ def _read_build(path: Path, plate: int | None = None) -> Build:
             raise MeshError(f"{path}: is empty")
         if size > MOST_BYTES:
             raise MeshError(f"{path}: has {size} bytes, at most {MOST_BYTES} are read: a model of fewer faces is needed")
-        if path.suffix.lower() == ".3mf":
-            from mdp.formats.threemf import read_build
-
-            return read_build(path, plate)
-        if plate is not None:
-            raise MeshError(f"{path}: has no plates: --plate {plate} goes with a file of Bambu Studio or OrcaSlicer (.3mf)")
-        return Build([BuildObject([BuildVolume(surface) for surface in READERS[path.suffix.lower()](path)])])
+        return READERS[path.suffix.lower()](path, plate)
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from None
 

@@ -38,6 +38,15 @@ def reason(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
+def first_line(error: BaseException) -> str:
+    """The first line of an error's text, at most 200 letters, or its kind where it has none.
+
+    >>> first_line(ValueError("no number\\nat all")), first_line(EOFError())
+    ('no number', 'EOFError')
+    """
+    return (str(error).splitlines() or [type(error).__name__])[0][:200]
+
+
 def causes(error: BaseException | None) -> list[BaseException]:
     """An error, then what lies beneath it: what it was raised from, or while what was handled."""
     beneath: list[BaseException] = []

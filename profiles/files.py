@@ -1,14 +1,18 @@
-"""Files: written whole or not at all, and locked for one process at a time, on every system that Python runs on."""
+"""Files: written whole or not at all, locked for one process at a time on every system that Python runs on, and damaged zips."""
 
 import errno
+import lzma
 import os
 import shutil
+import struct
 import sys
 import tempfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
+from zipfile import BadZipFile, is_zipfile
 
 try:
     import fcntl
@@ -19,7 +23,26 @@ if sys.platform == "win32":
 
 LOCKED_BYTE = 1 << 30  # on Windows, where nobody else can read what is locked: far behind the end, which LockFileEx allows
 LOCK = ".lock"  # the file in a folder that is locked for it, where a folder cannot be opened
+DAMAGED_ZIP: tuple[type[Exception], ...] = (  # what zipfile raises for one, beside OSError
+    BadZipFile,
+    EOFError,
+    LookupError,  # there is no such member
+    NotImplementedError,  # a compression that is not known
+    RuntimeError,  # a password
+    ValueError,
+    lzma.LZMAError,
+    struct.error,  # a mangled directory
+    zlib.error,
+)
 PRIVATE, SHARED = 0o600, 0o666  # modes: for this user alone, for all whom the umask does not exclude
+
+
+def is_zip(file: Path) -> bool:
+    """Whether a file is a zip, or was one before it was damaged."""
+    try:
+        return is_zipfile(file)
+    except BadZipFile:  # of its 64-bit directory; for all else that is wrong with it is_zipfile has an answer
+        return True
 
 
 @contextmanager

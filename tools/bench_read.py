@@ -16,6 +16,7 @@ import numpy as np
 import trimesh
 
 from mdp.formats.readers import READERS
+from mdp.formats.slicer_file import PART
 from mdp.formats.surface import Surface, concatenate
 
 WEIGHED = 4  # meshes whose memory is measured, which takes many times as long as reading them
@@ -43,7 +44,7 @@ def row(kind: str, names: list[Path], folder: Path) -> str:
     """The medians of one format."""
     times, same, memory = [], 0, []
     for number, path in enumerate(written(kind, names, folder)):
-        ours, theirs = READERS[path.suffix], read_with_trimesh
+        ours, theirs = read_here, read_with_trimesh
         times.append((seconds(ours, path), seconds(theirs, path)))
         own, theirs_read = (concatenate(reader(path)) for reader in (ours, theirs))
         same += np.array_equal(own.vertices[own.faces], theirs_read.vertices[theirs_read.faces])
@@ -62,6 +63,11 @@ def written(kind: str, names: list[Path], folder: Path) -> Iterator[Path]:
             mesh = trimesh.Trimesh(arrays["vertices"].astype(float), arrays["faces"], process=False)
         mesh.export(path, file_type=kind)
         yield path
+
+
+def read_here(path: Path) -> list[Surface]:
+    """The surfaces of a file as they are read here."""
+    return [surface for built in READERS[path.suffix](path, None).objects for surface in built.surfaces(PART)]
 
 
 def read_with_trimesh(path: Path) -> list[Surface]:

@@ -28,7 +28,6 @@ from machine.app.project_record import RECORD, VERSION, GivenRecord, NewerError,
 from machine.app.requests import Given, ModelRequest
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
-from mdp.formats.threemf import DAMAGES
 from mdp.mesh import Mesh
 from mdp.model_file import DEMO
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile
@@ -37,7 +36,7 @@ from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
 from profiles.errors import PlanError, reason
-from profiles.files import lock_folder, remove_locked, whole_file, write_whole
+from profiles.files import DAMAGED_ZIP, lock_folder, remove_locked, whole_file, write_whole
 from profiles.frozen import Vector
 from profiles.places import KINDS, PARENT, is_file_name, own, shipped
 from profiles.toml_text import read_toml
@@ -52,7 +51,7 @@ SUFFIX = ".3mf"
 FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: in no other folder, on any disk
 ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-([0-9a-f]{{12}})-")  # to the names of a project's files
 MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
-DAMAGED: tuple[type[Exception], ...] = (*DAMAGES, OSError)  # of a zip archive
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, OSError)  # of a zip archive
 PREFIX = "tiltprint-project-"  # of temporary folders
 BEGUN_S = 60.0  # a folder as new as this may belong to a program that has not locked it yet
 _unpacked: list[tuple[TemporaryDirectory[str], str, int | None]] = []  # projects that were opened: folder, file, lock

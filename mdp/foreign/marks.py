@@ -26,8 +26,10 @@ from mdp.formats.slicer_file import (
 from mdp.formats.surface import concatenate
 from mdp.head import corners
 from mdp.mesh import Floats, Mesh
+from mdp.repair.colours import NONE, triangle_of
 from mdp.zone import AnyZone, MeshVolume, Modifier, Triangles, Volume, Zone, Zones
-from profiles.errors import MeshError
+from profiles.errors import MeshError, ProfileError, counted
+from profiles.frozen import Vector
 
 if TYPE_CHECKING:
     from profiles.foreign.slicer_file import SlicerSettings
@@ -36,35 +38,43 @@ MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
 SAME = 1e-6  # cosine of a right angle, and share of a box's size by which its corners may lie off
 MOST_TOLD = 8  # settings in a sentence
+THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
 
-def marks(build: Build, path: Path, linear: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
-    """The modifiers and marks of a slicer file, with each place p of it at linear @ p + shift_mm, and a note on each.
+def marks(build: Build, path: Path, mesh: Mesh, scale: float, turn: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
+    """The modifiers and marks of a slicer file, with each place p of it at turn @ scale p + shift_mm, and a note on each.
 
-    A volume that is no solid is left out, with a note.
+    mesh: the solid of what the file prints, which lies so. A volume that is no solid is left out, with a note.
     """
-    return _Marks(build, path, linear, shift_mm).zones()
+    return _Marks(build, path, mesh, scale, turn, shift_mm).zones()
 
 
 class _Marks:
     """The marks of a slicer file, moved as its model is."""
 
-    def __init__(self, build: Build, path: Path, linear: Floats, shift_mm: Floats) -> None:
+    def __init__(self, build: Build, path: Path, mesh: Mesh, scale: float, turn: Floats, shift_mm: Floats) -> None:
         self._objects, self._several = build.objects, sum(bool(own.surfaces(PART)) for own in build.objects) > 1
-        self._path, self._linear, self._shift_mm, self._on_plate = path, linear, shift_mm, build.on_plate
+        self._corners_mm = mesh.vertices[mesh.faces]
+        self._path, self._scale, self._turn, self._shift_mm, self._on_plate = path, scale, turn, shift_mm, build.on_plate
         self._notes: list[str] = []
 
     @cached_property
-    def _settings(self) -> "SlicerSettings":
-        """The settings of the whole print, read once; most models have none."""
+    def _settings(self) -> "SlicerSettings | None":
+        """The settings of the whole print, read once; most models have none. None, with a note: they are damaged."""
         from profiles.foreign.slicer_file import read_slicer_settings
 
-        return read_slicer_settings(self._path)
+        try:
+            return read_slicer_settings(self._path)
+        except ProfileError as error:
+            said = str(error).removeprefix(f"profile {self._path}: ")
+            self._notes.append(f"{said}: those of its objects, modifiers and height ranges are left out")
+            return None
 
     def zones(self) -> tuple[Zones, list[str]]:
         """All marks and a sentence for each."""
         modifiers, kinds = list[Modifier](), {kind: list[AnyZone]() for kind in ("no_seam", "no_support", "support")}
+        painted = dict[str, list[Floats]]()
         for own in self._objects:
             modifiers += self._of_object(own) if own.surfaces(PART) else ()
             for volume in own.volumes:
@@ -77,29 +87,48 @@ class _Marks:
                     kinds[MARKED[role.kind]].append(place)
                     self._notes.append(f"{_named(role)} is taken as [[{MARKED[role.kind]}]]")
                 elif role.kind in PAINTED:
-                    corners_mm = volume.surface.vertices[volume.surface.faces]
-                    kinds[PAINTED[role.kind]].append(Triangles(self._moved(corners_mm)))
-                    self._notes.append(f"{role.kind} on {len(corners_mm)} of its triangles is taken as [[{PAINTED[role.kind]}]]")
+                    painted.setdefault(role.kind, []).append(self._moved(volume.surface.vertices[volume.surface.faces]))
+        for kind, corners_mm in painted.items():
+            kinds[PAINTED[kind]] += self._painted(kind, np.concatenate(corners_mm))
         return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), self._notes
 
     def _of_object(self, own: BuildObject) -> Iterator[Modifier]:
         """The settings of an object and those between two heights of it."""
-        low, high = _bounds(own) + np.array([[-BESIDE_MM], [BESIDE_MM]])
+        lowest, highest = _bounds(own)
+        low, high = lowest - BESIDE_MM, highest + BESIDE_MM
         if own.settings and (process := self._process("the object", own.settings)):
             yield Modifier(self._box(low, high), process)
+        base = max(lowest[2], 0.0) if self._on_plate else lowest[2]
+        tall_mm = highest[2] - base
         for least, most, settings in own.heights:
-            process = self._process(f"the height range {least:g} to {most:g} mm", settings)
-            if process and least < most:
-                base = max(low[2] + BESIDE_MM, 0.0) if self._on_plate else low[2] + BESIDE_MM
-                yield Modifier(self._box([*low[:2], base + least], [*high[:2], base + most]), process)
+            what, first, last = f"the height range {least:g} to {most:g} mm", max(least, 0.0), min(most, tall_mm + BESIDE_MM)
+            box = self._box([*low[:2], base + first], [*high[:2], base + last])
+            if not (first < min(last, tall_mm) and np.subtract(box.max_mm, box.min_mm).min() >= THINNEST_MM):
+                self._notes.append(f"{what} is left out: it holds nothing of its object, which is {tall_mm:.4g} mm tall")
+            elif process := self._process(what, settings):
+                yield Modifier(box, process)
 
     def _process(self, what: str, settings: Mapping[str, str]) -> dict[str, Any]:
         """The keys of a process that settings become, with a note on them."""
+        if self._settings is None:
+            return {}
         process, left = self._settings.of_place(settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
         rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
         self._notes.append(f"{what} " + (f"is taken as [[modifier]]: {taken}" if taken else "changes nothing here") + rest)
         return process
+
+    def _painted(self, kind: str, corners_mm: Floats) -> list[Triangles]:
+        """The faces of the solid that lie on (k, 3, 3) painted triangles, with a note on how many of these have any."""
+        row = triangle_of(corners_mm, self._corners_mm)
+        found, lost = len(np.unique(row[row != NONE])), "not on the surface of what is printed"
+        rest = len(corners_mm) - found
+        if not found:
+            self._notes.append(f"{kind} is left out: its {counted(rest, 'triangle')} {'is' if rest == 1 else 'are'} {lost}")
+            return []
+        others = f"; {counted(rest, 'other')} {'is' if rest == 1 else 'are'} {lost}" if rest else ""
+        self._notes.append(f"{kind} on {found} of its triangles is taken as [[{PAINTED[kind]}]]{others}")
+        return [Triangles(self._corners_mm[row != NONE])]
 
     def _place(self, volume: BuildVolume, own: BuildObject) -> Volume | None:
         """Where a volume lies, within the box of its object if there are others; None for one that is no solid, with a note.
@@ -118,15 +147,20 @@ class _Marks:
             return MeshVolume(self._path, mesh, room)
         return _within(box, room)
 
+    @cached_property
+    def _axes(self) -> tuple[Vector, Vector, Vector] | None:
+        """The axes of what is level in the file, where it lies now; None: it is level there, too."""
+        cube = _box_at(corners((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) @ self._turn.T)
+        assert cube is not None  # a rotation leaves it one
+        return cube.axes
+
     def _box(self, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Zone:
         """A box of the file where it lies now."""
         points = np.array([[*low], [*high]])
-        box = _box_at(self._moved(corners(*map(tuple, points.tolist()))))
-        assert box is not None  # a rotation and a scale leave it one
-        return box
+        return _box_along(self._axes, self._moved(corners(*map(tuple, points.tolist()))))
 
     def _moved(self, places: Floats) -> Floats:
-        moved: Floats = places @ self._linear.T + self._shift_mm
+        moved: Floats = (places * self._scale) @ self._turn.T + self._shift_mm  # rounded as the solid is
         return moved
 
 
@@ -171,12 +205,16 @@ def _box_at(points: Floats) -> Zone | None:
     axes = axes[np.argsort([int(np.argmax(np.abs(axis))) for axis in axes], kind="stable")]
     axes *= np.sign(axes[np.arange(3), np.argmax(np.abs(axes), axis=1)])[:, None]
     axes[2] *= np.sign(np.linalg.det(axes))
-    level = np.allclose(axes, np.eye(3), rtol=0.0, atol=SAME)
-    own = points if level else points @ axes.T
-    low, high = own.min(axis=0), own.max(axis=0)
-    near = np.minimum(np.abs(own - low), np.abs(own - high)).max()
-    if near > SAME * lengths[-1] or len(np.unique(own > 0.5 * (low + high), axis=0)) < 8:
-        return None
-    (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
     rows = [(x, y, z) for x, y, z in axes.tolist()]
-    return Zone((x0, y0, z0), (x1, y1, z1), None if level else (rows[0], rows[1], rows[2]))
+    level = np.allclose(axes, np.eye(3), rtol=0.0, atol=SAME)
+    box = _box_along(None if level else (rows[0], rows[1], rows[2]), points)
+    own, low, high = box.along(points), np.array(box.min_mm), np.array(box.max_mm)
+    near = np.minimum(np.abs(own - low), np.abs(own - high)).max()
+    return box if near <= SAME * lengths[-1] and len(np.unique(own > 0.5 * (low + high), axis=0)) == 8 else None
+
+
+def _box_along(axes: tuple[Vector, Vector, Vector] | None, points: Floats) -> Zone:
+    """The smallest box around some points with these axes; None: those of the frame."""
+    own = points if axes is None else points @ np.array(axes).T
+    (x0, y0, z0), (x1, y1, z1) = own.min(axis=0).tolist(), own.max(axis=0).tolist()
+    return Zone((x0, y0, z0), (x1, y1, z1), axes)

@@ -1,7 +1,10 @@
 """Printed: the surfaces that a slicer file prints, its negative volumes subtracted."""
 
+import numpy as np
+
 from mdp.formats.slicer_file import NEGATIVE, PART, Build, BuildVolume
 from mdp.formats.surface import Surface
+from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
 from mdp.repair.shells import above, subtract
 from profiles.errors import MeshError
@@ -29,6 +32,7 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
         if sinks:
             left = above(left, 0.0)
             repairs.append(f"leaves out what lies below the plate, {deep_mm:.3g} mm deep")
+        left = Surface(left.vertices, left.faces, carry_colours(parts, left))
         notes += [*repairs, *([] if len(left.faces) else ["nothing is left of one of its objects"])]
         surfaces += [left] if len(left.faces) else []
     if not surfaces:
@@ -39,6 +43,7 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
 def solid_of_volume(volume: BuildVolume) -> Surface:
     """A volume as a closed solid. Raises MeshError, which names it."""
     try:
-        return repair([volume.surface])[0]
+        with np.errstate(all="ignore"):  # one that lies too far away for its volume to be a number is refused as any other
+            return repair([volume.surface])[0]
     except MeshError as error:
         raise MeshError(f"its {volume.role.kind} {volume.role.name!r} {error}") from None

@@ -1,4 +1,6 @@
-"""Readers: one file a format with `read(path) -> list[Surface]`; READERS is the family, each of which is loaded when it reads.
+"""Readers: what a file of a format prints, as its build; READERS is the family, each of which is loaded when it reads.
+
+One module a format has `read(path) -> list[Surface]`, the one of 3MF, which slicers save, `read_build(path, plate) -> Build`.
 
 The six that printers know are read by our own: trimesh reads some valid files of them as other solids (tools/RESULTS.md,
 "Reading") and takes longer to import than these readers take for a model. What else it knows it reads.
@@ -10,15 +12,25 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from profiles.errors import MeshError
+
 if TYPE_CHECKING:
-    from mdp.formats.surface import Surface
+    from mdp.formats.slicer_file import Build
 
-Reader = Callable[[Path], "list[Surface]"]
+Reader = Callable[[Path, int | None], "Build"]
 
 
-def _read(module: str, path: Path) -> "list[Surface]":
-    surfaces: list[Surface] = import_module(f"mdp.formats.{module}").read(path)
-    return surfaces
+def _read(module: str, path: Path, plate: int | None) -> "Build":
+    """One object of a file that no slicer has saved, or what a plate of a slicer file prints."""
+    if module == "threemf":
+        from mdp.formats.threemf import read_build
+
+        return read_build(path, plate)
+    if plate is not None:
+        raise MeshError(f"{path}: has no plates: --plate {plate} goes with a file of Bambu Studio or OrcaSlicer (.3mf)")
+    from mdp.formats.slicer_file import Build, BuildObject, BuildVolume
+
+    return Build([BuildObject([BuildVolume(surface) for surface in import_module(f"mdp.formats.{module}").read(path)])])
 
 
 READERS: dict[str, Reader] = {

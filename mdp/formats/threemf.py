@@ -1,11 +1,8 @@
 """3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3), the colours
 of their triangles (Materials and Properties Extension 1.2), and the roles that a slicer gives to volumes."""
 
-import lzma
 import re
-import struct
 import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,7 +29,8 @@ from mdp.formats.slicer_file import (
 )
 from mdp.formats.surface import Surface, check_meshes, check_placed, check_surface, parse_floats, parse_integers
 from mdp.mesh import NO_COLOUR, Floats, Indices, parse_colour
-from profiles.errors import MeshError
+from profiles.errors import MeshError, first_line
+from profiles.files import DAMAGED_ZIP
 
 UNIT_MM = {"micron": 0.001, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
 MATERIAL = "{http://schemas.microsoft.com/3dmanufacturing/material/2015/02}"
@@ -64,20 +62,8 @@ PAINTED = {  # attributes of triangles, and what they would change
     "filaments": ("paint_color", "slic3rpe:mmu_segmentation"),
     "fuzzy skin": ("paint_fuzzy_skin", "slic3rpe:fuzzy_skin"),
 }
-DAMAGES: tuple[type[Exception], ...] = (
-    LookupError,
-    ElementTree.ParseError,
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    EOFError,
-    ValueError,
-    NotImplementedError,  # unknown compression
-    RuntimeError,  # a password
-    struct.error,  # a mangled directory
-)
 LARGEST_MODEL_BYTES = 2**30  # a zip of a few kB can unpack to more than any memory
-MOST_MARKS = 12_000_000  # each element takes 80 bytes of memory and more; eight million triangles are below
+MOST_ELEMENTS = 12_000_000  # each element takes 80 bytes of memory and more; eight million triangles are below
 DEEPEST = 32  # components within components; a ring of them would never end
 _IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
 _Read = TypeVar("_Read")
@@ -117,17 +103,17 @@ class Package:
             if self.archive.getinfo(entry).file_size > LARGEST_MODEL_BYTES:
                 raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
             content = self.archive.read(entry)
-        except DAMAGES as error:
+        except DAMAGED_ZIP as error:
             raise self._damaged(name, error) from None
-        if content.count(b"<") > MOST_MARKS or content.count(b"=") > 4 * MOST_MARKS:
-            raise MeshError(f"{self.path}: its part {name} has more than {MOST_MARKS} elements or too many attributes")
+        if content.count(b"<") > MOST_ELEMENTS or content.count(b"=") > 4 * MOST_ELEMENTS:
+            raise MeshError(f"{self.path}: its part {name} has more than {MOST_ELEMENTS} elements or too many attributes")
         return content
 
     def parse(self, name: str, content: bytes) -> ElementTree.Element:
         """The root element of a part; raises MeshError when it is malformed."""
         try:
             return _tree(content)
-        except DAMAGES as error:
+        except (LookupError, ValueError, ElementTree.ParseError) as error:
             raise self._damaged(name, error) from None
 
     def config(self, names: tuple[str, ...], read: Callable[[ElementTree.Element], _Read]) -> _Read | None:
@@ -169,7 +155,7 @@ class Package:
                 )
 
     def _damaged(self, name: str, error: Exception) -> MeshError:
-        return MeshError(f"{self.path}: its part {name} is missing or malformed ({error})")
+        return MeshError(f"{self.path}: its part {name} is missing or malformed ({first_line(error)})")
 
 
 @dataclass(frozen=True)
@@ -184,11 +170,6 @@ class Placement:
     role: Role | None = None
 
 
-def read(path: Path) -> list[Surface]:
-    """One surface for every mesh that the build prints, in mm; see read_build."""
-    return [surface for built in read_build(path).objects for surface in built.surfaces(PART)]
-
-
 def read_build(path: Path, plate: int | None = None) -> Build:
     """The objects that the build prints on one plate; None: the first that holds something.
 
@@ -197,7 +178,7 @@ def read_build(path: Path, plate: int | None = None) -> Build:
     """
     try:
         archive = zipfile.ZipFile(path)
-    except (zipfile.BadZipFile, struct.error, ValueError, NotImplementedError):
+    except DAMAGED_ZIP:
         raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
         return _Builder(Package(path, archive)).build(plate)

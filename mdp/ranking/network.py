@@ -16,7 +16,7 @@ from mdp.mesh import Floats
 from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import FEATURES, features
 from mdp.ranking.ranking import RankedCandidate
-from profiles.errors import RankerError
+from profiles.errors import RankerError, first_line
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -54,7 +54,7 @@ class Network:
         try:
             (scores,) = session.run([OUTPUT], {INPUT: rows.astype(np.float32)})
         except Exception as error:  # noqa: BLE001 - onnxruntime's own have no common base
-            raise RankerError(f"ranker {self.file}: cannot score candidates ({_first_line(error)})") from None
+            raise RankerError(f"ranker {self.file}: cannot score candidates ({first_line(error)})") from None
         if np.shape(scores) != (len(rows),) or not np.isfinite(scores).all():
             raise RankerError(f"ranker {self.file}: gives no number for each of {len(rows)} candidates")
         rounded: Floats = np.asarray(np.round(np.asarray(scores, np.float64), DECIMALS), np.float64)
@@ -100,12 +100,8 @@ class Network:
         except OSError as error:
             raise RankerError(f"ranker {self.file}: cannot be read ({error.strerror})") from None
         except Exception as error:  # noqa: BLE001 - as above
-            raise RankerError(f"ranker {self.file}: is no ONNX file ({_first_line(error)})") from None
+            raise RankerError(f"ranker {self.file}: is no ONNX file ({first_line(error)})") from None
         named = ([value.name for value in session.get_inputs()], [value.name for value in session.get_outputs()])
         if named != ([INPUT], [OUTPUT]):
             raise RankerError(f"ranker {self.file}: takes {named[0]} and gives {named[1]}; {INPUT} and {OUTPUT} are needed")
         return session
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0][:200]

@@ -1,4 +1,4 @@
-"""Colours: which face of a repaired solid is a face, or a piece of one, that the file has painted."""
+"""Colours and paint: which face of a repaired solid is a face, or a piece of one, that the file has painted."""
 
 from collections.abc import Iterator
 
@@ -7,6 +7,7 @@ import numpy as np
 from mdp.formats.surface import Surface, concatenate
 from mdp.mesh import NO_COLOUR, Floats, Indices
 
+NONE = -1  # the number of no triangle, behind which the last row of a table has what holds for none
 NEAR_SHARE = 1e-4  # of the model's size: as far as repairs move a vertex
 SAME_DIRECTION = 1.0 - 1e-6  # cosine of two normals
 INSIDE = -1e-6  # least barycentric coordinate
@@ -24,42 +25,47 @@ def carry_colours(surfaces: list[Surface], solid: Surface) -> Indices | None:
     if given.colours is None or _same_faces(given, solid):
         return given.colours
     painted = given.colours != NO_COLOUR
-    corners, colours = given.vertices[given.faces[painted]], given.colours[painted]
-    wanted = solid.vertices[solid.faces]
-    carried_colours = _same_corners(corners, colours, wanted)
-    rest = np.flatnonzero(carried_colours == NO_COLOUR)
-    if len(rest) and len(corners):
-        carried_colours[rest] = _pieces(corners, colours, wanted[rest])
-    return carried_colours
+    row = triangle_of(given.vertices[given.faces[painted]], solid.vertices[solid.faces])
+    return np.append(given.colours[painted], NO_COLOUR)[row]
+
+
+def triangle_of(corners: Floats, wanted: Floats) -> Indices:
+    """(m,) for (m, 3, 3) faces of a repaired solid which of (k, 3, 3) triangles of its file each is, or lies on with its middle;
+    NONE: it is none of them."""
+    row = _same_corners(corners, wanted)
+    rest, cut = np.flatnonzero(row == NONE), np.setdiff1d(np.arange(len(corners)), row)
+    if len(rest) and len(cut):  # what is there as a whole is there in no pieces
+        row[rest] = np.append(cut, NONE)[_pieces(corners[cut], wanted[rest])]
+    return row
 
 
 def _same_faces(given: Surface, solid: Surface) -> bool:
     return len(given.faces) == len(solid.faces) and np.array_equal(given.vertices[given.faces], solid.vertices[solid.faces])
 
 
-def _same_corners(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
-    """Colours of the triangles that have the corners of a painted one, in any order."""
+def _same_corners(corners: Floats, wanted: Floats) -> Indices:
+    """The first triangle that has the corners of each wanted one, in any order; NONE: there is none."""
     both = np.concatenate([corners, wanted]) + 0.0  # -0.0 and 0.0 are one place
     _, vertex_of = np.unique(both.reshape(-1, 3), axis=0, return_inverse=True)
     _, group = np.unique(np.sort(vertex_of.reshape(-1, 3), axis=1), axis=0, return_inverse=True)
     group = group.ravel()
-    by_group = np.full(len(both), NO_COLOUR, dtype=np.int64)
-    by_group[group[: len(corners)][::-1]] = colours[::-1]
+    by_group = np.full(len(both), NONE, dtype=np.int64)
+    by_group[group[: len(corners)][::-1]] = np.arange(len(corners))[::-1]
     matched: Indices = by_group[group[len(corners) :]]
     return matched
 
 
-def _pieces(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
-    """Colours of the triangles whose middle lies on a painted one, and that face the same way or the opposite."""
+def _pieces(corners: Floats, wanted: Floats) -> Indices:
+    """The triangle that the middle of each wanted one lies on, and that faces the same way or the opposite; NONE: none does."""
     both = np.concatenate([corners, wanted]).reshape(-1, 3)
     middle, size = (both.min(axis=0) + both.max(axis=0)) / 2.0, float(np.ptp(both, axis=0).max())
     near_mm = NEAR_SHARE * size
     order = np.argsort(corners[:, :, 0].min(axis=1), kind="stable")
-    corners, colours = corners[order] - middle, colours[order]
+    corners = corners[order] - middle
     wanted = wanted - middle
     normals, wanted_normals, middles = _normals(corners), _normals(wanted), wanted.mean(axis=1)
     nearest = np.full(len(wanted), np.inf)
-    colour_of = np.full(len(wanted), NO_COLOUR, dtype=np.int64)
+    triangle = np.full(len(wanted), NONE, dtype=np.int64)
     for rows, painted in _neighbours(corners, normals, middles, wanted_normals, size):
         away = np.abs(np.einsum("ij,ij->i", normals[painted], middles[rows] - corners[painted, 0]))
         parallel = np.abs(np.einsum("ij,ij->i", normals[painted], wanted_normals[rows])) > SAME_DIRECTION
@@ -69,8 +75,8 @@ def _pieces(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
         row, first = np.unique(rows[on], return_index=True)
         better = away[on[first]] < nearest[row]
         row, best = row[better], on[first[better]]
-        nearest[row], colour_of[row] = away[best], colours[painted[best]]
-    return colour_of
+        nearest[row], triangle[row] = away[best], order[painted[best]]
+    return triangle
 
 
 def _neighbours(

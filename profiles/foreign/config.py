@@ -7,6 +7,7 @@ written once.
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 NOTHING = ("", "nil")  # PrusaSlicer's filament overrides are nil where the printer's value holds
@@ -41,15 +42,13 @@ class Config:
 
     def number(self, key: str) -> float | None:
         """The number of a key; None where nothing is said, or a share, or no number."""
-        text = self.text(key)
-        return float(text) if text is not None and NUMBER.fullmatch(text) else None
+        return finite(self.text(key) or "")
 
     def share(self, key: str) -> float | None:
         """The percentage of a key as a share; None where it is none."""
         text = self.text(key)
-        if text is None or not text.endswith("%") or not NUMBER.fullmatch(text[:-1].strip()):
-            return None
-        return float(text[:-1]) / 100.0
+        percent = finite(text[:-1]) if text is not None and text.endswith("%") else None
+        return None if percent is None else percent / 100.0
 
     def flag(self, key: str) -> bool | None:
         """Whether a key is on."""
@@ -57,12 +56,20 @@ class Config:
         return None if text is None else text.lower() in ("1", "true", "yes")
 
 
+def finite(text: str) -> float | None:
+    """The number that a text is; None where it is none, or too large for one."""
+    stripped = text.strip()
+    number = float(stripped) if NUMBER.fullmatch(stripped) else None
+    return number if number is not None and isfinite(number) else None
+
+
 def width_of_nozzle(text: str, nozzle: str) -> str:
     """A line's width that is in percent of the nozzle, in mm, "0" where the nozzle is not told; any other as it is."""
-    if not text.strip().endswith("%"):
+    percent = finite(text.strip()[:-1]) if text.strip().endswith("%") else None
+    if percent is None:
         return text
-    diameter = first_of(nozzle)
-    return f"{float(text.strip()[:-1]) / 100.0 * float(diameter):g}" if diameter else "0"
+    diameter_mm = finite(first_of(nozzle))
+    return f"{percent / 100.0 * diameter_mm:g}" if diameter_mm is not None else "0"
 
 
 def first_of(text: str) -> str:

@@ -128,7 +128,7 @@ def density(spacing: str, line: str) -> Callable[[Config], float | None]:
     def convert(config: Config) -> float | None:
         gap, wide = config.number(spacing), width(auto=AUTO_NARROW)(config, line)
         high = config.number("layer_height")
-        if gap is None or high is None or isinstance(wide, Left) or not isinstance(wide.value, float):
+        if gap is None or gap < 0.0 or high is None or isinstance(wide, Left) or not isinstance(wide.value, float):
             return None
         pitch = wide.value - ROUND_ENDS * high
         return round(pitch / (pitch + gap), 4) if pitch > 0.0 else None

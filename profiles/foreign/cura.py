@@ -8,13 +8,15 @@ import configparser
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile, ZipInfo
+from zipfile import ZipFile, ZipInfo
 
-from profiles.errors import ProfileError, reason
-from profiles.foreign.config import NUMBER, Config, Entry
+from profiles.errors import ProfileError, first_line, reason
+from profiles.files import DAMAGED_ZIP
+from profiles.foreign.config import Config, Entry, finite
 
 PROGRAM = "Cura"
-PROJECT = re.compile(r"Cura/.*\.inst\.cfg$")  # members of a project that have a person's settings
+SLICER_FILE = re.compile(r"Cura/.*\.inst\.cfg$")  # members of a .3mf that have a person's settings
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, configparser.Error)
 MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
 PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
 KEYS = {
@@ -116,8 +118,8 @@ def of_values(values: Mapping[str, str], name: str = "") -> Config:
         elif own not in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
             key = KEYS.get(own, own)
             entries[key] = Entry(own, _said(key, text))
-    if NUMBER.fullmatch(values.get("support_angle", "")):  # Cura's is from the vertical
-        entries["support_material_threshold"] = Entry("support_angle", f"{90.0 - float(values['support_angle']):g}")
+    if (angle_deg := finite(values.get("support_angle", ""))) is not None:  # Cura's is from the vertical
+        entries["support_material_threshold"] = Entry("support_angle", f"{90.0 - angle_deg:g}")
     entries |= _raft(values)
     if "min_fan_speed" in entries:
         entries["fan_always_on"] = Entry(entries["min_fan_speed"].name, "1")
@@ -133,23 +135,26 @@ def _raft(values: Mapping[str, str]) -> dict[str, Entry]:
     if (kind := values.get("adhesion_type", "")) and not kind.startswith("="):
         layers = sum(_number(values.get(own, ""), usual) for own, usual in RAFT_LAYERS.items())
         entries["raft_layers"] = Entry("adhesion_type", f"{layers:g}" if kind == "raft" else "0")
-    if NUMBER.fullmatch(gap := values.get("raft_airgap", "")):
-        into_mm = _number(values.get("layer_0_z_overlap", ""), 0.5 * float(gap))
-        entries["raft_contact_distance"] = Entry("raft_airgap", f"{max(float(gap) - into_mm, 0.0):g}")
+    if (gap_mm := finite(values.get("raft_airgap", ""))) is not None:
+        into_mm = _number(values.get("layer_0_z_overlap", ""), 0.5 * gap_mm)
+        entries["raft_contact_distance"] = Entry("raft_airgap", f"{max(gap_mm - into_mm, 0.0):g}")
     return entries
 
 
 def _number(text: str, usual: float) -> float:
-    return float(text) if NUMBER.fullmatch(text) else usual
+    number = finite(text)
+    return usual if number is None else number
 
 
 def read_values(file: Path) -> tuple[Mapping[str, str], str]:
-    """The settings of all ini files of a profile, or of those that a project keeps, an extruder's over the print's and a person's
+    """The settings of all ini files of a profile, or of those in a .3mf of Cura, an extruder's over the print's and a person's
     own over all others, and its name. Raises ProfileError."""
     values, name = dict[str, str](), file.stem
     try:
         with ZipFile(file) as archive:
-            members = [member for member in archive.infolist() if file.suffix.lower() != ".3mf" or PROJECT.match(member.filename)]
+            members = [
+                member for member in archive.infolist() if file.suffix.lower() != ".3mf" or SLICER_FILE.match(member.filename)
+            ]
             for member in sorted(members, key=_precedence):
                 if member.file_size > MOST_BYTES:
                     raise ProfileError(
@@ -163,8 +168,8 @@ def read_values(file: Path) -> tuple[Mapping[str, str], str]:
                 values |= own if first else {}
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
-    except (BadZipFile, configparser.Error, UnicodeDecodeError, NotImplementedError, RuntimeError) as error:
-        raise ProfileError(f"profile {file}: is no profile of Cura ({str(error).splitlines()[0]})") from None
+    except DAMAGED as error:
+        raise ProfileError(f"profile {file}: is no profile of Cura ({first_line(error)})") from None
     return values, name
 
 
@@ -177,6 +182,6 @@ def _said(key: str, text: str) -> str:
     """A value as PrusaSlicer would say it."""
     if key in PERCENT and not text.endswith("%"):
         return f"{text}%"
-    if key == "extrusion_multiplier" and NUMBER.fullmatch(text):
-        return f"{float(text) / 100.0:g}"
+    if key == "extrusion_multiplier" and (percent := finite(text)) is not None:
+        return f"{percent / 100.0:g}"
     return WORDS.get(key, {}).get(text, text)

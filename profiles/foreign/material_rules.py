@@ -6,7 +6,7 @@ from profiles.foreign.config import Config
 from profiles.foreign.conversion import Convert, Converted, Left, Value, above_zero, number, share, whole
 
 FIRMWARE = "the firmware's own"
-ADVANCE = re.compile(r"^(?:M900 K|M572 (?:D\d+ )?S|SET_PRESSURE_ADVANCE (?:EXTRUDER=\S+ )?ADVANCE=)([0-9.]+)")
+ADVANCE = re.compile(r"^(?:M900 K|M572 (?:D\d+ )?S|SET_PRESSURE_ADVANCE (?:EXTRUDER=\S+ )?ADVANCE=)(\d+\.?\d*|\.\d+)(?![\d.])")
 BASES = {"PLA": "pla", "PETG": "petg", "PET": "petg", "ABS": "abs", "ASA": "abs", "TPU": "tpu", "FLEX": "tpu", "TPE": "tpu"}
 USUAL_BASE = "pla"
 

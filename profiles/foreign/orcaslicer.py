@@ -139,7 +139,7 @@ def of_values(values: Mapping[str, str], process: str = "", material: str = "") 
 
 
 def values_of(document: Mapping[str, Any]) -> dict[str, str]:
-    """The settings of a preset or a project as texts."""
+    """The settings of a preset or a slicer file as texts."""
     return {key: _text(value) for key, value in document.items() if key not in ABOUT}
 
 
@@ -195,7 +195,7 @@ def read_json(file: Path) -> Mapping[str, Any]:
         document = json.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ProfileError(f"profile {file}: is no JSON ({error})") from None
     if not isinstance(document, dict):
         raise ProfileError(f"profile {file}: is no table of settings")

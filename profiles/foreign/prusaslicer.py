@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from profiles.errors import ProfileError
-from profiles.foreign.config import Config, Entry, width_of_nozzle
+from profiles.foreign.config import Config, Entry, finite, width_of_nozzle
 
 KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # of a bundle's sections, and the options' names
 SECTION = re.compile(r"\[(.+)\]")
@@ -62,7 +62,7 @@ def _json_settings(block: str) -> dict[str, str]:
         document = json.loads("\n".join(line.removeprefix(";") for line in block.split("\n")))
         groups = [document["presets"].get(group, {}) for group in JSON_GROUPS]
         *of_print, of_filament = [{key: _json_text(value) for key, value in group.items()} for group in groups]
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ProfileError(
             f"prusaslicer_json_config is not as PrusaSlicer 3 writes it ({type(error).__name__}: {error})"
         ) from None
@@ -156,4 +156,5 @@ def _said(key: str, text: str, nozzle: str) -> str:
     """A value of SuperSlicer as PrusaSlicer would say it."""
     if key.endswith(OF_NOZZLE):
         return width_of_nozzle(text, nozzle)
-    return f"{float(text[:-1]) / 100.0:g}" if key in FLOWS and text.endswith("%") else text
+    percent = finite(text[:-1]) if key in FLOWS and text.endswith("%") else None
+    return text if percent is None else f"{percent / 100.0:g}"

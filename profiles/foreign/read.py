@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from zipfile import is_zipfile
 
 from profiles.errors import ProfileError, reason
+from profiles.files import is_zip
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
 from profiles.foreign.slicer_file import is_slicer_file, read_slicer_settings
@@ -23,8 +23,8 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     """
     try:
         if is_slicer_file(file):
-            return _of_project(file)
-        if is_zipfile(file):
+            return _of_slicer_file(file)
+        if is_zip(file):
             return cura.read_profile(file)
         content = _ends(file)
     except OSError as error:
@@ -49,7 +49,7 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     return config
 
 
-def _of_project(file: Path) -> Config:
+def _of_slicer_file(file: Path) -> Config:
     """The settings inside a slicer file. Raises ProfileError where it keeps none."""
     settings = read_slicer_settings(file)
     if not settings.values:

@@ -1,19 +1,19 @@
 """Slicer file: the settings inside a .3mf saved by PrusaSlicer, Bambu Studio, OrcaSlicer or Cura."""
 
 import json
-import lzma
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile, is_zipfile
+from zipfile import ZipFile
 
-from profiles.errors import ProfileError, reason
+from profiles.errors import ProfileError, first_line, reason
+from profiles.files import DAMAGED_ZIP, is_zip
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
 from profiles.foreign.imported import settings_of_place
 
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, ProfileError)
 MOST_BYTES = 16 << 20  # of the settings, which have some 100 kB
 OF_PRUSASLICER = ("metadata/slic3r_pe.config", "metadata/slic3r.config", "metadata/superslicer.config")
 OF_ORCASLICER = "metadata/project_settings.config"
@@ -40,7 +40,7 @@ class SlicerSettings:
 
 def is_slicer_file(file: Path) -> bool:
     """Whether a file may be one, by its name and kind."""
-    return file.suffix.lower() == ".3mf" and is_zipfile(file)
+    return file.suffix.lower() == ".3mf" and is_zip(file)
 
 
 def read_slicer_settings(file: Path) -> SlicerSettings:
@@ -62,8 +62,8 @@ def read_slicer_settings(file: Path) -> SlicerSettings:
                 return SlicerSettings({}, prusaslicer.of_gcode)
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
-    except (BadZipFile, zlib.error, lzma.LZMAError, EOFError, ValueError, NotImplementedError, RuntimeError) as error:
-        raise ProfileError(f"profile {file}: its settings are damaged ({str(error).splitlines()[0]})") from None
+    except DAMAGED as error:
+        raise ProfileError(f"profile {file}: its settings are damaged ({first_line(error)})") from None
     kept = any(name.startswith(OF_CURA) for name in entries)
     return SlicerSettings(cura.read_values(file)[0] if kept else {}, cura.of_values)
 

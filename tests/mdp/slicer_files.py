@@ -1,4 +1,4 @@
-"""Project files as PrusaSlicer, Bambu Studio and OrcaSlicer write them, made of solids whose union is known."""
+"""Slicer files as PrusaSlicer, Bambu Studio and OrcaSlicer write them, made of solids whose union is known."""
 
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -53,7 +53,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Object:
-    """An object of a project, its instances and the settings of all of it."""
+    """An object of a slicer file, its instances and the settings of all of it."""
 
     volumes: Sequence[Made]
     instances: Sequence[Placed]

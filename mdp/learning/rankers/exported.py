@@ -11,7 +11,7 @@ from mdp.learning.labels import RatedList
 from mdp.learning.ndcg import Scores
 from mdp.mesh import Floats
 from mdp.ranking.network import INPUT, OUTPUT
-from profiles.errors import LearningError
+from profiles.errors import LearningError, first_line
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ def read_ranker(file: Path) -> Exported:
     except OSError as error:
         raise LearningError(f"ranker {file}: cannot be read ({error.strerror})") from None
     except Exception as error:  # noqa: BLE001 - onnx and protobuf have errors of many kinds
-        raise LearningError(f"ranker {file}: is no ONNX file ({str(error).splitlines()[0]})") from None
+        raise LearningError(f"ranker {file}: is no ONNX file ({first_line(error)})") from None
     about = {entry.key: entry.value for entry in model.metadata_props}
     if "features" not in about or [entry.name for entry in model.graph.input] != [INPUT] or OUTPUT not in graph.output_names:
         raise LearningError(f"ranker {file}: is an ONNX file of something else; input {INPUT!r}, output {OUTPUT!r} are needed")

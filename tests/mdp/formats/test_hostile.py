@@ -34,7 +34,7 @@ def test_a_few_hundred_bytes_place_no_thousands_of_meshes(tmp_path: Path) -> Non
 def test_a_package_of_nothing_but_elements_is_refused_before_it_is_parsed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(threemf, "MOST_MARKS", 1000)
+    monkeypatch.setattr(threemf, "MOST_ELEMENTS", 1000)
     objects = {1: files.threemf_mesh(files.placed(5, 5, 5))}
     path = files.threemf(tmp_path / "a.3mf", objects, '<item objectid="1"/>' + "<a/>" * 1000)
     with zipfile.ZipFile(path) as archive:

@@ -1,4 +1,4 @@
-"""Project files of other slicers: what is printed of them, on which plate, and what their other volumes become."""
+"""Slicer files: what is printed of them, on which plate, and what their other volumes become."""
 
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -8,6 +8,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.formats.readers import READERS
 from mdp.mesh import Floats, Mesh
 from mdp.read import read_model
 from mdp.zone import MeshVolume, Zone, faces_of
@@ -54,7 +55,7 @@ def drawn(rng: np.random.Generator, plates: int) -> list[Object]:
 
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("seed", range(30))
-def test_what_is_read_is_what_the_project_was_made_of(tmp_path: Path, dialect: str, seed: int) -> None:
+def test_what_is_read_is_what_the_slicer_file_was_made_of(tmp_path: Path, dialect: str, seed: int) -> None:
     rng = np.random.default_rng([seed, len(dialect)])
     plates = int(rng.integers(1, 4)) if dialect == "bambu" else 1
     objects = drawn(rng, plates)
@@ -164,6 +165,36 @@ def test_settings_between_two_heights_count_from_the_lowest_point_of_their_objec
     np.testing.assert_allclose(corners, [(34.0, -16.0, 7.0), (66.0, 16.0, 10.0)], atol=1e-9)
 
 
+@pytest.mark.parametrize("rotate_deg", [(0.0, 0.0, 0.0), (30.0, 20.0, 10.0)])
+@pytest.mark.parametrize(
+    ("between", "span_mm"),
+    [
+        (("0", "1e200"), (0.0, 21.0)),
+        (("-1e200", "5"), (0.0, 5.0)),
+        (("0", "1e-10"), None),
+        (("8", "5"), None),
+        (("-5", "0"), None),
+        (("20", "1e200"), None),
+        (("0", "1e-300"), None),
+    ],
+)
+def test_a_height_range_ends_just_above_its_object_and_one_that_holds_nothing_is_left_out(
+    tmp_path: Path, between: tuple[str, str], span_mm: tuple[float, float] | None, rotate_deg: tuple[float, float, float]
+) -> None:
+    option = '<option opt_key="perimeters">6</option>'
+    ranges = f'<objects><object id="1"><range min_z="{between[0]}" max_z="{between[1]}">{option}</range></object></objects>'
+    further = {"Metadata/Prusa_Slicer_layer_config_ranges.xml": ranges}
+    model = read_model(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [AT_ORIGIN])], further), rotate_deg=rotate_deg)
+    if span_mm is None:
+        assert model.zones.modifiers == ()
+        assert "is left out: it holds nothing of its object, which is 20 mm tall" in model.notes[0]
+        return
+    (modifier,) = model.zones.modifiers
+    assert isinstance(modifier.volume, Zone)
+    sizes = np.sort(np.subtract(modifier.volume.max_mm, modifier.volume.min_mm))
+    np.testing.assert_allclose(sizes, np.sort([32.0, 32.0, span_mm[1] - span_mm[0]]), atol=1e-9)
+
+
 def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
     beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 10.0]]))
     wide = m3.Manifold.cube((100.0, 5.0, 5.0), True)
@@ -172,7 +203,7 @@ def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
     assert (modifier.volume.min_mm[0], modifier.volume.max_mm[0]) == (-35.0, -5.0)  # no farther than its own object
 
 
-def test_older_projects_name_a_modifier_by_a_key(tmp_path: Path) -> None:
+def test_older_slicer_files_name_a_modifier_by_a_key(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "modifier", {"perimeters": "4"})], [AT_ORIGIN])])
     change(path, "Metadata/Slic3r_PE_model.config", 'key="volume_type" value="ParameterModifier"', 'key="modifier" value="1"')
     model = read_model(path)
@@ -210,6 +241,12 @@ def test_a_negative_volume_inside_leaves_a_void(tmp_path: Path) -> None:
     assert mesh.volume_mm3 < BLOCK.volume() - 480.0
 
 
+def test_the_family_of_readers_tells_parts_of_a_slicer_file_from_negative_volumes(tmp_path: Path) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "negative")], [AT_ORIGIN])])
+    (built,) = READERS[".3mf"](path, None).objects
+    assert [volume.role.kind for volume in built.volumes] == ["part", "negative volume"]
+
+
 def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -> None:
     long = m3.Manifold.cube((200.0, 5.0, 5.0), True)
     beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 10.0]]))
@@ -217,7 +254,7 @@ def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -
     assert read_model(prusaslicer(tmp_path / "a.3mf", objects)).mesh.volume_mm3 == pytest.approx(36000.0 - 30.0 * 25.0)
 
 
-def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
+def test_a_slicer_file_says_which_plate_is_taken_and_refuses_one_that_is_not_there(tmp_path: Path) -> None:
     at = [Placed(np.vstack([np.eye(3), [100.0 * plate, 0.0, 20.0]]), plate, plate != 1) for plate in (1, 2, 3)]
     objects = [Object([Made(BLOCK)], at[:2]), Object([Made(BOX)], at[2:])]
     path = bambu(tmp_path / "a.3mf", objects, np.random.default_rng(0))
@@ -241,7 +278,7 @@ def test_a_project_says_which_plate_is_taken_and_refuses_one_that_is_not_there(t
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_what_lies_below_the_plate_of_a_project_is_not_printed(tmp_path: Path, dialect: str) -> None:
+def test_what_lies_below_the_plate_of_a_slicer_file_is_not_printed(tmp_path: Path, dialect: str) -> None:
     sunk = Placed(np.vstack([np.eye(3), [0.0, 0.0, 6.0]]))
     model = read_model(written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK), Made(BOX, "support")], [sunk])]))
     check(model.mesh, BLOCK.trim_by_plane((0.0, 0.0, 1.0), -6.0))
@@ -259,7 +296,7 @@ def test_objects_that_are_no_models_are_left_out(tmp_path: Path, kind: str) -> N
     assert model.notes == (f"leaves out object pole, an object of type {kind}, which is not printed",)
 
 
-def test_a_project_that_prints_nothing_is_refused(tmp_path: Path) -> None:
+def test_a_slicer_file_that_prints_nothing_is_refused(tmp_path: Path) -> None:
     hidden = Placed(AT_ORIGIN.transform, printable=False)
     assert files.refusal(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [hidden])])) == (
         "its build places no mesh that is printed: it leaves out object b, which is switched off in its slicer"
@@ -287,10 +324,31 @@ CONFIG = "Metadata/Slic3r_PE_model.config"
         ("_rels/.rels", "3dmodel.model", "other.model", "its part 3D/other.model is missing or malformed"),
     ],
 )
-def test_a_damaged_project_is_refused_with_a_sentence(tmp_path: Path, part: str, old: str, new: str, words: str) -> None:
+def test_a_damaged_slicer_file_is_refused_with_a_sentence(tmp_path: Path, part: str, old: str, new: str, words: str) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "negative")], [AT_ORIGIN])])
     change(path, part, old, new)
     assert words in files.refusal(path)
+
+
+@pytest.mark.parametrize("text", ["", "[", "[" * 100_000, "[1]"])
+def test_damaged_settings_leave_a_sound_mesh_readable_with_a_note(tmp_path: Path, text: str) -> None:
+    objects = [Object([Made(BLOCK), Made(BOX, "modifier", {"wall_loops": "4"})], [AT_ORIGIN], {"wall_loops": "3"})]
+    model = read_model(written(tmp_path / "a.3mf", "bambu", objects, further={"Metadata/project_settings.config": text}))
+    check(model.mesh, BLOCK)
+    assert model.zones.modifiers == ()
+    (note,) = model.notes
+    assert note.startswith("its settings are damaged (")
+    assert note.endswith("): those of its objects, modifiers and height ranges are left out")
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_mark_farther_than_any_number_is_left_out_without_warnings(tmp_path: Path) -> None:
+    far = from_manifold(BOX).vertices[0, 0]
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "support")], [AT_ORIGIN])])
+    change(path, "3D/3dmodel.model", f'x="{float(far)!r}"', 'x="1e200"')
+    model = read_model(path)
+    assert model.zones.support == ()
+    assert "it is left out" in model.notes[0]
 
 
 def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None:
@@ -330,6 +388,61 @@ def test_whole_triangles_that_are_painted_are_marked_wherever_the_model_lies(
         "paint against support on 1 of its triangles is taken as [[no_support]]",
         "paint for support on 1 of its triangles is taken as [[support]]",
     ]
+
+
+def paint(path: Path, rows: Sequence[int], attributes: str) -> None:
+    """Give some triangles of the model part attributes."""
+    part = "3D/3dmodel.model"
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read(part).decode()
+    pieces = text.split("<triangle ")
+    change(
+        path, part, text, "<triangle ".join(f"{attributes} {piece}" if k - 1 in rows else piece for k, piece in enumerate(pieces))
+    )
+
+
+@pytest.mark.parametrize("rotate_deg", [(0.0, 0.0, 0.0), (30.0, 20.0, 10.0)])
+@pytest.mark.parametrize("second", ["part", "negative"])
+def test_paint_follows_what_is_left_of_a_face_and_a_note_counts_what_is_lost(
+    tmp_path: Path, second: str, rotate_deg: tuple[float, float, float]
+) -> None:
+    pole, seed = (
+        m3.Manifold.cube((10.0, 8.0, 40.0), True).translate((3.1, 2.3, 0.0)),
+        BOX.scale((0.1, 0.1, 0.1)).translate((-9, 0, 0)),
+    )
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(seed), Made(pole, second)], [AT_ORIGIN])])
+    top = np.flatnonzero(from_manifold(BLOCK).normals[:, 2] > 0.9)
+    paint(path, [*top, *range(12, 24)], 'slic3rpe:custom_supports="4"')
+    model = read_model(path, rotate_deg=rotate_deg)
+    (zone,) = model.zones.support
+    assert not isinstance(zone, Zone)
+    assert model.mesh.areas_mm2[faces_of(model.mesh, zone)].sum() == pytest.approx(30.0 * 30.0 - 10.0 * 8.0)
+    lost = "12 others are not on the surface of what is printed"
+    assert f"paint for support on 2 of its triangles is taken as [[support]]; {lost}" in model.notes
+
+
+def test_paint_on_nothing_that_is_printed_is_left_out_with_a_note(tmp_path: Path) -> None:
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX.scale((0.1, 0.1, 0.1)))], [AT_ORIGIN])])
+    paint(path, [12], 'paint_seam="8"')
+    model = read_model(path)
+    assert model.zones.no_seam == ()
+    assert "paint against seams is left out: its 1 triangle is not on the surface of what is printed" in model.notes
+
+
+@pytest.mark.parametrize(("second", "deep_mm"), [("negative", 0.0), ("part", 4.0), ("part", 0.0)])
+def test_colours_follow_what_negative_volumes_and_the_plate_leave_of_their_faces(
+    tmp_path: Path, second: str, deep_mm: float
+) -> None:
+    pole = m3.Manifold.cube((10.0, 8.0, 40.0), True).translate((3.1, 2.3, 20.0))
+    at = Placed(np.vstack([np.eye(3), [0.0, 0.0, 10.0 - deep_mm]]))
+    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(pole, second)], [at])])
+    top = np.flatnonzero(from_manifold(BLOCK).normals[:, 2] > 0.9)
+    paint(path, top, 'pid="9" p1="0"')
+    group = '<basematerials id="9"><base name="red" displaycolor="#FF0000"/></basematerials>'
+    change(path, "3D/3dmodel.model", "<resources>", f"<resources>{group}")
+    mesh = read_model(path).mesh
+    assert mesh.colours is not None
+    assert mesh.areas_mm2[mesh.colours == 0xFF0000].sum() == pytest.approx(30.0 * 30.0 - 10.0 * 8.0)
 
 
 def test_colours_painted_on_triangles_are_told(tmp_path: Path) -> None:

@@ -1,8 +1,11 @@
 """What numbers of other slicers mean here."""
 
+from collections.abc import Callable, Mapping
+
 import pytest
 
 from profiles.errors import ProfileError
+from profiles.foreign import orcaslicer, prusaslicer
 from profiles.foreign.config import Config, Entry
 from profiles.foreign.imported import imported, stay, unused
 from profiles.foreign.process_rules import RULES
@@ -90,6 +93,11 @@ def test_a_filament_setting_becomes_ours(values: dict[str, str], key: str, value
         ({"external_perimeter_speed": "50%"}, "perimeter_speed, which the file does not tell"),
         ({"layer_height": "9"}, "a number from"),
         ({"layer_height": "thin"}, "is no number"),
+        ({"perimeters": "1e999"}, "is no number"),
+        (
+            {"support_material_spacing": "-0.4", "support_material_extrusion_width": "0.4", "layer_height": "1e-9"},
+            "needs a width",
+        ),
     ],
 )
 def test_what_cannot_be_said_here_is_left_with_the_reason(values: dict[str, str], why: str) -> None:
@@ -107,6 +115,29 @@ def test_pressure_advance_on_a_condition_is_left_to_the_person() -> None:
     block = '"{if nozzle_diameter[0]==0.4}M900 K0.05{endif}"'
     (row,) = imported(config(start_filament_gcode=block), "material").rows
     assert "on a condition" in row.how
+
+
+def test_pressure_advance_that_is_no_number_is_left() -> None:
+    (row,) = imported(config(start_filament_gcode='"M900 K0.05.1"'), "material").rows
+    assert not row.taken
+
+
+@pytest.mark.parametrize(
+    ("made", "values", "key"),
+    [
+        (orcaslicer.of_values, {"line_width": "thick%", "nozzle_diameter": "0.4"}, "extrusion_width"),
+        (orcaslicer.of_values, {"line_width": "110%", "nozzle_diameter": "fine"}, "extrusion_width"),
+        (
+            prusaslicer.of_gcode,
+            {"extrusion_spacing": "", "perimeter_extrusion_spacing": "", "bridge_flow_ratio": "%"},
+            "bridge_flow_ratio",
+        ),
+    ],
+)
+def test_a_percentage_without_a_number_says_no_number(
+    made: Callable[[Mapping[str, str]], Config], values: dict[str, str], key: str
+) -> None:
+    assert not made(values).number(key)
 
 
 def test_a_filament_s_kind_chooses_the_material_below_it() -> None:

@@ -1,8 +1,10 @@
 """Files of other slicers, told by what is in them."""
 
 import json
+import struct
+from collections.abc import Callable
 from pathlib import Path
-from zipfile import ZipFile
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 
@@ -229,3 +231,67 @@ def test_a_zip_of_something_else_is_refused(tmp_path: Path) -> None:
         archive.writestr("x", "no ini at all")
     with pytest.raises(ProfileError, match="is no profile of Cura"):
         read_config(file)
+
+
+def flipped(file: Path, member: str, text: str) -> Path:
+    """A zip of one member, the first bytes of whose deflated content are wrong."""
+    with ZipFile(file, "w", ZIP_DEFLATED) as archive:
+        archive.writestr(member, text)
+    content, begin = bytearray(file.read_bytes()), 30 + len(member)
+    content[begin : begin + 6] = bytes(byte ^ 0xFF for byte in content[begin : begin + 6])
+    file.write_bytes(content)
+    return file
+
+
+def cut_short(file: Path, member: str, text: str) -> Path:
+    """A zip of one stored member that says to be 100 kB longer than the file has bytes."""
+    with ZipFile(file, "w") as archive:
+        archive.writestr(member, text)
+    content = bytearray(file.read_bytes())
+    entry = content.rindex(b"PK\x01\x02")
+    struct.pack_into("<II", content, entry + 20, len(text) + 100_000, len(text) + 100_000)
+    file.write_bytes(content)
+    return file
+
+
+def on_many_disks(file: Path, member: str, text: str) -> Path:
+    """A zip whose 64-bit directory is on the second of two disks."""
+    with ZipFile(file, "w") as archive:
+        archive.writestr(member, text)
+    content = file.read_bytes()
+    end = content.rindex(b"PK\x05\x06")
+    file.write_bytes(content[:end] + struct.pack("<4sIQI", b"PK\x06\x07", 1, end, 2) + content[end:])
+    return file
+
+
+@pytest.mark.parametrize("damaged", [flipped, cut_short, on_many_disks])
+@pytest.mark.parametrize(
+    ("name", "member"),
+    [
+        ("x.curaprofile", "mine"),
+        ("x.3mf", "Cura/a_user.inst.cfg"),
+        ("x.3mf", "Metadata/Slic3r_PE.config"),
+        ("x.3mf", "Metadata/project_settings.config"),
+    ],
+)
+def test_settings_in_a_damaged_zip_are_refused_in_one_sentence(
+    tmp_path: Path, damaged: Callable[[Path, str, str], Path], name: str, member: str
+) -> None:
+    file = damaged(tmp_path / name, member, "[general]\nversion = 4\n[values]\nwall_line_count = 3\n" * 9)
+    with pytest.raises(ProfileError, match=r"x\.\w+: (is no profile of Cura|its settings are damaged) \(.+\)$"):
+        read_config(file)
+
+
+def test_json_without_end_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    block = f"; prusaslicer_json_config = begin\n; {'[' * 100_000}\n; prusaslicer_json_config = end\n"
+    for name, text in (("print.gcode", block), ("preset.json", '{"a": ' + "[" * 100_000)):
+        with pytest.raises(ProfileError, match=rf"^profile .*{name}: .*recursion"):
+            read_config(written(tmp_path, name, text))
+
+
+def test_json_in_a_slicer_file_that_is_not_as_prusaslicer_writes_it_is_refused_by_the_file_s_name(tmp_path: Path) -> None:
+    with ZipFile(tmp_path / "x.3mf", "w") as archive:
+        block = "; prusaslicer_json_config = begin\n; {}\n; prusaslicer_json_config = end\n"
+        archive.writestr("Metadata/Slic3r_PE.config", block)
+    with pytest.raises(ProfileError, match=r"^profile .*x\.3mf: its settings are damaged \(prusaslicer_json_config is not"):
+        read_config(tmp_path / "x.3mf")
