@@ -1,5 +1,6 @@
 """Marks: the modifiers, support enforcers and support blockers of a slicer file, as modifiers and marks of a plan."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
 SAME = 1e-6  # cosine of a right angle, and share of a box's size by which its corners may lie off
+PLURAL = {"is": "are", "changes": "change"}
 MOST_TOLD = 8  # settings in a sentence
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
@@ -54,6 +56,7 @@ class _Marks:
         self._objects, self._several = build.objects, sum(bool(own.surfaces(PART)) for own in build.objects) > 1
         self._path, self._linear, self._shift_mm, self._on_plate = path, linear, shift_mm, build.on_plate
         self._notes: list[str] = []
+        self._subjects: dict[tuple[str, str], list[str]] = {}  # of notes, by what is said of each
 
     @cached_property
     def _settings(self) -> "SlicerSettings":
@@ -64,6 +67,7 @@ class _Marks:
 
     def zones(self) -> tuple[Zones, list[str]]:
         """All marks and a sentence for each."""
+        painted: Counter[str] = Counter()
         modifiers, kinds = list[Modifier](), {kind: list[AnyZone]() for kind in ("no_seam", "no_support", "support")}
         for own in self._objects:
             modifiers += self._of_object(own) if own.surfaces(PART) else ()
@@ -75,17 +79,22 @@ class _Marks:
                     modifiers += [] if place is None else [Modifier(place, process)]
                 elif role.kind in MARKED and (place := self._place(volume, own)) is not None:
                     kinds[MARKED[role.kind]].append(place)
-                    self._notes.append(f"{_named(role)} is taken as [[{MARKED[role.kind]}]]")
+                    self._tell(_named(role), "is", f"taken as [[{MARKED[role.kind]}]]")
                 elif role.kind in PAINTED:
                     corners_mm = volume.surface.vertices[volume.surface.faces]
                     kinds[PAINTED[role.kind]].append(Triangles(self._moved(corners_mm)))
-                    self._notes.append(f"{role.kind} on {len(corners_mm)} of its triangles is taken as [[{PAINTED[role.kind]}]]")
-        return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), self._notes
+                    painted[role.kind] += len(corners_mm)
+        told = [_sentence(subjects, *predicate) for predicate, subjects in self._subjects.items()]
+        told += [f"{kind} on {count} of its triangles is taken as [[{PAINTED[kind]}]]" for kind, count in painted.items()]
+        return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), [*self._notes, *told]
+
+    def _tell(self, subject: str, verb: str, rest: str) -> None:
+        self._subjects.setdefault((verb, rest), []).append(subject)
 
     def _of_object(self, own: BuildObject) -> Iterator[Modifier]:
         """The settings of an object and those between two heights of it."""
         low, high = _bounds(own) + np.array([[-BESIDE_MM], [BESIDE_MM]])
-        if own.settings and (process := self._process("the object", own.settings)):
+        if own.settings and (process := self._process(f"object {own.name!r}" if own.name else "the object", own.settings)):
             yield Modifier(self._box(low, high), process)
         for least, most, settings in own.heights:
             process = self._process(f"the height range {least:g} to {most:g} mm", settings)
@@ -98,7 +107,7 @@ class _Marks:
         process, left = self._settings.of_place(settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
         rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
-        self._notes.append(f"{what} " + (f"is taken as [[modifier]]: {taken}" if taken else "changes nothing here") + rest)
+        self._tell(what, *(("is", f"taken as [[modifier]]: {taken}{rest}") if taken else ("changes", f"nothing here{rest}")))
         return process
 
     def _place(self, volume: BuildVolume, own: BuildObject) -> Volume | None:
@@ -128,6 +137,13 @@ class _Marks:
     def _moved(self, places: Floats) -> Floats:
         moved: Floats = places @ self._linear.T + self._shift_mm
         return moved
+
+
+def _sentence(subjects: Sequence[str], verb: str, rest: str) -> str:
+    """What is said of one subject, or of the first and how many more."""
+    if len(subjects) == 1:
+        return f"{subjects[0]} {verb} {rest}"
+    return f"{subjects[0]} and {len(subjects) - 1} more {PLURAL[verb]} {rest}"
 
 
 def _named(role: Role) -> str:
