@@ -6,6 +6,7 @@ from zipfile import ZipFile
 import pytest
 
 from profiles.foreign.cura import of_values
+from profiles.foreign.material_rules import base_of
 from profiles.foreign.slicer_file import read_slicer_settings
 
 MATERIAL = """<fdmmaterial xmlns="http://www.ultimaker.com/material">
