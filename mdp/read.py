@@ -85,7 +85,7 @@ def read_model(
     left_out = (note for surface in surfaces for note in surface.notes)
     size = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
     notes = (*build.notes, *taken, *mark_notes, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
-    return ReadModel(mesh, notes, zones, {own.number: own.name for own in build.plates})
+    return ReadModel(mesh, tuple(dict.fromkeys(notes)), zones, {own.number: own.name for own in build.plates})
 
 
 def read_in_place(path: Path) -> Mesh:

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
 SAME = 1e-6  # cosine of a right angle, and share of a box's size by which its corners may lie off
+PLURAL = {"is": "are", "changes": "change"}
 MOST_TOLD = 8  # settings in a sentence
 THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
@@ -58,6 +59,7 @@ class _Marks:
         self._corners_mm = mesh.vertices[mesh.faces]
         self._path, self._scale, self._turn, self._shift_mm, self._on_plate = path, scale, turn, shift_mm, build.on_plate
         self._notes: list[str] = []
+        self._subjects: dict[tuple[str, str], list[str]] = {}  # of notes, by what is said of each
 
     @cached_property
     def _settings(self) -> "SlicerSettings | None":
@@ -85,18 +87,22 @@ class _Marks:
                     modifiers += [] if place is None else [Modifier(place, process)]
                 elif role.kind in MARKED and (place := self._place(volume, own)) is not None:
                     kinds[MARKED[role.kind]].append(place)
-                    self._notes.append(f"{_named(role)} is taken as [[{MARKED[role.kind]}]]")
+                    self._tell(_named(role), "is", f"taken as [[{MARKED[role.kind]}]]")
                 elif role.kind in PAINTED:
                     painted.setdefault(role.kind, []).append(self._moved(volume.surface.vertices[volume.surface.faces]))
         for kind, corners_mm in painted.items():
             kinds[PAINTED[kind]] += self._painted(kind, np.concatenate(corners_mm))
-        return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), self._notes
+        told = [_sentence(subjects, *predicate) for predicate, subjects in self._subjects.items()]
+        return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), [*told, *self._notes]
+
+    def _tell(self, subject: str, verb: str, rest: str) -> None:
+        self._subjects.setdefault((verb, rest), []).append(subject)
 
     def _of_object(self, own: BuildObject) -> Iterator[Modifier]:
         """The settings of an object and those between two heights of it."""
         lowest, highest = _bounds(own)
         low, high = lowest - BESIDE_MM, highest + BESIDE_MM
-        if own.settings and (process := self._process("the object", own.settings)):
+        if own.settings and (process := self._process(f"object {own.name!r}" if own.name else "the object", own.settings)):
             yield Modifier(self._box(low, high), process)
         base = max(lowest[2], 0.0) if self._on_plate else lowest[2]
         tall_mm = highest[2] - base
@@ -115,7 +121,7 @@ class _Marks:
         process, left = self._settings.of_place(settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
         rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
-        self._notes.append(f"{what} " + (f"is taken as [[modifier]]: {taken}" if taken else "changes nothing here") + rest)
+        self._tell(what, *(("is", f"taken as [[modifier]]: {taken}{rest}") if taken else ("changes", f"nothing here{rest}")))
         return process
 
     def _painted(self, kind: str, corners_mm: Floats) -> list[Triangles]:
@@ -162,6 +168,13 @@ class _Marks:
     def _moved(self, places: Floats) -> Floats:
         moved: Floats = (places * self._scale) @ self._turn.T + self._shift_mm  # rounded as the solid is
         return moved
+
+
+def _sentence(subjects: Sequence[str], verb: str, rest: str) -> str:
+    """What is said of one subject, or of the first and how many more."""
+    if len(subjects) == 1:
+        return f"{subjects[0]} {verb} {rest}"
+    return f"{subjects[0]} and {len(subjects) - 1} more {PLURAL[verb]} {rest}"
 
 
 def _named(role: Role) -> str:

@@ -17,7 +17,7 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
 
     Raises MeshError where nothing is left, and for a negative volume that is no solid.
     """
-    surfaces, notes = list[Surface](), list[str]()
+    surfaces, notes, subtracted = list[Surface](), list[str](), 0
     for own in build.objects:
         parts, negatives = own.surfaces(PART), [volume for volume in own.volumes if volume.role.kind == NEGATIVE]
         deep_mm = -min((float(part.vertices[part.faces.ravel(), 2].min()) for part in parts), default=0.0)
@@ -28,13 +28,14 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
         left, repairs = repair(parts)
         if negatives:
             left = subtract(left, [solid_of_volume(volume) for volume in negatives])
-            repairs.append(f"subtracted {len(negatives)} negative volume{'s' * (len(negatives) > 1)}")
+            subtracted += len(negatives)
         if sinks:
             left = above(left, 0.0)
             repairs.append(f"leaves out what lies below the plate, {deep_mm:.3g} mm deep")
         left = Surface(left.vertices, left.faces, carry_colours(parts, left))
         notes += [*repairs, *([] if len(left.faces) else ["nothing is left of one of its objects"])]
         surfaces += [left] if len(left.faces) else []
+    notes += [f"subtracted {subtracted} negative volume{'s' * (subtracted > 1)}"] if subtracted else []
     if not surfaces:
         raise MeshError("nothing is left of it: negative volumes or the plate cut all of it away")
     return surfaces, notes

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from math import isfinite
 from xml.etree.ElementTree import Element
 
+from mdp.formats.painted import AGAINST, FOR
 from mdp.formats.surface import Surface
 
 PART, NEGATIVE, MODIFIER, SUPPORT, NO_SUPPORT = "part", "negative volume", "modifier", "support enforcer", "support blocker"
-# Kinds that are triangles of a part, by what they are painted for and the digit of a whole triangle that is painted so: 4
-# enforces, 8 blocks; more digits tell of a triangle that is painted in part (PrusaSlicer, src/libslic3r/TriangleSelector.cpp).
+# Kinds that are triangles of a part, by what they are painted for and with which paint.
 PAINT_SUPPORT, PAINT_NO_SUPPORT, PAINT_NO_SEAM = "paint for support", "paint against support", "paint against seams"
-PAINTS = {("support", "4"): PAINT_SUPPORT, ("support", "8"): PAINT_NO_SUPPORT, ("seams", "8"): PAINT_NO_SEAM}
+PAINTS = {("support", FOR): PAINT_SUPPORT, ("support", AGAINST): PAINT_NO_SUPPORT, ("seams", AGAINST): PAINT_NO_SEAM}
 VOLUME_TYPES = {  # PrusaSlicer's, then those of Bambu Studio and OrcaSlicer
     "ModelPart": PART,
     "NegativeVolume": NEGATIVE,
@@ -84,11 +84,12 @@ class BuildVolume:
 
 @dataclass(frozen=True, eq=False)
 class BuildObject:
-    """An object on the plate: its volumes, the settings of them all, and those between two heights above its lowest point."""
+    """An object on the plate: its volumes, the settings of them all and those between two heights above its lowest point."""
 
     volumes: Sequence[BuildVolume]
     settings: Mapping[str, str] = field(default_factory=dict)
     heights: Sequence[tuple[float, float, Mapping[str, str]]] = ()
+    name: str = ""
 
     def surfaces(self, kind: str) -> list[Surface]:
         """The surfaces of a kind of volume."""

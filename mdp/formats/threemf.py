@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from mdp.formats.painted import painted_shares
 from mdp.formats.slicer_file import (
     PAINTS,
     PART,
@@ -42,6 +43,7 @@ MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 EXTENSION = re.compile(r"3dmanufacturing/([a-z]+)/\d{4}")  # its name in its namespace
 EXTENSIONS = {"core", "production", "material", "trianglesets"}  # that change no shape beyond what is read here
 PLAIN = "the program that made the file can export plain triangles"
+GCODE_ONLY = "nothing but G-code of a sliced plate: save the project in its slicer (File, Save Project) instead"
 NOT_PRINTED = ("support", "solidsupport", "other")  # types of objects
 PRUSASLICER = ("metadata/slic3r_pe_model.config", "metadata/slic3r_model.config", "metadata/superslicer_model.config")
 BAMBU = "metadata/model_settings.config"
@@ -56,6 +58,7 @@ NOT_TAKEN = {  # parts of a package, and what they would change
         "its pauses and changes of filament at heights are not taken: --pause, --filament-change",
     ),
 }
+TAKEN_PAINT = "paints for and against support and against seams"
 PAINTED = {  # attributes of triangles, and what they would change
     "support": ("paint_supports", "slic3rpe:custom_supports"),
     "seams": ("paint_seam", "slic3rpe:custom_seam"),
@@ -93,6 +96,10 @@ class Package:
         """The entry that holds a part, whose names know no case (Open Packaging Conventions, 6.2.2.3); None: there is none."""
         wanted, entries = unquote(name).lstrip("/"), self.archive.namelist()
         return wanted if wanted in entries else next((own for own in entries if own.lower() == wanted.lower()), None)
+
+    def sliced(self) -> bool:
+        """Whether it keeps the G-code of a plate."""
+        return any(name.lower().endswith(".gcode") for name in self.archive.namelist())
 
     def content(self, name: str) -> bytes:
         """The bytes of a part; raises MeshError when it is missing or too large."""
@@ -194,6 +201,7 @@ class _Builder:
         self._notes: list[str] = []
         self._plates: list[Plate] = []  # that hold something that is printed
         self._unpainted: Counter[str] = Counter()
+        self._in_part = 0  # triangles that count as painted
         self._placed = self._meshes = self._faces = 0
         objects = package.model(self._start).root.findall("{*}resources/{*}object")
         if not self._configs.parts:
@@ -206,13 +214,17 @@ class _Builder:
         items = self._items(package.model(self._start).root.findall("{*}build/{*}item"), plate)
         built = [own for item in items if (own := self._object(item)) is not None]
         if not any(own.surfaces(PART) for own in built):
-            raise MeshError(f"{self._path}: its build places no mesh" + (f" that is printed: it {notes[0]}" if notes else ""))
+            why = f" that is printed: it {notes[0]}" if notes else f", it keeps {GCODE_ONLY}" if package.sliced() else ""
+            raise MeshError(f"{self._path}: its build places no mesh{why}")
         notes += [
             f"{count} triangle{'s' * (count > 1)} painted for {what} {'are' if count > 1 else 'is'} not taken"
-            + (": only whole ones are, for and against support and against seams" if what in ("support", "seams") else "")
+            + (f": only {TAKEN_PAINT} are, on more than half of a triangle" if what in ("support", "seams") else "")
             for what, count in self._unpainted.items()
             if count
         ]
+        if self._in_part:
+            triangles = f"{self._in_part} triangles painted in part are" if self._in_part > 1 else "1 triangle painted in part is"
+            notes.append(f"{triangles} taken as a whole: more than half of it is painted")
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
         return Build(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._configs.objects), plates=self._plates)
 
@@ -282,7 +294,8 @@ class _Builder:
             components = element.findall("{*}components/{*}component")
             self._check_understood(element, bool(components))
             pending += [self._placement(component, placement) for component in reversed(components)]
-        return BuildObject(volumes, settings, heights) if volumes else None
+        name = self._configs.objects.get(item.get("objectid", ""), Role()).name
+        return BuildObject(volumes, settings, heights, name) if volumes else None
 
     def _with_role(self, placement: Placement, element: ElementTree.Element) -> Placement:
         """The placement with the role that the slicer gives its object."""
@@ -321,15 +334,16 @@ class _Builder:
             yield BuildVolume(_piece(surface, np.flatnonzero(rest)))
 
     def _painted(self, surface: Surface, mesh: ElementTree.Element, painted: Sequence[str]) -> Iterator[BuildVolume]:
-        """The triangles of a mesh that are painted as a whole for something that is known here; others are counted."""
+        """The triangles of a mesh that are painted on more than half for something that is known here; others are counted."""
         triangles = mesh.findall("{*}triangles/{*}triangle") if painted else []
         for what in painted:
             chosen: dict[str, list[int]] = {}
             for number, triangle in enumerate(triangles):
                 if digits := next((text for name in PAINTED[what] if (text := _attribute(triangle, name))), ""):
-                    kind = PAINTS.get((what, digits))
-                    self._unpainted[what] += kind is None
-                    chosen.setdefault(kind or "", []).append(number)
+                    kind = _paint(what, digits)
+                    self._unpainted[what] += not kind
+                    self._in_part += bool(kind) and len(digits) > 1
+                    chosen.setdefault(kind, []).append(number)
             for kind, numbers in chosen.items():
                 if kind:
                     yield BuildVolume(_piece(surface, np.array(numbers)), Role(kind))
@@ -351,6 +365,15 @@ class _Builder:
         element = self._package.model(self._start).objects.get(number)
         told = self._configs.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
         self._notes.append(f"leaves out object {told or number}, {why}")
+
+
+def _paint(what: str, digits: str) -> str:
+    """The kind of paint on more than half of a triangle; empty where there is none that is known here."""
+    try:
+        shares = painted_shares(digits) if what in ("support", "seams") else {}
+    except ValueError:
+        return ""
+    return next((kind for (own, paint), kind in PAINTS.items() if own == what and shares.get(paint, 0.0) > 0.5), "")
 
 
 def _attribute(element: ElementTree.Element, name: str) -> str:

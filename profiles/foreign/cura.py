@@ -1,22 +1,54 @@
 """Cura's .curaprofile: a zip of ini files, one of the print and one an extruder, with what differs from a printer's definition.
 
-What the user has not changed stands in Cura's own definitions, not in the file; values that are formulas (`=...`) are Cura's to
-work out (Cura, plugins/CuraProfileReader). Names: Cura, resources/definitions/fdmprinter.def.json.
+What the user has not changed stands in Cura's own definitions, not in the file (Cura, plugins/CuraProfileReader). A project
+(.3mf) keeps stacks of such files, one of the print and one for each extruder, the person's own on top (Cura,
+cura/Settings/CuraContainerStack.py). Names: Cura, resources/definitions/fdmprinter.def.json.
 """
 
 import configparser
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from itertools import zip_longest
 from pathlib import Path
-from zipfile import ZipFile, ZipInfo
+from xml.etree import ElementTree
+from zipfile import ZipFile
 
 from profiles.errors import ProfileError, first_line, reason
 from profiles.files import DAMAGED_ZIP
 from profiles.foreign.config import Config, Entry, finite
+from profiles.foreign.cura_formulas import worked_out
 
 PROGRAM = "Cura"
-SLICER_FILE = re.compile(r"Cura/.*\.inst\.cfg$")  # members of a .3mf that have a person's settings
-DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, configparser.Error)
+SLICER_FILE = re.compile(r"Cura/(.*)\.inst\.cfg$")  # members of a slicer file that have settings
+STACK = re.compile(r"Cura/.*\.(global|extruder)\.cfg$")
+MATERIAL = re.compile(r"Cura/(.*)\.xml\.fdm_material$")
+PROPERTIES = {  # of a material's file
+    "material_type": "{*}metadata/{*}name/{*}material",
+    "material_diameter": "{*}properties/{*}diameter",
+    "material_density": "{*}properties/{*}density",
+}
+OF_MATERIAL = {
+    "print temperature": "default_material_print_temperature",
+    "heated bed temperature": "default_material_bed_temperature",
+    "print cooling": "cool_fan_speed",
+    "retraction amount": "retraction_amount",
+    "retraction speed": "retraction_speed",
+}
+HOLDS = {  # settings that hold only where another has a word, and what they are where it has not; None: nothing is said
+    "retraction_hop": ("retraction_hop_enabled", "true", "0"),
+    "retraction_amount": ("retraction_enable", "true", "0"),
+    "cool_fan_speed_max": ("cool_fan_enabled", "true", "0"),
+    "cool_fan_speed_min": ("cool_fan_enabled", "true", "0"),
+    "brim_width": ("adhesion_type", "brim", "0"),
+    "skirt_line_count": ("adhesion_type", "skirt", "0"),
+    "bridge_skin_speed": ("bridge_settings_enabled", "true", None),
+    "acceleration_print": ("acceleration_enabled", "true", None),
+    "acceleration_wall_0": ("acceleration_enabled", "true", None),
+    "acceleration_infill": ("acceleration_enabled", "true", None),
+    "acceleration_travel": ("acceleration_enabled", "true", None),
+    "acceleration_layer_0": ("acceleration_enabled", "true", None),
+}
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, configparser.Error, ElementTree.ParseError)
 MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
 PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
 KEYS = {
@@ -87,6 +119,9 @@ KEYS = {
     "xy_offset": "xy_contour_compensation",
     "hole_xy_offset": "xy_hole_compensation",
     "machine_nozzle_size": "nozzle_diameter",
+    "material_diameter": "filament_diameter",
+    "material_density": "filament_density",
+    "material_type": "filament_type",
 }
 RAFT_LAYERS = {"raft_base_layers": 1, "raft_interface_layers": 1, "raft_surface_layers": 2}  # with Cura's own numbers
 WORDS = {
@@ -110,17 +145,20 @@ def read_profile(file: Path) -> Config:
 
 
 def of_values(values: Mapping[str, str], name: str = "") -> Config:
-    """Settings under Cura's names."""
-    entries, formulas = dict[str, Entry](), list[str]()
-    for own, text in values.items():
+    """Settings under Cura's names, formulas worked out where that can be."""
+    entries, formulas, known = dict[str, Entry](), list[str](), worked_out(values)
+    for own, text in known.items():
+        switch, word, off = HOLDS.get(own, ("", "", None))
         if text.startswith("="):
             formulas.append(own)
+        elif (said := known.get(switch, word)).lower() != word and not said.startswith("="):
+            entries |= {KEYS.get(own, own): Entry(own, off)} if off is not None else {}
         elif own not in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
             key = KEYS.get(own, own)
             entries[key] = Entry(own, _said(key, text))
-    if (angle_deg := finite(values.get("support_angle", ""))) is not None:  # Cura's is from the vertical
+    if (angle_deg := finite(known.get("support_angle", ""))) is not None:  # Cura's is from the vertical
         entries["support_material_threshold"] = Entry("support_angle", f"{90.0 - angle_deg:g}")
-    entries |= _raft(values)
+    entries |= _raft(known)
     if "min_fan_speed" in entries:
         entries["fan_always_on"] = Entry(entries["min_fan_speed"].name, "1")
     return Config(PROGRAM, entries, tuple(f"{own} (a formula)" for own in formulas), name, name)
@@ -147,35 +185,76 @@ def _number(text: str, usual: float) -> float:
 
 
 def read_values(file: Path) -> tuple[Mapping[str, str], str]:
-    """The settings of all ini files of a profile, or of those in a .3mf of Cura, an extruder's over the print's and a person's
-    own over all others, and its name. Raises ProfileError."""
-    values, name = dict[str, str](), file.stem
+    """The settings of a profile or of a slicer file, the first extruder's over the print's, and its name. Raises ProfileError."""
     try:
         with ZipFile(file) as archive:
-            members = [
-                member for member in archive.infolist() if file.suffix.lower() != ".3mf" or SLICER_FILE.match(member.filename)
-            ]
-            for member in sorted(members, key=_precedence):
-                if member.file_size > MOST_BYTES:
-                    raise ProfileError(
-                        f"profile {file}: {member.filename} has {member.file_size} bytes, {MOST_BYTES} are allowed"
-                    )
-                parser = configparser.ConfigParser(interpolation=None)
-                parser.read_string(archive.read(member).decode("utf-8-sig"))
-                name = parser.get("general", "name", fallback=name)
-                own = dict(parser["values"]) if parser.has_section("values") else {}
-                first = parser.get("metadata", "position", fallback="0") in ("", "0")
-                values |= own if first else {}
+            if file.suffix.lower() == ".3mf":
+                return _of_slicer_file(archive), file.stem
+            values, name = dict[str, str](), file.stem
+            for member in sorted(archive.namelist(), key=lambda member: "extruder" in member):
+                ini = _ini(archive, member)
+                name = ini.get("general", "name", fallback=name)
+                values |= _values(ini) if _position(ini) in ("", "0") else {}
+            return values, name
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
     except DAMAGED as error:
         raise ProfileError(f"profile {file}: is no profile of Cura ({first_line(error)})") from None
-    return values, name
 
 
-def _precedence(member: ZipInfo) -> tuple[bool, bool]:
-    """Later ones hold over earlier ones."""
-    return "_user." in member.filename, "extruder" in member.filename
+def _of_slicer_file(archive: ZipFile) -> dict[str, str]:
+    """The settings of the stacks of the print and of its first extruder that is switched on, level by level."""
+    layers = {match[1]: member for member in archive.namelist() if (match := SLICER_FILE.match(member) or MATERIAL.match(member))}
+    stacks = [_ini(archive, member) for member in archive.namelist() if STACK.match(member)]
+    prints = [stack for stack in stacks if not _position(stack)]
+    extruders = [stack for stack in stacks if _position(stack) and stack.get("metadata", "enabled", fallback="") != "False"]
+    first = sorted(extruders, key=lambda stack: int(_position(stack)) if _position(stack).isdecimal() else 0)[:1]
+    values = dict[str, str]()
+    levels = [list(dict(stack["containers"]).values())[::-1] for stack in (*prints, *first) if stack.has_section("containers")]
+    for containers in zip_longest(*levels, fillvalue=""):
+        for container in containers:
+            member = layers.get(container) or layers.get(_material_of(container, layers), "")
+            if MATERIAL.match(member):
+                values |= _of_material(ElementTree.fromstring(_content(archive, member)))
+            elif member:
+                values |= _values(_ini(archive, member))
+    return values
+
+
+def _material_of(container: str, layers: Collection[str]) -> str:
+    """The file of a material, which a container's name begins with before those of the printer and its nozzle."""
+    return max((name for name in layers if container.startswith(f"{name}_")), key=len, default="")
+
+
+def _of_material(material: ElementTree.Element) -> dict[str, str]:
+    """What a material's file says for all printers."""
+    texts = {key: material.findtext(path, "") for key, path in PROPERTIES.items()}
+    for setting in material.findall("{*}settings/{*}setting"):
+        texts[OF_MATERIAL.get(setting.get("key", ""), "")] = setting.text or ""
+    return {key: text.strip() for key, text in texts.items() if key and text.strip()}
+
+
+def _content(archive: ZipFile, member: str) -> str:
+    """The text of a member. Raises ProfileError for one that is too large."""
+    size = archive.getinfo(member).file_size
+    if size > MOST_BYTES:
+        raise ProfileError(f"profile {archive.filename}: {member} has {size} bytes, {MOST_BYTES} are allowed")
+    return archive.read(member).decode("utf-8-sig")
+
+
+def _ini(archive: ZipFile, member: str) -> configparser.ConfigParser:
+    ini = configparser.ConfigParser(interpolation=None)
+    ini.read_string(_content(archive, member))
+    return ini
+
+
+def _values(ini: configparser.ConfigParser) -> dict[str, str]:
+    return dict(ini["values"]) if ini.has_section("values") else {}
+
+
+def _position(ini: configparser.ConfigParser) -> str:
+    """The number of its extruder, from 0; empty for the print."""
+    return ini.get("metadata", "position", fallback="")
 
 
 def _said(key: str, text: str) -> str:

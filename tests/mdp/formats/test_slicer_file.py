@@ -106,11 +106,10 @@ def test_volumes_that_are_not_printed_become_marks_where_they_lie_in_the_model(t
     wanted = moved(CYLINDER, linear)
     np.testing.assert_allclose(round_one.mesh.bounds_mm, wanted.bounds_mm, atol=1e-9)
     assert round_one.mesh.volume_mm3 == pytest.approx(8.0 * CYLINDER.volume())
-    assert [note.split(" is taken")[0] for note in model.notes] == [
-        "support enforcer 'support'",
-        "support blocker 'no_support'",
-        "support enforcer 'support'",
-    ]
+    assert model.notes == (
+        "support enforcer 'support' and 1 more are taken as [[support]]",
+        "support blocker 'no_support' is taken as [[no_support]]",
+    )
 
 
 @pytest.mark.parametrize(
@@ -365,14 +364,21 @@ def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None
     ("dialect", "supports", "seams"),
     [("prusaslicer", "slic3rpe:custom_supports", "slic3rpe:custom_seam"), ("bambu", "paint_supports", "paint_seam")],
 )
-def test_whole_triangles_that_are_painted_are_marked_wherever_the_model_lies(
+def test_triangles_that_are_painted_on_more_than_half_are_marked_wherever_the_model_lies(
     tmp_path: Path, dialect: str, supports: str, seams: str
 ) -> None:
     path = written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK)], [AT_ORIGIN])])
     part = "3D/3dmodel.model" if dialect == "prusaslicer" else "3D/Objects/object_1.model"
     with zipfile.ZipFile(path) as archive:
         pieces = archive.read(part).decode().split("<triangle ")
-    painted = {0: f'{supports}="4"', 1: f'{supports}="8"', 2: f'{seams}="8"', 3: f'{seams}="4"', 4: f'{supports}="41"'}
+    painted = {
+        0: f'{supports}="4"',
+        1: f'{supports}="8"',
+        2: f'{seams}="8"',
+        3: f'{seams}="4"',
+        4: f'{supports}="0442"',
+        5: f'{supports}="041"',
+    }
     text = "<triangle ".join(pieces[:1] + [f"{painted.get(k, '')} {piece}" for k, piece in enumerate(pieces[1:])])
     change(path, part, "<triangle ".join(pieces), text)
     model = read_model(path, 1.7, (30.0, 20.0, 10.0))
@@ -380,13 +386,15 @@ def test_whole_triangles_that_are_painted_are_marked_wherever_the_model_lies(
     turned, zones = model.mesh.transform(turn, (1.0, 2.0, 3.0)), model.zones.transform(turn, np.array([1.0, 2.0, 3.0]))
     for mesh, marks in ((model.mesh, model.zones), (turned, zones)):
         faces = [faces_of(mesh, zone).nonzero()[0].tolist() for (zone,) in (marks.support, marks.no_support, marks.no_seam)]
-        assert faces == [[0], [1], [2]]
+        assert faces == [[0, 4], [1], [2]]
+    unpainted = "is not taken: only paints for and against support and against seams are, on more than half of a triangle"
     assert sorted(model.notes) == [
-        "1 triangle painted for seams is not taken: only whole ones are, for and against support and against seams",
-        "1 triangle painted for support is not taken: only whole ones are, for and against support and against seams",
+        f"1 triangle painted for seams {unpainted}",
+        f"1 triangle painted for support {unpainted}",
+        "1 triangle painted in part is taken as a whole: more than half of it is painted",
         "paint against seams on 1 of its triangles is taken as [[no_seam]]",
         "paint against support on 1 of its triangles is taken as [[no_support]]",
-        "paint for support on 1 of its triangles is taken as [[support]]",
+        "paint for support on 2 of its triangles is taken as [[support]]",
     ]
 
 
@@ -454,3 +462,22 @@ def test_colours_painted_on_triangles_are_told(tmp_path: Path) -> None:
         "12 triangles painted for filaments are not taken",
         "paint against seams on 12 of its triangles is taken as [[no_seam]]",
     )
+
+
+def test_what_is_said_of_many_volumes_is_said_once(tmp_path: Path) -> None:
+    volumes = [Made(BLOCK), *(Made(BOX.translate((0.0, 0.0, 4.0 * k)), "negative") for k in range(3))]
+    blockers = [Made(BOX, "no_support")] * 3
+    objects = [Object([*volumes, *blockers], [AT_ORIGIN], {"wall_generator": "arachne"})]
+    assert read_model(bambu(tmp_path / "a.3mf", objects, np.random.default_rng(1))).notes == (
+        "subtracted 3 negative volumes",
+        "object 'b' changes nothing here; without wall_generator",
+        "support blocker 'no_support' and 2 more are taken as [[no_support]]",
+    )
+
+
+def test_a_file_that_keeps_nothing_but_g_code_says_so(tmp_path: Path) -> None:
+    path = bambu(tmp_path / "a.3mf", [], np.random.default_rng(0), {"Metadata/plate_1.gcode": "G1 X1\n"})
+    with pytest.raises(
+        MeshError, match="its build places no mesh, it keeps nothing but G-code of a sliced plate: save the project"
+    ):
+        read_model(path)

@@ -100,12 +100,16 @@ def settings_of(kind: str) -> dict[str, str]:
             "nozzle_temperature": ["231", "9"],
         }
         return {"Metadata/project_settings.config": json.dumps(values)}
-    changes, user = (f"[general]\nname = a\n[metadata]\ntype = {kind}\n" for kind in ("quality_changes", "user"))
+    values = {
+        "print_changes": "wall_line_count = 2",
+        "print_user": "wall_line_count = 4",
+        "first_changes": "infill_sparse_density = 33",
+        "first_user": "material_print_temperature = 231",
+    }
     return {
-        "Cura/a_quality_changes.inst.cfg": f"{changes}[values]\nwall_line_count = 2\n",
-        "Cura/a_extruder_0_quality_changes.inst.cfg": f"{changes}position = 0\n[values]\ninfill_sparse_density = 33\n",
-        "Cura/a_extruder_0_user.inst.cfg": f"{user}position = 0\n[values]\nmaterial_print_temperature = 231\n",
-        "Cura/a_user.inst.cfg": f"{user}[values]\nwall_line_count = 4\n",
+        "Cura/a.global.cfg": "[metadata]\ntype = machine\n[containers]\n0 = print_user\n1 = print_changes\n",
+        "Cura/b.extruder.cfg": "[metadata]\nposition = 0\n[containers]\n0 = first_user\n1 = first_changes\n",
+        **{f"Cura/{name}.inst.cfg": f"[values]\n{text}\n" for name, text in values.items()},
         "Cura/Version.txt": "no ini",
     }
 
