@@ -269,7 +269,7 @@ def on_many_disks(file: Path, member: str, text: str) -> Path:
     ("name", "member"),
     [
         ("x.curaprofile", "mine"),
-        ("x.3mf", "Cura/a_user.inst.cfg"),
+        ("x.3mf", "Cura/a.global.cfg"),
         ("x.3mf", "Metadata/Slic3r_PE.config"),
         ("x.3mf", "Metadata/project_settings.config"),
     ],
