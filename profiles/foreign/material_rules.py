@@ -14,7 +14,7 @@ USUAL_BASE = "pla"
 def base_of(config: Config) -> tuple[str, str]:
     """The shipped material that one inherits from, and what the file says that it is."""
     kind = (config.text("filament_type") or "").strip('"').upper()
-    return BASES.get(kind, BASES.get(re.split(r"[^A-Z]", kind)[0], USUAL_BASE)), kind
+    return next((BASES[word] for word in re.split(r"[^A-Z]+", kind) if word in BASES), USUAL_BASE), kind
 
 
 def _fan_least(config: Config, key: str) -> Converted:
