@@ -6,6 +6,7 @@ from zipfile import ZipFile
 import pytest
 
 from profiles.foreign.cura import of_values
+from profiles.foreign.material_rules import base_of
 from profiles.foreign.slicer_file import read_slicer_settings
 
 MATERIAL = """<fdmmaterial xmlns="http://www.ultimaker.com/material">
@@ -61,6 +62,13 @@ def test_a_material_says_its_kind_and_temperature_below_what_a_person_has_set(tm
     config = read_slicer_settings(project(tmp_path / "a.3mf", {"user": "material_bed_temperature = 70"}, stacks)).config
     assert config.text("filament_type") == "PETG"
     assert [config.number(key) for key in ("temperature", "bed_temperature", "filament_density")] == [240, 70, 1.27]
+
+
+@pytest.mark.parametrize(
+    ("kind", "base"), [("PLA", "pla"), ("ApolloX ASA", "abs"), ("PETG-CF", "petg"), ("TPU 95A", "tpu"), ("Wood", "pla")]
+)
+def test_a_material_inherits_from_the_shipped_one_that_its_kind_names(kind: str, base: str) -> None:
+    assert base_of(of_values({"material_type": kind}))[0] == base
 
 
 @pytest.mark.parametrize(
