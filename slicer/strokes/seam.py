@@ -30,9 +30,10 @@ from slicer.strokes.strokes import RINGS
 REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
 ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
 NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
-PLANNED = (0.7, 0.2)  # the same beside a planned place
+PLANNED = (1.0, 1.0)  # the same beside a planned place, whose corner of the outline a thin wall may lack
 NO_CORNER = (0.0, 0.0)  # no corner is worth a way
-FOLLOW_MM, FOLLOW = 2.0, 0.3  # a planned place so near to the seam below draws it by this share of the way: the line is smooth
+FOLLOW_MM, FOLLOW = 2.0, 0.3  # a planned place so near to the seam below draws it by this share of the way, outside of corners
+KEPT = 0.25  # from this strength on a planned corner is kept to, however far the seam below is
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
 FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
 NO_SEAMS = np.zeros((0, 2))
@@ -109,9 +110,10 @@ def _target(loop: Floats, process: Process, around: Surroundings) -> _Target:
     distance, x, y = _nearest(loop, around.before, REACH_MM)
     planned, px, py = _nearest(loop, around.planned, REACH_MM)
     if planned < np.inf:
-        if np.hypot(px - x, py - y) < FOLLOW_MM and distance < np.inf:
-            px, py = x + FOLLOW * (px - x), y + FOLLOW * (py - y)
-        return _Target(px, py, *PLANNED)
+        beside = _Target(px, py, *PLANNED)
+        if distance == np.inf or np.hypot(px - x, py - y) >= FOLLOW_MM or _in_corner(loop, beside):
+            return beside
+        return _Target(x + FOLLOW * (px - x), y + FOLLOW * (py - y), *PLANNED)
     if distance == np.inf:
         return _Target(*rear, *ANYWHERE)
     return _Target(x, y, *(ANYWHERE if process.seam == "corner" else NEARBY))
@@ -218,6 +220,13 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
                     if cost < least:
                         least, at, share, free = cost, i, s / count, clear
     return at, share, free
+
+
+@kernel
+def _in_corner(loop: Floats, target: _Target) -> bool:
+    """Whether the place of least cost is a corner that is sharp enough to be kept to."""
+    at, share, _ = _best(loop, target, NO_LIMITS)
+    return share == 0.0 and abs(corner_strength(loop, at)) > KEPT
 
 
 def begin_with_room(loop: Floats, lead_mm: float) -> Floats:

@@ -30,7 +30,7 @@ from slicer.sectioning import Sections
 
 SPACING_MM = 1.0  # of the places of an outline
 FEWEST = 8  # places of an outline
-INNER, OUTER = 0.7, 0.4  # what sharp inner and outer corners are worth; a place in full sight costs 1
+INNER, OUTER = 0.7, 0.55  # what sharp inner and outer corners are worth; a place in full sight costs 1
 TO_REAR = 5e-4  # what a mm to the rear costs: among places that are seen alike, people look at the front
 SHIFT, JUMP = 0.14, 2.4  # what a mm of way between two layers costs, and a jump at most
 FORBIDDEN = 1e3  # more than all that a part's seams can cost otherwise

@@ -30,10 +30,13 @@ def process(seam: str, **more: float) -> Process:
     return profile(f"process.seam={seam}", "process.seam_gap=0", *(f"process.{k}={v}" for k, v in more.items())).process
 
 
-def around(before: Any = NONE, tip: Sequence[float] = (0.0, 0.0), interfaces: Any = None, layer: int = 0) -> Surroundings:
+def around(
+    before: Any = NONE, tip: Sequence[float] = (0.0, 0.0), interfaces: Any = None, layer: int = 0, planned: Any = NONE
+) -> Surroundings:
     edges = np.zeros((0, 6)) if interfaces is None else np.array(interfaces, dtype=float)
     limits = seam_limits(edges, np.zeros((0, 6)), 0.1, process("rear"))
-    return Surroundings(np.array([5.0, 30.0]), np.array(before, dtype=float), np.array(tip), limits, layer)
+    below, wanted = np.array(before, dtype=float), np.array(planned, dtype=float)
+    return Surroundings(np.array([5.0, 30.0]), below, np.array(tip), limits, layer, wanted)
 
 
 def seam_of(loop: Floats, rule: str, **surroundings: Any) -> tuple[float, float]:
@@ -81,6 +84,12 @@ def test_aligned_goes_on_beside_the_seam_below_unless_a_corner_is_close() -> Non
     assert seam_of(SQUARE, "aligned", before=[(4, -0.1)]) == pytest.approx((4, 0))
     assert seam_of(SQUARE, "aligned", before=[(9.4, -0.1)]) == (10, 0)
     assert seam_of(SQUARE, "corner", before=[(6, -0.1)]) == (10, 0)
+
+
+def test_a_planned_corner_is_taken_whole_and_a_planned_place_on_a_side_draws_the_line_by_a_share() -> None:
+    """The outline's corner lies half a width outside the wall's on both sides."""
+    assert seam_of(SQUARE, "aligned", before=[(8.5, 0)], planned=[(10.225, -0.225)]) == (10, 0)
+    assert seam_of(SQUARE, "aligned", before=[(3, 0)], planned=[(4, -0.225)]) == pytest.approx((3.3, 0))
 
 
 def test_random_seams_are_spread_over_the_whole_wall_and_repeat() -> None:

@@ -65,6 +65,22 @@ def test_the_seam_of_a_cylinder_lies_where_it_faces_a_wall_of_its_own_body() -> 
         assert of_cylinder[0] > 5.0
 
 
+@pytest.mark.parametrize(("gap_mm", "x_mm", "y_mm"), [(1.0, 6.0, 0.0), (10.0, 0.0, 6.0)])
+def test_a_sharp_outer_corner_in_sight_beats_a_face_that_a_wall_half_hides_but_not_one_in_a_narrow_gap(
+    gap_mm: float, x_mm: float, y_mm: float
+) -> None:
+    """A half-round post turns its back, with two square corners, away from a wall. A face keeps about 1 - sin(atan(h / 2d)) of
+    its light beside an endless wall of height h at a distance d, in the middle of its height: 0.43 of it, and 0.01 in the gap."""
+    post = m3.Manifold.cylinder(14, 6, 6, 92) ^ m3.Manifold.cube((12, 12, 14)).translate((0, -6, 0))
+    wall = m3.Manifold.cube((2, 80, 14)).translate((6 + gap_mm, -40, 0))
+    foot = m3.Manifold.cube((16 + gap_mm, 4, 1)).translate((-8, -2, -1))
+    of = whole(standing(m3.Manifold.batch_boolean([post, wall, foot], m3.OpType.Add)))
+    middle = of.mesh.bounds_mm[0, 0] + 8.0  # of the post
+    for of_layer in planned(of)[15:60]:
+        x, y = of_layer[of_layer[:, 0].argmin()] - [middle, 0.0]
+        assert [x, abs(y)] == pytest.approx([x_mm, y_mm], abs=1.0)
+
+
 def test_another_body_on_the_plate_hides_no_seam() -> None:
     for of_layer in planned(beside_a_wall()):
         (of_cylinder,) = of_layer[of_layer[:, 0] < 7.0]
