@@ -16,7 +16,7 @@ from slicer.strokes.strokes import Strokes, in_pieces
 from slicer.strokes.travels import may_wipe_over
 
 SHORTEST = 0.5  # line widths: the steps of skin lines are no shorter,
-ASIDE = 0.25  # where a line need not lie farther aside for that
+ASIDE, ASIDE_ON_TOP = 0.25, 0.15  # where a line need not lie farther aside for that; on tops gaps are seen
 
 
 def timed(
@@ -38,7 +38,8 @@ def timed(
 def _without_short_steps(strokes: Strokes) -> Strokes:
     """The strokes, those of skins without short steps where that moves them little; the plastic of each stays the same."""
     width_mm = np.where(strokes.is_of(*SKINS), strokes.width_mm, 0.0)
-    points, left = lengthen_steps(strokes.points, strokes.starts, SHORTEST * width_mm, ASIDE * width_mm)
+    aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN), ASIDE_ON_TOP, ASIDE)
+    points, left = lengthen_steps(strokes.points, strokes.starts, SHORTEST * width_mm, aside_mm)
     eased = replace(strokes, points=points[left], starts=np.append(0, np.cumsum(left))[strokes.starts])
     return replace(eased, flow=strokes.flow * strokes.lengths_mm / np.maximum(eased.lengths_mm, 1e-9))
 
