@@ -191,3 +191,64 @@ def _next_corner(corner: Mask, at: int) -> int:
     while not corner[at]:
         at += 1
     return at
+
+
+@kernel
+def lengthen_steps(points: Floats, starts: Indices, shortest_mm: Floats, most_mm: Floats) -> tuple[Floats, Mask]:
+    """Polylines without steps shorter than that where no place of them need move farther; and (n,) which points are left.
+
+    One end of a short step goes back along the step beside it, or is left out with it, whichever moves the line less. First and
+    last points stay. points: (n, 2 or more), one polyline after the other; shortest_mm, most_mm: (k,); shortest 0: as it is.
+    """
+    out, left, fixed = points.copy(), flags(len(points)), flags(len(points))
+    for k in range(len(starts) - 1):
+        a, b, last = -1, starts[k], starts[k + 1] - 1
+        left[b] = fixed[b] = fixed[last] = True
+        while b < last:
+            c = b + 1
+            left[c] = True
+            if shortest_mm[k] <= 0.0 or np.hypot(out[c, 0] - out[b, 0], out[c, 1] - out[b, 1]) >= shortest_mm[k]:
+                a, b = b, c
+                continue
+            back = _drawn_back(out, (a, b, c), fixed, shortest_mm[k]) if a >= 0 else (np.inf, 0.0)
+            on = _drawn_back(out, (c + 1, c, b), fixed, shortest_mm[k]) if c < last else (np.inf, 0.0)
+            if min(back[0], on[0]) > most_mm[k]:
+                a, b = b, c
+                continue
+            moved, towards, share = (b, a, back[1]) if back[0] <= on[0] else (c, c + 1, on[1])
+            if share < 1.0:
+                fixed[moved] = True
+                out[moved, 0] += share * (out[towards, 0] - out[moved, 0])
+                out[moved, 1] += share * (out[towards, 1] - out[moved, 1])
+                a, b = b, c
+                continue
+            left[moved] = False
+            fixed[b if moved == c else c] = fixed[towards] = True
+            if moved == c:
+                left[towards] = True
+                a, b = b, towards
+            else:
+                b = c
+    return out, left
+
+
+@no_nrt
+def _drawn_back(points: Floats, ends: tuple[int, int, int], fixed: Mask, shortest_mm: float) -> tuple[float, float]:
+    """How far the line a, b, c moves if b goes back towards a until the step to c is long enough, and the share of the way there.
+
+    Share 1: b is left out. Infinitely far where that would make a step shorter or move what is fixed.
+    """
+    a, b, c = ends
+    ux, uy = points[a, 0] - points[b, 0], points[a, 1] - points[b, 1]
+    vx, vy = points[b, 0] - points[c, 0], points[b, 1] - points[c, 1]
+    square, along = ux * ux + uy * uy, ux * vx + uy * vy
+    short = vx * vx + vy * vy - shortest_mm * shortest_mm
+    if fixed[b] or square <= 0.0:
+        return np.inf, 0.0
+    share = (np.sqrt(max(along * along - square * short, 0.0)) - along) / square
+    if (1.0 - share) * np.sqrt(square) < shortest_mm:
+        if np.hypot(points[a, 0] - points[c, 0], points[a, 1] - points[c, 1]) < shortest_mm:
+            return np.inf, 0.0
+        share = 1.0
+    to = Segment(points[b, 0] + share * ux, points[b, 1] + share * uy, points[c, 0], points[c, 1])
+    return np.sqrt(squared_distance(to, points[b, 0], points[b, 1])), share

@@ -31,7 +31,7 @@ SHORTEST_HANGING = 2.0  # line widths: no stretch is split off for less, the spe
 SHORTEST_FARTHER = 6.0  # line widths: nor within what hangs for less, because it hangs farther
 MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
 SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
-MOST_SPREAD_MM, LEAST_MM = 0.03, 0.045  # but for one where they change by that much, which is no shorter than this
+MOST_SPREAD_MM, LEAST_MM = 0.1, 0.045  # but for one where they change by that much, which is no shorter than this
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,14 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.polyline import mark_corners
-from slicer.paths import Kind, Layer
+from slicer.geometry.polyline import lengthen_steps, mark_corners
+from slicer.paths import SKINS, Kind, Layer
 from slicer.strokes.speed import fan_share, own_fans, speeds_mm_s, travel_time_s
 from slicer.strokes.strokes import Strokes, in_pieces
 from slicer.strokes.travels import may_wipe_over
+
+SHORTEST = 0.5  # line widths: the steps of skin lines are no shorter,
+ASIDE, ASIDE_ON_TOP = 0.25, 0.15  # where a line need not lie farther aside for that; on tops gaps are seen
 
 
 def timed(
@@ -28,7 +31,17 @@ def timed(
     strokes = in_pieces(strokes, height_mm)
     speeds = speeds_mm_s(strokes, profile, height_mm, fixed_mm_s, flow, of_places)
     corners = mark_corners(strokes.points, strokes.starts, profile.process.resolution_mm)
-    return replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts]), speeds
+    strokes = replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts])
+    return _without_short_steps(strokes), speeds
+
+
+def _without_short_steps(strokes: Strokes) -> Strokes:
+    """The strokes, those of skins without short steps where that moves them little; the plastic of each stays the same."""
+    width_mm = np.where(strokes.is_of(*SKINS), strokes.width_mm, 0.0)
+    aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN), ASIDE_ON_TOP, ASIDE)
+    points, left = lengthen_steps(strokes.points, strokes.starts, SHORTEST * width_mm, aside_mm)
+    eased = replace(strokes, points=points[left], starts=np.append(0, np.cumsum(left))[strokes.starts])
+    return replace(eased, flow=strokes.flow * strokes.lengths_mm / np.maximum(eased.lengths_mm, 1e-9))
 
 
 def layer_of(

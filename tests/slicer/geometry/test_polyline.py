@@ -1,12 +1,13 @@
 """Simplified polylines keep few points and leave none of the others far off."""
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats
-from slicer.geometry.polyline import mark_corners
+from slicer.geometry.polyline import lengthen_steps, mark_corners
 
 TOLERANCE_MM = 0.02
 
@@ -29,3 +30,35 @@ def test_no_point_that_is_left_out_lies_farther_off_than_the_tolerance(corners: 
     line = shapely.LineString(kept(points))
     assert [line.coords[0], line.coords[-1]] == [corners[0], corners[-1]]
     assert max(line.distance(shapely.Point(x, y)) for x, y in corners) < TOLERANCE_MM + 1e-9
+
+
+def lengthened(points: Floats, shortest_mm: float, most_mm: float) -> Floats:
+    moved, left = lengthen_steps(points, np.array([0, len(points)]), np.array([shortest_mm]), np.array([most_mm]))
+    return moved[left]
+
+
+def test_a_short_step_round_a_corner_is_lengthened_along_the_longer_step_beside_it() -> None:
+    bevelled = np.array([[0.0, 0.0], [5.0, 0.0], [5.1, 0.1], [5.1, 5.0]])
+    points = lengthened(bevelled, 0.25, 0.1)
+    back_mm = np.sqrt(0.25**2 - 0.1**2) - 0.1  # its corner goes back until the step is the hypotenuse of 0.1 and 0.1 + back
+    assert points.tolist() in [
+        [[0.0, 0.0], [pytest.approx(5.0 - back_mm), 0.0], [5.1, 0.1], [5.1, 5.0]],
+        [[0.0, 0.0], [5.0, 0.0], [5.1, pytest.approx(0.1 + back_mm)], [5.1, 5.0]],
+    ]
+
+
+def test_a_short_step_stays_where_its_line_would_move_too_far() -> None:
+    there_and_back = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 0.1], [0.0, 0.1]])
+    assert lengthened(there_and_back, 0.2, 0.05).tolist() == there_and_back.tolist()
+    assert lengthened(there_and_back, 0.0, 1.0).tolist() == there_and_back.tolist()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), min_size=2, max_size=30, unique=True))
+def test_lengthened_steps_leave_the_line_where_it_was_and_make_none_shorter(corners: list[tuple[float, float]]) -> None:
+    points = np.array(corners)
+    line = lengthened(points, 0.2, 0.1)
+    before, after = (np.hypot(*np.diff(way, axis=0).T) for way in (points, line))
+    assert [line[0].tolist(), line[-1].tolist()] == [list(corners[0]), list(corners[-1])]
+    assert (after < 0.2 - 1e-9).sum() <= (before < 0.2 - 1e-9).sum()
+    assert shapely.LineString(points).hausdorff_distance(shapely.LineString(line)) < 0.2 + 1e-9  # a point and the next one move

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from profiles.profile import load
 from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, bead_area_mm2
 from slicer.strokes.strokes import in_pieces, split, strokes_of
+from slicer.strokes.timed import timed
 from tests.slicer.hand import rows_of
 
 
@@ -43,3 +45,22 @@ def test_a_piece_of_a_small_wall_is_no_small_wall() -> None:
     assert strokes.small.tolist() == [True]
     assert len(pieces) == 3
     assert not pieces.small.any()
+
+
+def test_no_piece_of_a_wall_is_short_because_its_width_changes_a_little() -> None:
+    course = np.array([[0.0, 0.0, 0.55], [5.0, 0.0, 0.55], [5.4, 0.0, 0.64], [9.0, 0.0, 0.64]])
+    pieces = in_pieces(strokes_of([Bead(Kind.INNER_WALL, course[:, :2], 0.6, 0, course=course)], np.array([True]), {}, 0.0), 0.2)
+    assert len(pieces) > 2
+    assert pieces.lengths_mm.min() > 0.2 - 1e-9
+    plastic_mm2 = 5.0 * 0.55 + 0.4 * 0.595 + 3.6 * 0.64
+    assert float((pieces.width_mm * pieces.lengths_mm).sum()) == pytest.approx(plastic_mm2, rel=0.002)
+
+
+@pytest.mark.parametrize(("kind", "least_mm"), [(Kind.SKIN, 0.2), (Kind.INNER_WALL, 0.149)])
+def test_a_skin_line_that_reaches_into_a_corner_has_no_short_steps_and_keeps_its_plastic(kind: Kind, least_mm: float) -> None:
+    line = np.array([[-8.0, -6.0], [-0.55, 0.0], [0.0, 0.0], [0.0, -0.149], [-0.173, -0.173], [-7.0, -7.0]])
+    strokes = strokes_of([Bead(kind, line, 0.42, 0)], np.array([True]), {}, 0.0)
+    printed, _ = timed(strokes, load(), 0.2, None, 1.0)
+    assert np.hypot(*np.diff(printed.points[:, :2], axis=0).T).min() == pytest.approx(least_mm, abs=0.015)
+    assert [printed.points[0, :2].tolist(), printed.points[-1, :2].tolist()] == [line[0].tolist(), line[-1].tolist()]
+    assert float(printed.flow[0] * printed.lengths_mm[0]) == pytest.approx(float(np.hypot(*np.diff(line, axis=0).T).sum()))
