@@ -132,7 +132,7 @@ def test_a_project_that_a_bench_saves_is_cut_by_the_command_line_and_opened_as_i
     assert bench.ask("plan.toml")[1] == (folder / "again" / "plan.toml").read_bytes()
 
 
-def test_marks_of_another_slicer_s_project_are_there_when_it_is_saved_and_opened(bench: Running, folder: Path) -> None:
+def test_marks_of_a_slicer_file_are_there_when_it_is_saved_and_opened(bench: Running, folder: Path) -> None:
     post = m3.Manifold.cube((8.0, 10.0, 12.0), True).translate((0.0, 0.0, 6.0))
     near = m3.Manifold.cube((20.0, 20.0, 4.0), True).translate((0.0, 0.0, 8.0))
     prusaslicer(folder / "post.3mf", [Object([Made(post), Made(near, "no_support")], [AT_ORIGIN])])
