@@ -99,31 +99,31 @@ class Project:
     plate: int | None = None
     marks_in_plan: bool = False
 
-    def applied(self, asked: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
+    def applied(self, request: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
         """A request for the model inside: the project decides what the command line leaves open.
 
         file: the project; copies: as the user has given it, None for as many as the project has. Raises PlanError for options
         that do not go with its plan.
         """
-        own_plan = self.plan if not asked.cuts.plans and asked.cuts.planes is None else None
+        own_plan = self.plan if not request.cuts.plans and request.cuts.planes is None else None
         if own_plan is not None:
-            self._check_plan_goes_with(asked, file)
+            self._check_plan_goes_with(request, file)
         return replace(
-            asked,
+            request,
             model=self.argument,
             project=file,
-            cuts=asked.cuts if own_plan is None else replace(asked.cuts, plans=(own_plan,)),
+            cuts=request.cuts if own_plan is None else replace(request.cuts, plans=(own_plan,)),
             own_marks=own_plan is None or not self.marks_in_plan,
-            stops=asked.stops or self.stops,
+            stops=request.stops or self.stops,
             copies=self.copies if copies is None else copies,
-            plate=self.plate if asked.plate is None else asked.plate,
+            plate=self.plate if request.plate is None else request.plate,
         )
 
-    def _check_plan_goes_with(self, asked: ModelRequest, file: Path) -> None:
-        if asked.orient or (asked.orient is False and self.rotation != STANDING):
-            option = "--orient" if asked.orient else "--as-is"
+    def _check_plan_goes_with(self, request: ModelRequest, file: Path) -> None:
+        if request.orient or (request.orient is False and self.rotation != STANDING):
+            option = "--orient" if request.orient else "--as-is"
             raise PlanError(f"{option}: the project {file} says how its model lies; decompose the model itself to change that")
-        if (record := asked.outputs.record) is not None:
+        if (record := request.outputs.record) is not None:
             raise PlanError(f"--record {record}: the project {file} has its parts, so nothing is searched that could be recorded")
 
     @property
@@ -188,7 +188,7 @@ def with_meshes(plan: PlanFile, folder: Path) -> PlanFile:
         return replace(volume, file=(folder / _copied(volume.file, folder, "modifier")).absolute())
 
     marks = {kind: tuple(map(copied, getattr(plan.zones, kind))) for kind in ZONE_KINDS}
-    modifiers = tuple(replace(own, volume=copied(own.volume)) for own in plan.zones.modifiers)
+    modifiers = tuple(replace(modifier, volume=copied(modifier.volume)) for modifier in plan.zones.modifiers)
     return replace(plan, zones=replace(plan.zones, modifiers=modifiers, **marks))
 
 

@@ -55,7 +55,7 @@ class _Marks:
     """The marks of a slicer file, moved as its model is."""
 
     def __init__(self, build: Build, path: Path, mesh: Mesh, scale: float, turn: Floats, shift_mm: Floats) -> None:
-        self._objects, self._several = build.objects, sum(bool(own.surfaces(PART)) for own in build.objects) > 1
+        self._objects, self._several = build.objects, sum(bool(item.surfaces(PART)) for item in build.objects) > 1
         self._corners_mm = mesh.vertices[mesh.faces]
         self._path, self._scale, self._turn, self._shift_mm, self._on_plate = path, scale, turn, shift_mm, build.on_plate
         self._notes: list[str] = []
@@ -77,36 +77,36 @@ class _Marks:
         """All marks and a sentence for each."""
         modifiers, kinds = list[Modifier](), {kind: list[AnyZone]() for kind in ("no_seam", "no_support", "support")}
         painted = dict[str, list[Floats]]()
-        for own in self._objects:
-            modifiers += self._of_object(own) if own.surfaces(PART) else ()
-            for volume in own.volumes:
+        for item in self._objects:
+            modifiers += self._of_object(item) if item.surfaces(PART) else ()
+            for volume in item.volumes:
                 role = volume.role
                 if role.kind == MODIFIER or (role.kind == PART and role.settings):
                     process = self._process(_named(role), role.settings)
-                    place = self._place(volume, own) if process else None
+                    place = self._place(volume, item) if process else None
                     modifiers += [] if place is None else [Modifier(place, process)]
-                elif role.kind in MARKED and (place := self._place(volume, own)) is not None:
+                elif role.kind in MARKED and (place := self._place(volume, item)) is not None:
                     kinds[MARKED[role.kind]].append(place)
                     self._tell(_named(role), "is", f"taken as [[{MARKED[role.kind]}]]")
                 elif role.kind in PAINTED:
                     painted.setdefault(role.kind, []).append(self._moved(volume.surface.vertices[volume.surface.faces]))
         for kind, corners_mm in painted.items():
             kinds[PAINTED[kind]] += self._painted(kind, np.concatenate(corners_mm))
-        told = [_sentence(subjects, *predicate) for predicate, subjects in self._subjects.items()]
-        return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), [*told, *self._notes]
+        notes = [_sentence(subjects, *predicate) for predicate, subjects in self._subjects.items()]
+        return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), [*notes, *self._notes]
 
     def _tell(self, subject: str, verb: str, rest: str) -> None:
         self._subjects.setdefault((verb, rest), []).append(subject)
 
-    def _of_object(self, own: BuildObject) -> Iterator[Modifier]:
+    def _of_object(self, item: BuildObject) -> Iterator[Modifier]:
         """The settings of an object and those between two heights of it."""
-        lowest, highest = _bounds(own)
+        lowest, highest = _bounds(item)
         low, high = lowest - BESIDE_MM, highest + BESIDE_MM
-        if own.settings and (process := self._process(f"object {own.name!r}" if own.name else "the object", own.settings)):
+        if item.settings and (process := self._process(f"object {item.name!r}" if item.name else "the object", item.settings)):
             yield Modifier(self._box(low, high), process)
         base = max(lowest[2], 0.0) if self._on_plate else lowest[2]
         tall_mm = highest[2] - base
-        for least, most, settings in own.heights:
+        for least, most, settings in item.heights:
             what, first, last = f"the height range {least:g} to {most:g} mm", max(least, 0.0), min(most, tall_mm + BESIDE_MM)
             box = self._box([*low[:2], base + first], [*high[:2], base + last])
             if not (first < min(last, tall_mm) and np.subtract(box.max_mm, box.min_mm).min() >= THINNEST_MM):
@@ -127,16 +127,16 @@ class _Marks:
     def _painted(self, kind: str, corners_mm: Floats) -> list[Triangles]:
         """The faces of the solid that lie on (k, 3, 3) painted triangles, with a note on how many of these have any."""
         row = triangle_of(corners_mm, self._corners_mm)
-        found, lost = len(np.unique(row[row != NONE])), "not on the surface of what is printed"
-        rest = len(corners_mm) - found
-        if not found:
+        held, lost = len(np.unique(row[row != NONE])), "not on the surface of what is printed"
+        rest = len(corners_mm) - held
+        if not held:
             self._notes.append(f"{kind} is left out: its {counted(rest, 'triangle')} {'is' if rest == 1 else 'are'} {lost}")
             return []
         others = f"; {counted(rest, 'other')} {'is' if rest == 1 else 'are'} {lost}" if rest else ""
-        self._notes.append(f"{kind} on {found} of its triangles is taken as [[{PAINTED[kind]}]]{others}")
+        self._notes.append(f"{kind} on {held} of its triangles is taken as [[{PAINTED[kind]}]]{others}")
         return [Triangles(self._corners_mm[row != NONE])]
 
-    def _place(self, volume: BuildVolume, own: BuildObject) -> Volume | None:
+    def _place(self, volume: BuildVolume, item: BuildObject) -> Volume | None:
         """Where a volume lies, within the box of its object if there are others; None for one that is no solid, with a note.
 
         Where an object is nothing but marks, as in Cura, they hold for all.
@@ -147,7 +147,7 @@ class _Marks:
             self._notes.append(f"{error}: it is left out")
             return None
         mesh = Mesh(self._moved(solid.vertices), solid.faces.astype(np.int32))
-        room = self._box(*_bounds(own)) if self._several and own.surfaces(PART) else None
+        room = self._box(*_bounds(item)) if self._several and item.surfaces(PART) else None
         box = _box_at(mesh.vertices)
         if box is None or not isclose(float(np.prod(np.subtract(box.max_mm, box.min_mm))), mesh.volume_mm3, rel_tol=SAME):
             return MeshVolume(self._path, mesh, room)
@@ -181,9 +181,9 @@ def _named(role: Role) -> str:
     return f"{role.kind} {role.name!r}" if role.name else f"a {role.kind}"
 
 
-def _bounds(own: BuildObject) -> Floats:
+def _bounds(item: BuildObject) -> Floats:
     """(2, 3) least and greatest coordinates of what is printed of an object."""
-    surface = concatenate(own.surfaces(PART))
+    surface = concatenate(item.surfaces(PART))
     used = surface.vertices[surface.faces.ravel()]
     return np.stack([used.min(axis=0), used.max(axis=0)])
 
@@ -221,13 +221,13 @@ def _box_at(points: Floats) -> Zone | None:
     rows = [(x, y, z) for x, y, z in axes.tolist()]
     level = np.allclose(axes, np.eye(3), rtol=0.0, atol=SAME)
     box = _box_along(None if level else (rows[0], rows[1], rows[2]), points)
-    own, low, high = box.along(points), np.array(box.min_mm), np.array(box.max_mm)
-    near = np.minimum(np.abs(own - low), np.abs(own - high)).max()
-    return box if near <= SAME * lengths[-1] and len(np.unique(own > 0.5 * (low + high), axis=0)) == 8 else None
+    places, low, high = box.along(points), np.array(box.min_mm), np.array(box.max_mm)
+    near = np.minimum(np.abs(places - low), np.abs(places - high)).max()
+    return box if near <= SAME * lengths[-1] and len(np.unique(places > 0.5 * (low + high), axis=0)) == 8 else None
 
 
 def _box_along(axes: tuple[Vector, Vector, Vector] | None, points: Floats) -> Zone:
     """The smallest box around some points with these axes; None: those of the frame."""
-    own = points if axes is None else points @ np.array(axes).T
-    (x0, y0, z0), (x1, y1, z1) = own.min(axis=0).tolist(), own.max(axis=0).tolist()
+    places = points if axes is None else points @ np.array(axes).T
+    (x0, y0, z0), (x1, y1, z1) = places.min(axis=0).tolist(), places.max(axis=0).tolist()
     return Zone((x0, y0, z0), (x1, y1, z1), axes)

@@ -18,8 +18,8 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
     Raises MeshError where nothing is left, and for a negative volume that is no solid.
     """
     surfaces, notes, subtracted = list[Surface](), list[str](), 0
-    for own in build.objects:
-        parts, negatives = own.surfaces(PART), [volume for volume in own.volumes if volume.role.kind == NEGATIVE]
+    for item in build.objects:
+        parts, negatives = item.surfaces(PART), [volume for volume in item.volumes if volume.role.kind == NEGATIVE]
         deep_mm = -min((float(part.vertices[part.faces.ravel(), 2].min()) for part in parts), default=0.0)
         sinks = build.on_plate and deep_mm > SINKING_MM
         if not parts or not (negatives or sinks):

@@ -131,7 +131,7 @@ def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], 
     for place, element in enumerate(config.findall("plate"), start=1):
         values = _values(element)
         instances = [_values(instance) for instance in element.findall("model_instance")]
-        standing = frozenset((own.get("object_id", ""), int(own.get("instance_id", "0"))) for own in instances)
+        standing = frozenset((instance.get("object_id", ""), int(instance.get("instance_id", "0"))) for instance in instances)
         plates.append(Plate(int(values.get("plater_id", place)), values.get("plater_name", ""), standing))
     return objects, parts, plates
 

@@ -95,7 +95,7 @@ class Package:
     def entry(self, name: str) -> str | None:
         """The entry that holds a part, whose names know no case (Open Packaging Conventions, 6.2.2.3); None: there is none."""
         wanted, entries = unquote(name).lstrip("/"), self.archive.namelist()
-        return wanted if wanted in entries else next((own for own in entries if own.lower() == wanted.lower()), None)
+        return wanted if wanted in entries else next((name for name in entries if name.lower() == wanted.lower()), None)
 
     def sliced(self) -> bool:
         """Whether it keeps the G-code of a plate."""
@@ -145,7 +145,7 @@ class Package:
             self._check_extensions(root, content)
             objects = {element.get("id", ""): element for element in reversed(root.findall("{*}resources/{*}object"))}
             painted = tuple(
-                what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % own.encode(), content) for own in names)
+                what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % name.encode(), content) for name in names)
             )
             self.models[name] = Model(root, objects, _palettes(root), painted)
         return self.models[name]
@@ -212,8 +212,8 @@ class _Builder:
         """What is printed on a plate."""
         package, notes = self._package, self._notes
         items = self._items(package.model(self._start).root.findall("{*}build/{*}item"), plate)
-        built = [own for item in items if (own := self._object(item)) is not None]
-        if not any(own.surfaces(PART) for own in built):
+        built = [placed for item in items if (placed := self._object(item)) is not None]
+        if not any(placed.surfaces(PART) for placed in built):
             why = f" that is printed: it {notes[0]}" if notes else f", it keeps {GCODE_ONLY}" if package.sliced() else ""
             raise MeshError(f"{self._path}: its build places no mesh{why}")
         notes += [
@@ -235,8 +235,8 @@ class _Builder:
         for item in items:
             instances.append((item.get("objectid", ""), counts[item.get("objectid", "")]))
             counts[item.get("objectid", "")] += 1
-        printed = {own for own, item in zip(instances, items, strict=True) if _is_printed(item)}
-        self._plates = [own for own in self._configs.plates if own.instances & printed]
+        printed = {instance for instance, item in zip(instances, items, strict=True) if _is_printed(item)}
+        self._plates = [plate for plate in self._configs.plates if plate.instances & printed]
         chosen = self._plate(plate)
         for item, instance in zip(items, instances, strict=True):
             if not _is_printed(item):
@@ -286,8 +286,8 @@ class _Builder:
             mesh = element.find("{*}mesh")
             if mesh is not None:
                 volumes += self._volumes(placement, model, mesh, element.get("pid", ""))
-                own = placement.identity if placement.part == self._start else ""
-                for number in (*placement.within[:1], own):
+                whole = placement.identity if placement.part == self._start else ""
+                for number in (*placement.within[:1], whole):
                     settings = {**settings, **self._configs.objects.get(number, Role()).settings}
                     heights = self._configs.heights.get(self._rank.get(number, ""), heights)
                 continue
@@ -299,13 +299,13 @@ class _Builder:
 
     def _with_role(self, placement: Placement, element: ElementTree.Element) -> Placement:
         """The placement with the role that the slicer gives its object."""
-        within, told = placement.within, self._configs.parts
-        role = told.get(((*within, placement.identity)[0], placement.identity))
-        own = read_cura(element)
-        if role is None and (own.kind != PART or own.settings):
+        within, parts = placement.within, self._configs.parts
+        role = parts.get(((*within, placement.identity)[0], placement.identity))
+        cura = read_cura(element)
+        if role is None and (cura.kind != PART or cura.settings):
             outer = Role() if placement.role is None else placement.role
-            kind = own.kind if outer.kind == PART else outer.kind
-            role = Role(kind, own.name or outer.name, {**outer.settings, **own.settings})
+            kind = cura.kind if outer.kind == PART else outer.kind
+            role = Role(kind, cura.name or outer.name, {**outer.settings, **cura.settings})
         return placement if role is None else Placement(placement.part, placement.identity, placement.transform, within, role)
 
     def _volumes(self, placement: Placement, model: Model, mesh: ElementTree.Element, pid: str) -> Iterator[BuildVolume]:
@@ -363,8 +363,8 @@ class _Builder:
 
     def _leave_out(self, number: str, why: str) -> None:
         element = self._package.model(self._start).objects.get(number)
-        told = self._configs.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
-        self._notes.append(f"leaves out object {told or number}, {why}")
+        name = self._configs.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
+        self._notes.append(f"leaves out object {name or number}, {why}")
 
 
 def _paint(what: str, digits: str) -> str:
@@ -373,7 +373,7 @@ def _paint(what: str, digits: str) -> str:
         shares = painted_shares(digits) if what in ("support", "seams") else {}
     except ValueError:
         return ""
-    return next((kind for (own, paint), kind in PAINTS.items() if own == what and shares.get(paint, 0.0) > 0.5), "")
+    return next((kind for (subject, paint), kind in PAINTS.items() if subject == what and shares.get(paint, 0.0) > 0.5), "")
 
 
 def _attribute(element: ElementTree.Element, name: str) -> str:

@@ -147,15 +147,15 @@ def read_profile(file: Path) -> Config:
 def of_values(values: Mapping[str, str], name: str = "") -> Config:
     """Settings under Cura's names, formulas worked out where that can be."""
     entries, formulas, known = dict[str, Entry](), list[str](), worked_out(values)
-    for own, text in known.items():
-        switch, word, off = HOLDS.get(own, ("", "", None))
+    for theirs, text in known.items():
+        switch, word, off = HOLDS.get(theirs, ("", "", None))
         if text.startswith("="):
-            formulas.append(own)
+            formulas.append(theirs)
         elif (said := known.get(switch, word)).lower() != word and not said.startswith("="):
-            entries |= {KEYS.get(own, own): Entry(own, off)} if off is not None else {}
-        elif own not in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
-            key = KEYS.get(own, own)
-            entries[key] = Entry(own, _said(key, text))
+            entries |= {KEYS.get(theirs, theirs): Entry(theirs, off)} if off is not None else {}
+        elif theirs not in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
+            key = KEYS.get(theirs, theirs)
+            entries[key] = Entry(theirs, _said(key, text))
     if (angle_deg := finite(known.get("support_angle", ""))) is not None:  # Cura's is from the vertical
         entries["support_material_threshold"] = Entry("support_angle", f"{90.0 - angle_deg:g}")
     entries |= _raft(known)
@@ -171,7 +171,7 @@ def _raft(values: Mapping[str, str]) -> dict[str, Entry]:
     """
     entries = dict[str, Entry]()
     if (kind := values.get("adhesion_type", "")) and not kind.startswith("="):
-        layers = sum(_number(values.get(own, ""), usual) for own, usual in RAFT_LAYERS.items())
+        layers = sum(_number(values.get(key, ""), usual) for key, usual in RAFT_LAYERS.items())
         entries["raft_layers"] = Entry("adhesion_type", f"{layers:g}" if kind == "raft" else "0")
     if (gap_mm := finite(values.get("raft_airgap", ""))) is not None:
         into_mm = _number(values.get("layer_0_z_overlap", ""), 0.5 * gap_mm)

@@ -33,9 +33,9 @@ class SlicerSettings:
         """Those of the print."""
         return self.of_values(self.values)
 
-    def of_place(self, own: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
+    def of_place(self, of_volume: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
         """What settings of a volume or an object become: values by keys of a process, and the names of those that are left."""
-        return settings_of_place(self.of_values({**self.values, **own}), own.keys()) if own else ({}, [])
+        return settings_of_place(self.of_values({**self.values, **of_volume}), of_volume.keys()) if of_volume else ({}, [])
 
 
 def is_slicer_file(file: Path) -> bool:
@@ -64,8 +64,8 @@ def read_slicer_settings(file: Path) -> SlicerSettings:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
     except DAMAGED as error:
         raise ProfileError(f"profile {file}: its settings are damaged ({first_line(error)})") from None
-    kept = any(name.startswith(OF_CURA) for name in entries)
-    return SlicerSettings(cura.read_values(file)[0] if kept else {}, cura.of_values)
+    has_settings = any(name.startswith(OF_CURA) for name in entries)
+    return SlicerSettings(cura.read_values(file)[0] if has_settings else {}, cura.of_values)
 
 
 def _text(archive: ZipFile, name: str) -> str:
