@@ -16,6 +16,7 @@ from slicer.strokes.strokes import Strokes, in_pieces
 from slicer.strokes.travels import may_wipe_over
 
 SHORTEST = 0.5  # line widths: the steps of skin lines are no shorter,
+SHORTEST_STROKE = 4.0  # line widths of a stroke whose steps are lengthened
 ASIDE, ASIDE_ON_TOP = 0.25, 0.15  # where a line need not lie farther aside for that; on tops gaps are seen
 
 
@@ -37,7 +38,9 @@ def timed(
 
 def _without_short_steps(strokes: Strokes) -> Strokes:
     """The strokes, those of skins without short steps where that moves them little; the plastic of each stays the same."""
-    width_mm = np.where(strokes.is_of(*SKINS), strokes.width_mm, 0.0)
+    # A shorter stroke is nothing but its two ends, which lie where the layer below holds them.
+    eases = strokes.is_of(*SKINS) & (strokes.lengths_mm > SHORTEST_STROKE * strokes.width_mm)
+    width_mm = np.where(eases, strokes.width_mm, 0.0)
     aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN), ASIDE_ON_TOP, ASIDE)
     points, left = lengthen_steps(strokes.points, strokes.starts, SHORTEST * width_mm, aside_mm)
     eased = replace(strokes, points=points[left], starts=np.append(0, np.cumsum(left))[strokes.starts])
