@@ -247,7 +247,7 @@ def order_layer(
     below = sections.below(index)
     if below is not None and own.fuzzy_skin != "none":
         below = offset(below, own.fuzzy_skin_thickness_mm)  # rough walls lie on rough walls
-    strokes = split_overhangs(strokes, outline, below, own)
+    strokes = split_overhangs(strokes, outline, below, own, shells.supports.right_under(index))
     if index == 0 and not on_platform and process.interlock == "grooves":
         strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
     places = sections.speed_places if index else []  # first layers have speeds of their own

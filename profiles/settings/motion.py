@@ -30,7 +30,11 @@ class Motion(Frozen):
         description="greatest speed of walls that nothing carries, mm/s: slow, so that they set before they sag",
     )
     bridge_speed_mm_s: float = Field(
-        30.0, gt=0, le=1000, description="speed of bridges, mm/s: faster strands tear, slower ones sag"
+        30.0,
+        gt=0,
+        le=1000,
+        description="speed of bridges, mm/s: faster strands tear, slower ones sag; also the greatest of overhanging walls over "
+        "dense support",
     )
     infill_bridge_speed_mm_s: float = Field(
         40.0, gt=0, le=1000, description="speed of the first solid layer over sparse infill, mm/s: it hangs between the lines"

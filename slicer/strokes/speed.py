@@ -82,7 +82,7 @@ def _by_kind(speeds: Mapping[Kind, float]) -> Floats:
 def _of_strokes(strokes: Strokes, process: Process) -> Floats:
     """The speed of its kind, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
     usual = _by_kind(stroke_speeds(process))[strokes.kind]
-    hanging = np.array([np.inf, *(getattr(process, key) for key in BY_SHARE)])[strokes.overhang]
+    hanging = np.array([np.inf, *(getattr(process, key) for key in BY_SHARE), process.bridge_speed_mm_s])[strokes.overhang]
     small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
     lowered = np.minimum(usual, np.where(strokes.overhang > 0, hanging, small))
     return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
@@ -96,7 +96,7 @@ def kinds_apart(processes: Sequence[Process]) -> list[Kind]:
 
     speeds = [stroke_speeds(process) for process in processes]
     kinds = [kind for kind in KINDS if len({own[kind] for own in speeds}) > 1]
-    kinds += [*RINGS, Kind.GAP, Kind.OVERHANG] if differ("small_wall_speed_mm_s", *BY_SHARE) else []
+    kinds += [*RINGS, Kind.GAP, Kind.OVERHANG] if differ("small_wall_speed_mm_s", "bridge_speed_mm_s", *BY_SHARE) else []
     return [*kinds, Kind.BRIDGE] if differ("infill_bridge_speed_mm_s") else kinds
 
 

@@ -26,6 +26,7 @@ RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 COLUMNS = ("kind", "width_mm", "flow", "overhang", "over_infill", "small", "varies", "retract", "place")
 Buffers = tuple[Floats, Indices, Indices, Mask]
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
+ON_SUPPORT = 5  # overhang of a wall that lies over dense support
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
 SHORTEST_HANGING = 2.0  # line widths: no stretch is split off for less, the speed would flicker
 SHORTEST_FARTHER = 6.0  # line widths: nor within what hangs for less, because it hangs farther
@@ -41,9 +42,9 @@ class Strokes:
     points: (n, 3) mm, x, y and the width of the bead there; starts: (k + 1,) where the points of each stroke begin.
     approach: (m, 2) points that the travels to strokes pass; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS;
     width_mm: mean; flow, over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or
-    nothing of it lies on plastic; small: a closed wall no longer than process.small_wall_mm, also the pieces of one whose width
-    varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back; place: the number of the
-    place in which other settings hold, from 1; 0: none.
+    nothing of it lies on plastic, ON_SUPPORT; small: a closed wall no longer than process.small_wall_mm, also the pieces of one
+    whose width varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back; place: the
+    number of the place in which other settings hold, from 1; 0: none.
     """
 
     points: Floats
@@ -233,11 +234,14 @@ def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, f
             a = b
 
 
-def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None, process: Process) -> Strokes:
+def split_overhangs(
+    strokes: Strokes, section: Polygons, below: Polygons | None, process: Process, support: Polygons | None = None
+) -> Strokes:
     """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic.
 
     below: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the
-    share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share.
+    share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share. support: dense, right under
+    the layer: over it an overhanging wall sags no farther than the gap, however little of it lies on plastic.
     """
     if below is None or process.overhang_share <= 0.0:
         return strokes
@@ -256,6 +260,10 @@ def split_overhangs(strokes: Strokes, section: Polygons, below: Polygons | None,
         if share <= process.overhang_share:
             kind = np.where(within, NUMBER[Kind.OVERHANG], kind)
         strokes = replace(strokes, kind=kind.astype(np.int8), overhang=overhang.astype(np.int8))
+    held = Polygons() if support is None or support.is_empty() else beyond ^ support
+    if not held.is_empty():
+        strokes, within = split(strokes, held, strokes.is_of(Kind.OVERHANG), shortest_mm)
+        strokes = replace(strokes, overhang=np.where(within, ON_SUPPORT, strokes.overhang).astype(np.int8))
     return strokes
 
 

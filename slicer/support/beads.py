@@ -7,6 +7,7 @@ tilted, and comes off by hand.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import takewhile
 from math import ceil
 
@@ -20,7 +21,7 @@ from profiles.process import Process
 from slicer.bead import OUTSIDE, Bead, spacing_mm, with_line_width
 from slicer.fill.lines import clip_pattern, parallel_lines
 from slicer.fill.skin import SolidLines, skin_beads
-from slicer.geometry.clip import rotation_2d
+from slicer.geometry.clip import rotation_2d, runs_within
 from slicer.geometry.edge_index import EdgeIndex, free, index_edges
 from slicer.geometry.polygons import (
     Polygons,
@@ -28,12 +29,13 @@ from slicer.geometry.polygons import (
     close_loop,
     closing,
     contours,
+    islands,
     offset,
     offset_round,
     opening,
     union,
 )
-from slicer.geometry.polyline import Segment
+from slicer.geometry.polyline import Segment, length_mm
 from slicer.paths import Kind
 from slicer.sectioning import Sections
 from slicer.support.reachable import SMOOTH_MM
@@ -192,26 +194,47 @@ def brim(
 
     footprint: the whole area that the first layer prints; base: the area of it on which the print stands; plate: the outline
     of the plate, which no loop leaves; top_mm: height of the print. A base that would tip over gets a brim of
-    process.small_base_brim_mm.
+    process.small_base_brim_mm, which goes no farther from it: round support it would hold nothing.
     """
-    spacing = spacing_mm(process.line_width_mm, height_mm)
-    width = process.brim_mm
-    if width == 0.0 and process.small_base_brim_mm > 0.0 and tips_over(base, top_mm):
-        width = process.small_base_brim_mm
+    spacing, beads = spacing_mm(process.line_width_mm, height_mm), list[Bead]()
+    holds_base = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and tips_over(base, top_mm)
+    width = process.small_base_brim_mm if holds_base else process.brim_mm
     if width > 0.0:
         count, nearest = max(ceil(width / spacing - 1e-9), 1), process.brim_gap_mm + 0.5 * spacing
-    else:
-        count, nearest = process.skirt_loops, process.skirt_distance_mm + 0.5 * process.line_width_mm
+        beads = _loops_around(footprint, plate, process, nearest, spacing, count)
+    if holds_base:
+        beads = _near_base(beads, offset_round(base, nearest + (count - 0.5) * spacing), count)
+    if beads:
+        return beads
+    nearest = process.skirt_distance_mm + 0.5 * process.line_width_mm
+    return _loops_around(footprint, plate, process, nearest, spacing, process.skirt_loops)
+
+
+def _loops_around(
+    footprint: Polygons, plate: Polygons, process: Process, nearest_mm: float, spacing: float, count: int
+) -> list[Bead]:
+    """Loops round an area as far as the plate has room, the first of them at a distance; outermost first."""
     outside, half = _outside(footprint), 0.5 * process.line_width_mm
     beads: list[Bead] = []
     for k in reversed(range(count)):
         # Along the plate's edge the loops lie beside each other as they do elsewhere; one that finds no room is left out.
-        around = offset_round(outside, nearest + k * spacing) ^ offset(plate, -half - (count - 1 - k) * spacing)
-        if (offset_round(outside, min(half, nearest)) - around).area() > LEAST_COVERED_MM2:
+        around = offset_round(outside, nearest_mm + k * spacing) ^ offset(plate, -half - (count - 1 - k) * spacing)
+        if (offset_round(outside, min(half, nearest_mm)) - around).area() > LEAST_COVERED_MM2:
             continue
         loops = [loop for loop in contours(around) if area_mm2(loop) > 0]
         beads += [Bead(Kind.SKIRT, start_at_rear(loop), process.line_width_mm, BRIM_RANK - k) for loop in loops]
     return beads
+
+
+def _near_base(loops: Sequence[Bead], near: Polygons, count: int) -> list[Bead]:
+    """What of a brim's loops lies near a base, one piece of the base after the other; count: ranks of loops."""
+    return [
+        replace(loop, points=run, rank=loop.rank - count * number)
+        for number, place in enumerate(islands(near))
+        for loop in loops
+        for run in runs_within(loop.points, place)
+        if length_mm(run) > loop.width_mm
+    ]
 
 
 def _outside(polygons: Polygons) -> Polygons:

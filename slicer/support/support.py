@@ -64,6 +64,12 @@ class Supports:
     missed: Sequence[Polygons]
     unwanted: Sequence[Polygons]
 
+    def right_under(self, layer: int) -> Polygons:
+        """The dense support whose top is nearest to a layer, support_gap_mm under it."""
+        heights, gap_mm = self.sections.heights, self.sections.process.support_gap_mm
+        highest = int(np.searchsorted(heights.tip_mm, heights.bottom_mm[layer] - gap_mm + SAME_MM, side="right")) - 1
+        return self.dense[highest] if highest >= 0 else Polygons()
+
     @property
     def unsupported_mm2(self) -> float:
         """Hanging area, seen from above, that no support could reach."""

@@ -17,7 +17,7 @@ from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.strokes.strokes import Strokes, split_overhangs, strokes_of
 from slicer.strokes.travels import NOWHERE
-from tests.shapes import standing
+from tests.shapes import standing, tee
 from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, rows_of, whole
 
 WIDTH = 0.45
@@ -61,6 +61,13 @@ def test_a_line_that_fills_a_gap_beside_a_bridge_overhangs_as_walls_do() -> None
 def test_a_bead_shorter_than_two_lines_overhangs_where_all_of_it_hangs() -> None:
     pieces = split(placed([(8, 5), (8.5, 5)]), Polygons.square((20, 10)), Polygons.square((5, 10)))
     assert kinds(pieces) == [Kind.OVERHANG]
+
+
+def test_walls_over_dense_support_are_as_fast_as_bridges_and_walls_over_air_are_slow() -> None:
+    settings = "process.least_layer_time_s=0", "process.bridge_speed_mm_s=28", "process.overhang_0_speed_mm_s=15"
+    held, free = (slice_part(whole(tee()), profile(*settings, f"process.support={support}")) for support in ("auto", "none"))
+    speeds = [[path.speed_mm_s for path in of_kind(sliced, Kind.OVERHANG)] for sliced in (held, free)]
+    assert (min(speeds[0]), max(speeds[0]), min(speeds[1])) == (28, 28, 15)
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,14 @@ def test_a_tall_part_on_a_small_base_gets_a_brim_and_a_stout_one_its_skirt() -> 
     assert min(np.abs(p.points).max() for p in stout) > 13
 
 
+def test_the_brim_of_a_small_base_goes_round_it_and_not_round_its_support() -> None:
+    sliced, base = slice_part(whole(tee(4, 40, 40)), profile("process.elephant_foot_mm=0")), shapely.box(-2, -2, 2, 2)
+    away = [shapely.distance(base, shapely.points(path.points)) for path in of_kind(sliced, Kind.SKIRT)]
+    assert max(np.abs(path.points).max() for path in sliced.layers[0].paths if path.kind is Kind.SUPPORT) > 6.5
+    assert max(distance.max() for distance in away) == pytest.approx(5, abs=0.3), "round the support it would reach 11.8"
+    assert min(distance.min() for distance in away) == pytest.approx(0.5 * (0.45 - 0.2 * (1 - np.pi / 4)), abs=0.01)
+
+
 def test_no_brim_where_it_is_not_wanted() -> None:
     assert brim_of(box(6, 6, 40), *BARE, "process.small_base_brim_mm=0") == []
 
