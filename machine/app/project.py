@@ -103,8 +103,9 @@ class Project:
         """A request for the model inside: the project decides what the command line leaves open.
 
         file: the project; copies: as the user has given it, None for as many as the project has. Raises PlanError for options
-        that do not go with its plan.
+        that do not go with it.
         """
+        self.check_plate(request.plate, file)
         own_plan = self.plan if not request.cuts.plans and request.cuts.planes is None else None
         if own_plan is not None:
             self._check_plan_goes_with(request, file)
@@ -116,8 +117,13 @@ class Project:
             own_marks=own_plan is None or not self.marks_in_plan,
             stops=request.stops or self.stops,
             copies=self.copies if copies is None else copies,
-            plate=self.plate if request.plate is None else request.plate,
+            plate=self.plate,
         )
+
+    def check_plate(self, plate: int | None, file: Path) -> None:
+        """Raises PlanError where another plate is asked for: the parts of the project are those of one."""
+        if plate is not None:
+            raise PlanError(f"--plate {plate}: {file} is a project of tiltprint, whose plan is of one plate")
 
     def _check_plan_goes_with(self, request: ModelRequest, file: Path) -> None:
         if request.orient or (request.orient is False and self.rotation != STANDING):

@@ -120,7 +120,8 @@ class _Marks:
             return {}
         process, left = self._settings.of_place(settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
-        rest = f"; without {', '.join(left[:MOST_TOLD])}{', ...' * (len(left) > MOST_TOLD)}" if left else ""
+        values = [f"{name} = {settings[name]}" for name in left[:MOST_TOLD]] + ["..."] * (len(left) > MOST_TOLD)
+        rest = f"; not taken: {', '.join(values)}" if left else ""
         self._tell(what, *(("is", f"taken as [[modifier]]: {taken}{rest}") if taken else ("changes", f"nothing here{rest}")))
         return process
 

@@ -7,7 +7,7 @@ OrcaSlicer have a component for each and say in model_settings.config what it is
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
+from math import isfinite, nan
 from xml.etree.ElementTree import Element
 
 from mdp.formats.painted import AGAINST, FOR
@@ -114,7 +114,8 @@ def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[t
         number = element.get("id", "")
         objects[number] = _role(element)
         triangles[number] = [
-            (int(volume.get("firstid", "")), int(volume.get("lastid", "")), _role(volume)) for volume in element.findall("volume")
+            (_whole("firstid", volume.get("firstid")), _whole("lastid", volume.get("lastid")), _role(volume))
+            for volume in element.findall("volume")
         ]
     return objects, triangles
 
@@ -131,8 +132,10 @@ def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], 
     for place, element in enumerate(config.findall("plate"), start=1):
         values = _values(element)
         instances = [_values(instance) for instance in element.findall("model_instance")]
-        standing = frozenset((instance.get("object_id", ""), int(instance.get("instance_id", "0"))) for instance in instances)
-        plates.append(Plate(int(values.get("plater_id", place)), values.get("plater_name", ""), standing))
+        standing = frozenset(
+            (instance.get("object_id", ""), _whole("instance_id", instance.get("instance_id", "0"))) for instance in instances
+        )
+        plates.append(Plate(_whole("plater_id", values.get("plater_id", str(place))), values.get("plater_name", ""), standing))
     return objects, parts, plates
 
 
@@ -142,11 +145,26 @@ def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[
     for element in config.iter("object"):
         for between in element.findall("range"):
             settings = {option.get("opt_key", ""): (option.text or "").strip() for option in between.findall("option")}
-            low, high = float(between.get("min_z", "")), float(between.get("max_z", ""))
-            if not (isfinite(low) and isfinite(high)):
-                raise ValueError(f"a range of heights from {low:g} to {high:g}")
+            low, high = (_height_mm(between, name) for name in ("min_z", "max_z"))
             heights.setdefault(element.get("id", ""), []).append((low, high, _settings(settings)))
     return heights
+
+
+def _whole(name: str, text: str | None) -> int:
+    if text is None or not text.strip().isascii() or not text.strip().removeprefix("-").isdigit():
+        raise ValueError(f"{name} is {text!r}: a whole number is expected")
+    return int(text)
+
+
+def _height_mm(between: Element, name: str) -> float:
+    text = between.get(name, "")
+    try:
+        height_mm = float(text)
+    except ValueError:
+        height_mm = nan
+    if not isfinite(height_mm):
+        raise ValueError(f"{name} of a height range is {text!r}: a number is expected")
+    return height_mm
 
 
 def read_cura(element: Element) -> Role:
@@ -170,6 +188,10 @@ def _role(element: Element) -> Role:
     """What an object, a volume or a part of a config is."""
     values = _values(element)
     kind_name = element.get("subtype") or values.get("volume_type") or values.get("part_type", "")
+    if kind_name and kind_name not in VOLUME_TYPES:
+        raise ValueError(
+            f"the kind of {values.get('name') or 'a volume'} is {kind_name!r}: one of {', '.join(VOLUME_TYPES)} is expected"
+        )
     kind = VOLUME_TYPES.get(kind_name) or (MODIFIER if values.get("modifier") == "1" else PART)
     return Role(kind, values.get("name", ""), _settings(values))
 

@@ -132,7 +132,7 @@ class Package:
         try:
             return read(root)
         except ValueError as error:
-            raise self._damaged(name, error) from None
+            raise MeshError(f"{self.path}: its part {self.entry(name)} is malformed: {error}") from None
 
     def model(self, name: str) -> Model:
         """A model part, parsed once; raises MeshError, also for what it needs and is not read."""
@@ -261,8 +261,8 @@ class _Builder:
             if plate.number == number:
                 return plate
         known = ", ".join(str(plate.number) for plate in plates)
-        empty = any(plate.number == number for plate in self._configs.plates)
-        raise MeshError(f"{self._path}: --plate {number}: its plate is {'empty' if empty else 'not there'}; there are {known}")
+        why = "is empty" if any(plate.number == number for plate in self._configs.plates) else "does not exist"
+        raise MeshError(f"{self._path}: --plate {number}: that plate {why}; plate{'s' * (len(plates) > 1)} with objects: {known}")
 
     def _object(self, item: ElementTree.Element) -> BuildObject | None:
         """What an item places; None: nothing."""

@@ -53,7 +53,7 @@ def _of_slicer_file(file: Path) -> Config:
     """The settings inside a slicer file. Raises ProfileError where it keeps none."""
     settings = read_slicer_settings(file)
     if not settings.values:
-        raise ProfileError(f"profile {file}: keeps no print settings; a .3mf that a slicer has saved with them is expected")
+        raise ProfileError(f"{file}: keeps no print settings; a .3mf that a slicer has saved with them is expected")
     return settings.config
 
 

@@ -63,7 +63,7 @@ def read_slicer_settings(file: Path) -> SlicerSettings:
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
     except DAMAGED as error:
-        raise ProfileError(f"profile {file}: its settings are damaged ({first_line(error)})") from None
+        raise ProfileError(f"profile {file}: the settings inside it are damaged ({first_line(error)})") from None
     has_settings = any(name.startswith(OF_CURA) for name in entries)
     return SlicerSettings(cura.read_values(file)[0] if has_settings else {}, cura.of_values)
 

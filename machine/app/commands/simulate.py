@@ -33,7 +33,10 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
         if not request.is_gcode:
             raise ProfileError(f"--model {reference}: {request.model} is a model itself; --model goes with a G-code file")
         project = open_project(reference)
-        plate = project.plate if project is not None and request.plate is None else request.plate
+        plate = request.plate
+        if project is not None:
+            project.check_plate(plate, Path(reference))
+            plate = project.plate
         reference = reference if project is None else project.argument
         check_file(locate(reference))
     loaded = load_program(request)

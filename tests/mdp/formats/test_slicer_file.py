@@ -129,7 +129,9 @@ def test_a_modifier_brings_those_of_its_settings_that_may_change_within_a_layer(
     assert modifier.process == {"walls": 4, "infill_density": 0.6}
     assert isinstance(modifier.volume, Zone)
     np.testing.assert_allclose([modifier.volume.min_mm, modifier.volume.max_mm], [(-5, -4, -5), (5, 4, 25)], atol=1e-9)
-    assert model.notes == ("modifier 'modifier' is taken as [[modifier]]: walls = 4, infill_density = 0.6; without layer_height",)
+    assert model.notes == (
+        "modifier 'modifier' is taken as [[modifier]]: walls = 4, infill_density = 0.6; not taken: layer_height = 0.1",
+    )
 
 
 def test_settings_of_an_object_hold_in_a_box_around_it_and_those_of_a_part_in_the_part(tmp_path: Path) -> None:
@@ -261,9 +263,9 @@ def test_a_slicer_file_says_which_plate_is_taken_and_refuses_one_that_is_not_the
         "prints plate 2; --plate prints another: 3",
         "leaves out object b, which is switched off in its slicer",
     )
-    with pytest.raises(MeshError, match="--plate 1: its plate is empty; there are 2, 3"):
+    with pytest.raises(MeshError, match="--plate 1: that plate is empty; plates with objects: 2, 3"):
         read_model(path, plate=1)
-    with pytest.raises(MeshError, match="--plate 4: its plate is not there; there are 2, 3"):
+    with pytest.raises(MeshError, match="--plate 4: that plate does not exist; plates with objects: 2, 3"):
         read_model(path, plate=4)
     check(read_model(path, plate=3).mesh, BOX)
     change(path, "Metadata/model_settings.config", '"instance_id" value="1"', '"instance_id" value="7"')
@@ -314,7 +316,12 @@ CONFIG = "Metadata/Slic3r_PE_model.config"
     [
         (CONFIG, 'lastid="23"', 'lastid="24"', "volume 'negative' has triangles 12 to 24 of object 1, which has 24"),
         (CONFIG, 'firstid="12"', 'firstid="-1"', "volume 'negative' has triangles -1 to 23 of object 1"),
-        (CONFIG, 'lastid="23"', 'lastid="many"', "its part metadata/slic3r_pe_model.config is missing or malformed"),
+        (
+            CONFIG,
+            'lastid="23"',
+            'lastid="many"',
+            "its part Metadata/Slic3r_PE_model.config is malformed: lastid is 'many': a whole",
+        ),
         (CONFIG, "</config>", "", "its part metadata/slic3r_pe_model.config is missing or malformed"),
         (CONFIG, 'firstid="12"', 'firstid="13"', "is not closed"),
         ("3D/3dmodel.model", '<triangle v1="1"', '<triangle v1="99"', "face 1 of 24 names vertex [99"),
@@ -336,7 +343,7 @@ def test_damaged_settings_leave_a_sound_mesh_readable_with_a_note(tmp_path: Path
     check(model.mesh, BLOCK)
     assert model.zones.modifiers == ()
     (note,) = model.notes
-    assert note.startswith("its settings are damaged (")
+    assert note.startswith("the settings inside it are damaged (")
     assert note.endswith("): those of its objects, modifiers and height ranges are left out")
 
 
@@ -470,7 +477,7 @@ def test_what_is_said_of_many_volumes_is_said_once(tmp_path: Path) -> None:
     objects = [Object([*volumes, *blockers], [AT_ORIGIN], {"wall_generator": "arachne"})]
     assert read_model(bambu(tmp_path / "a.3mf", objects, np.random.default_rng(1))).notes == (
         "subtracted 3 negative volumes",
-        "object 'b' changes nothing here; without wall_generator",
+        "object 'b' changes nothing here; not taken: wall_generator = arachne",
         "support blocker 'no_support' and 2 more are taken as [[no_support]]",
     )
 

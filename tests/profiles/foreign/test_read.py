@@ -278,7 +278,7 @@ def test_settings_in_a_damaged_zip_are_refused_in_one_sentence(
     tmp_path: Path, damaged: Callable[[Path, str, str], Path], name: str, member: str
 ) -> None:
     file = damaged(tmp_path / name, member, "[general]\nversion = 4\n[values]\nwall_line_count = 3\n" * 9)
-    with pytest.raises(ProfileError, match=r"x\.\w+: (is no profile of Cura|its settings are damaged) \(.+\)$"):
+    with pytest.raises(ProfileError, match=r"x\.\w+: (is no profile of Cura|the settings inside it are damaged) \(.+\)$"):
         read_config(file)
 
 
@@ -293,5 +293,5 @@ def test_json_in_a_slicer_file_that_is_not_as_prusaslicer_writes_it_is_refused_b
     with ZipFile(tmp_path / "x.3mf", "w") as archive:
         block = "; prusaslicer_json_config = begin\n; {}\n; prusaslicer_json_config = end\n"
         archive.writestr("Metadata/Slic3r_PE.config", block)
-    with pytest.raises(ProfileError, match=r"^profile .*x\.3mf: its settings are damaged \(prusaslicer_json_config is not"):
+    with pytest.raises(ProfileError, match=r"^profile .*: the settings inside it are damaged \(prusaslicer_json_config is not"):
         read_config(tmp_path / "x.3mf")

@@ -35,7 +35,7 @@ RULES = (
     (r"--(pause|filament-change) (\S+): ", rf"\2 {_PAUSES}: "),
     (r"--part \d+:", "its own "),
     (r"--plate prints another: ([\d, ]+)", r"another can be taken below: \1"),
-    (r"--plate (\d+): its plate is", r"plate \1 is"),
+    (r"--plate (\d+): that plate", r"plate \1"),
     (r"; profiles import lists them", ""),
     (r"--ranker ([^:]*): ", r"Ranked as \1: "),
     (r"give --set (\S+)=([\d.e+-]+)", r"set \1 to \2"),

@@ -207,9 +207,8 @@ class Session(SessionBase):
         model = self.bench.model
         numbers = [] if model is None else list(model.plates)
         if model is None or not isinstance(plate, int) or plate not in numbers:
-            raise PlanError(
-                f"plate is {plate!r}: {', '.join(map(str, numbers)) or 'nothing, for the model has no plates,'} is allowed"
-            )
+            allowed = f"one of {', '.join(map(str, numbers))} is expected" if numbers else "the model has no plates"
+            raise PlanError(f"plate is {plate!r}: {allowed}")
         await self.open_model(model.path, model.name, anew=False, plate=plate)
 
     async def take_settings_inside(self) -> None:
