@@ -276,9 +276,17 @@ class Zones:
     @property
     def boxes(self) -> "Zones":
         """Those that are boxes."""
+        return self._where(True)
+
+    @property
+    def shapes(self) -> "Zones":
+        """Those that are none."""
+        return self._where(False)
+
+    def _where(self, boxes: bool) -> "Zones":
         kinds = (self.keep, self.no_seam, self.no_support, self.support)
-        keep, no_seam, no_support, support = (tuple(zone for zone in zones if isinstance(zone, Zone)) for zones in kinds)
-        modifiers = tuple(modifier for modifier in self.modifiers if isinstance(modifier.volume, Zone))
+        keep, no_seam, no_support, support = (tuple(zone for zone in zones if isinstance(zone, Zone) == boxes) for zones in kinds)
+        modifiers = tuple(modifier for modifier in self.modifiers if isinstance(modifier.volume, Zone) == boxes)
         return Zones(keep, no_seam, no_support, support, modifiers)
 
     def beside(self, others: "Zones") -> "Zones":

@@ -80,7 +80,7 @@ class Project:
     model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows
     them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
     parts: 0 where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the
-    print waits for a person; marks_in_plan: the plan has the marks that the model's own file has, too; figures: of the print,
+    print waits for a person; marks_in_plan: the plan has the boxes that the model's own file marks; figures: of the print,
     for people and other programs; plate: of the model where that is a slicer file.
     """
 

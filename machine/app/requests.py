@@ -73,9 +73,10 @@ class ModelRequest:
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down in the cheapest orientation; None: where nothing says how it lies. compare: with the same model in one part. force:
     go on although the dry run found errors. profile_names, settings: machine, material and process as the user has given them,
-    names or files, and KEY=VALUE over them. project: the project file that the model comes from; own_marks: the marks of the
-    model's own file count beside those of the plan. stops: where the print waits for a person. copies: the number of each
-    model on the plate; beside: the other models there. plate: of each model's slicer file; None: the first that holds something.
+    names or files, and KEY=VALUE over them. project: the project file that the model comes from; own_marks: the boxes that the
+    model's own file marks count beside those of the plan, which has them else. stops: where the print waits for a person. copies:
+    the number of each model on the plate; beside: the other models there. plate: of each model's slicer file; None: the first
+    that holds something.
     """
 
     model: str

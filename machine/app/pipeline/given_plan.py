@@ -4,14 +4,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from machine.app.requests import MOST_COPIES, ModelRequest
+from mdp.directions.orientation import motion_between
 from mdp.directions.turns import turned_further
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Mesh
 from mdp.model_file import plan_beside
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.search.search import check_part_count
-from mdp.zone import Modifier
+from mdp.zone import NO_ZONES, Modifier, Zones
 from profiles.errors import PlanError, ProfileError
 from profiles.part_settings import problems_of_place
 from profiles.profile import Profile, with_part_settings
@@ -39,6 +42,14 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
             raise PlanError(f"--plan {file}: --plan {each[name].cuts.plan} cuts {model} already, and one plan cuts a model")
         each[name] = replace(each[name], cuts=replace(request.cuts, plans=(file,)))
     return each
+
+
+def with_file_marks(plan: PlanFile, zones: Zones, before: Mesh, after: Mesh, pedestal_mm: float) -> PlanFile:
+    """The plan with marks of the model's file, which lie on the model as it is read. after: the same model as it lies now."""
+    if zones == NO_ZONES:
+        return plan
+    rotation, shift_mm = (np.eye(3), np.zeros(3)) if after is before else motion_between(before, after)
+    return replace(plan, zones=zones.transform(rotation, shift_mm + np.array([0.0, 0.0, pedestal_mm])).beside(plan.zones))
 
 
 def check_number(request: ModelRequest) -> None:

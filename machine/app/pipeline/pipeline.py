@@ -20,6 +20,7 @@ from machine.app.pipeline.given_plan import (
     lays_down,
     read_given_plan,
     request_of_each,
+    with_file_marks,
     with_plan_settings,
 )
 from machine.app.pipeline.memory import keep_modules, return_unused
@@ -39,7 +40,7 @@ from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
 from machine.program import Program
 from mdp.decomposition import Decomposition, Part
-from mdp.directions.orientation import motion_between, standing_still
+from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.plans.plan_file import PlanFile, plan_of
@@ -165,14 +166,11 @@ class _Search:
 
     def _with_marks(self, mesh: Mesh) -> PlanFile | None:
         """The plan with the marks that the model's file has, on the model as it lies now; None: there are neither."""
-        model = self._model
-        if model.zones == NO_ZONES or not self._request.own_marks:
+        zones = self._model.zones if self._request.own_marks else self._model.zones.shapes
+        if zones == NO_ZONES:
             return self._given
         given = PlanFile(self._request.name) if self._given is None else self._given
-        rotation, shift_mm = (np.eye(3), np.zeros(3)) if mesh is model.mesh else motion_between(model.mesh, mesh)
-        lift_mm = np.array([0.0, 0.0, self._request.profile.search.pedestal_mm])
-        zones = model.zones.transform(rotation, shift_mm + lift_mm)
-        return replace(given, zones=zones.beside(given.zones))
+        return with_file_marks(given, zones, self._model.mesh, mesh, self._request.profile.search.pedestal_mm)
 
     def record_of(self, decomposition: Decomposition) -> bytes:
         """What was recorded of the search that ended with a decomposition."""

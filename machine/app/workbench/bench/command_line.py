@@ -31,6 +31,8 @@ def export_command(bench: Bench) -> str:
         settings = [setting for setting in settings if setting.partition("=")[0].strip() != "process.rotate_deg"]
         settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.12g}' for angle in turns_deg(bench))}]")
     words += [word for setting in settings for word in ("--set", setting)]
+    if bench.model.plate is not None:
+        words += ["--plate", str(bench.model.plate)]
     if bench.planned:
         words += ["--plan", f"{stem}-plan.toml"]
     else:

@@ -1,6 +1,7 @@
 """Model: a model as it is read. Its triangles are in a file, so that they go through no pipe and lie in no memory for longer than
 they are worked with."""
 
+import pickle
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,9 +20,11 @@ from profiles.frozen import Vector
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A model as it is read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for every repair. key:
-    what tells it from every other reading; a page asks for its triangles by it. zones: the boxes that its file marks; plate:
-    of a slicer file, None: the first of `plates`, which are their names by their numbers; has_settings: its file keeps some.
+    """A model as it is read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for every repair.
+
+    key: what tells it from every other reading; a page asks for its triangles by it. zones: the boxes that its file marks;
+    shapes_file: with what else it marks, None: nothing. plate: of a slicer file, None: the first of `plates`, which are their
+    names by their numbers. has_settings: its file keeps some.
     """
 
     name: str
@@ -34,6 +37,7 @@ class Model:
     key: str = field(default_factory=lambda: token_hex(8))
     zones: Zones = NO_ZONES
     plate: int | None = None
+    shapes_file: Path | None = None
     plates: Mapping[int, str] = field(default_factory=dict)
     has_settings: bool = False
 
@@ -41,17 +45,24 @@ class Model:
     def stored(
         cls, name: str, path: Path, read: ReadModel, mesh_file: Path, plate: int | None = None, has_settings: bool = False
     ) -> "Model":
-        """One whose mesh is written to a file first; of its marks boxes alone are kept, which move with it."""
+        """One whose mesh is written to a file first, and marks that are no boxes to another; boxes move with the bench."""
         mesh, zones = read.mesh, read.zones
         with mesh_file.open("wb") as file:
             file.writelines(mesh_blocks(mesh))
         size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
-        kept, notes = zones.boxes, read.notes
-        if left := zones.count - kept.count:
-            verb, it = ("is", "it") if left == 1 else ("are", "them")
-            notes += (f"{left} of these marks {verb} no box and left out here: the command line has {it}",)
-        more: dict[str, Any] = {"zones": kept, "plate": plate, "plates": read.plates, "has_settings": has_settings}
-        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, notes, **more)
+        shapes_file = None
+        if zones.shapes != NO_ZONES:
+            shapes_file = mesh_file.with_suffix(".marks")
+            shapes_file.write_bytes(pickle.dumps(zones.shapes))
+        more: dict[str, Any] = {"zones": zones.boxes, "plate": plate, "plates": read.plates, "has_settings": has_settings}
+        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, read.notes, shapes_file=shapes_file, **more)
+
+    def shapes(self) -> Zones:
+        """What its file marks that is no box, on the model as it is read."""
+        if self.shapes_file is None:
+            return NO_ZONES
+        shapes: Zones = pickle.loads(self.shapes_file.read_bytes())  # written by this program into its own folder
+        return shapes
 
     def mesh(self) -> Mesh:
         """Its triangles, read anew."""

@@ -370,7 +370,7 @@ class Session(SessionBase):
         model: Model | Unscaled = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file(), plate)
         if isinstance(model, Unscaled):
             raise _UnscaledError(model)
-        finalize(model, model.mesh_file.unlink, missing_ok=True)
+        finalize(model, _remove_files, model.mesh_file, model.shapes_file)
         return model
 
     def _begin_ranking(self, model: Model) -> None:
@@ -381,6 +381,12 @@ class Session(SessionBase):
         await self.readiness.wait()
         resting = await self.quick.run("rank_resting", model, self.bench.profile.of_all_parts)
         self.resting = model.key, resting
+
+
+def _remove_files(*files: Path | None) -> None:
+    """Remove the files of a model that nobody has any more."""
+    for file in filter(None, files):
+        file.unlink(missing_ok=True)
 
 
 def _read_plan(path: Path) -> PlanFile:

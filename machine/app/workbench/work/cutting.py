@@ -12,7 +12,7 @@ import numpy as np
 from machine.app.pictures.picture import parts_together
 from machine.app.pictures.png import png_bytes
 from machine.app.pipeline import compilers
-from machine.app.pipeline.given_plan import lies_freely
+from machine.app.pipeline.given_plan import lies_freely, with_file_marks
 from machine.app.pipeline.pricing import pricing
 from machine.app.project import PICTURE_PX, project_bytes
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
@@ -90,7 +90,8 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
                 best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
             tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
 
-        return decompose(candidate, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=locked, price=price)
+        by_hand = with_shapes(bench, locked, candidate)
+        return decompose(candidate, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=by_hand, price=price)
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if way.orient and untouched and lies_freely(profile):
@@ -162,7 +163,17 @@ def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decompositi
     """The model on the bench cut by a plan; prices: the rows of its front measured, too."""
     mesh, name = turned_mesh(bench, plan), _name(bench)
     compilers.wait_for(compilers.JUDGE)
-    return cut_by_plan(mesh, name, bench.profile, plan, price=pricing(bench.profile.of_all_parts) if prices else None)
+    marked = with_shapes(bench, plan, mesh)
+    return cut_by_plan(mesh, name, bench.profile, marked, price=pricing(bench.profile.of_all_parts) if prices else None)
+
+
+def with_shapes(bench: Bench, plan: PlanFile, mesh: Mesh) -> PlanFile:
+    """The plan with what the model's file marks that is no box, on the model as it lies now."""
+    assert bench.model is not None
+    shapes = bench.model.shapes()
+    return (
+        plan if shapes == NO_ZONES else with_file_marks(plan, shapes, bench.model.mesh(), mesh, bench.profile.search.pedestal_mm)
+    )
 
 
 def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:

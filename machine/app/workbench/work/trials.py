@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 
 from machine.app.pipeline import compilers
-from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.bench.planes import Cuts
-from machine.app.workbench.work.cutting import turned_mesh
+from machine.app.workbench.work.cutting import PLAN_NAME, turned_mesh, with_shapes
 from mdp.cut import convex_hull
 from mdp.kernels.workers import Tell
 from mdp.plane import Plane
@@ -68,7 +68,9 @@ def _trials(number: int, bench: Bench) -> Trials:
     if _ready is None or _ready[0] != number:
         _ready = None  # two at once would be too much for the memory
         compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
-        trials = Trials(turned_mesh(bench), bench.profile, bench.zones)
+        mesh = turned_mesh(bench)
+        zones = with_shapes(bench, plan_of_bench(bench, PLAN_NAME), mesh).zones
+        trials = Trials(mesh, bench.profile, zones)
         trials.warm()
         _ready = number, trials
     return _ready[1]

@@ -14,17 +14,19 @@ import pytest
 
 from machine.app.project import Project, project_bytes
 from machine.app.requests import Given
+from machine.app.workbench.bench.bench import plan_of_bench, with_rotation
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.snapshot import snapshot
+from machine.app.workbench.work.cutting import cut_bench
 from machine.app.workbench.work.models import read_model
 from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile
 from mdp.save import stl
-from mdp.zone import Modifier, Zone, Zones
+from mdp.zone import MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
@@ -148,14 +150,18 @@ def test_a_project_with_a_damaged_plan_leaves_the_bench_as_it_was(tmp_path: Path
     assert read(work, tmp_path / "tee.stl")
 
 
-def test_the_boxes_that_a_project_marks_lie_on_the_bench_and_meshes_are_left_out_with_a_note(tmp_path: Path) -> None:
+def test_what_a_slicer_file_marks_lies_on_the_bench_boxes_and_other_shapes_too(tmp_path: Path) -> None:
     block, ball = m3.Manifold.cube((20.0, 20.0, 20.0), True), m3.Manifold.sphere(4.0, 16)
     insert = Made(m3.Manifold.cube((4.0, 6.0, 8.0), True), "modifier", {"perimeters": "4"})
-    path = prusaslicer(tmp_path / "a.3mf", [Object([Made(block), insert, Made(ball, "support")], [AT_ORIGIN])])
+    path = prusaslicer(
+        tmp_path / "a.3mf", [Object([Made(block), insert, Made(ball.translate((1.0, 0.0, 0.0)), "support")], [AT_ORIGIN])]
+    )
 
     async def work(session: Session) -> Any:
-        return session.bench, the_model(session).notes
+        bench = with_rotation(session.bench, [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        return session.bench, cut_bench(bench, plan_of_bench(bench, "plan.toml")).parts[0].support.volumes
 
-    bench, notes = read(work, path)
+    bench, (held,) = read(work, path)
     assert bench.zones == Zones(modifiers=(Modifier(Zone((-2.0, -3.0, 6.0), (2.0, 3.0, 14.0)), {"walls": 4}),))
-    assert notes[-1] == "1 of these marks is no box and left out here: the command line has it"
+    assert isinstance(held, MeshVolume)
+    assert held.mesh.bounds_mm == pytest.approx(np.array([[-4.0, -3.0, 6.0], [4.0, 5.0, 14.0]]), abs=0.1)
