@@ -36,12 +36,3 @@ def set_copies(bench: Bench, asked: Asked) -> Bench:
     """Another number of copies (`count`) on the plate. Raises PlanError."""
     count = whole({"--copies": asked.get("count")}, "--copies", 1, MOST_COPIES)  # as the option is refused
     return bench if count == bench.copies else replace(bench, copies=count)
-
-
-def check_one_piece(bench: Bench) -> None:
-    """Raise PlanError for copies of a model in several parts, whose places are known only once it is cut."""
-    if bench.copies > 1 and bench.parts > 1 and bench.model is not None:
-        name = bench.model.name
-        raise PlanError(
-            f"--copies {bench.copies}: {name} is cut into {bench.parts} parts, copies are printed in one piece each: --parts 1"
-        )

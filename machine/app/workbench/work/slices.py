@@ -10,7 +10,6 @@ from machine.app.pipeline.given_plan import as_turned
 from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.plate import on_one_plate
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
-from machine.app.workbench.bench.stops import check_one_piece
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
 from machine.app.workbench.work.walls import walls
 from machine.dryrun.dryrun import summary
@@ -115,6 +114,5 @@ def share_page(tell: Tell, page: Path, alternatives: tuple[Alternative, ...], ou
 
 def _plated(bench: Bench) -> tuple[Decomposition, Profile]:
     """The parts on the bench, in copies as `export --copies` has them, and what they are printed with."""
-    check_one_piece(bench)
     cut = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     return on_one_plate([cut] * bench.copies, as_turned(bench.profile, bench.turned))

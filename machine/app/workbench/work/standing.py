@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from machine.app.pipeline.plate import places_of
-from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.bench.model import mesh_blocks
-from machine.app.workbench.bench.stops import check_one_piece
 from machine.app.workbench.bench.values import vector_of
-from machine.app.workbench.work.cutting import turned_mesh
+from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench, turned_mesh
 from machine.app.workbench.work.pieces import out_of_reach
 from machine.planning.fit import Place
 from mdp.decomposition import Decomposition
@@ -63,10 +62,12 @@ def _copies(mesh: Mesh, bench: Bench) -> tuple[tuple[Place, ...], str]:
     if bench.copies == 1 or bench.model is None:
         return (MIDDLE,), ""
     machine, (x, y) = bench.profile.machine, bench.profile.process.place_mm
-    whole = Decomposition(bench.model.name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
     try:
-        check_one_piece(bench)
-        places, _ = places_of([whole] * bench.copies, bench.profile)
+        if bench.parts > 1:
+            printed = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+        else:
+            printed = Decomposition(bench.model.name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
+        places, _ = places_of([printed] * bench.copies, bench.profile)
     except PlanError as error:
         return (MIDDLE,), str(error)
     return tuple((at_x - x, at_y - y) for at_x, at_y in places), ""

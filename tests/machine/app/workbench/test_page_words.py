@@ -19,10 +19,6 @@ from tests.machine.app.workbench.models import model
 
 PAIRS = [
     ("--copies is 0: 1 to 1000 is allowed", "Copies is 0: 1 to 1000 is allowed"),
-    (
-        "--copies 3: tee is cut into 2 parts, copies are printed in one piece each: --parts 1",
-        "3 copies: tee is cut into 2 parts, copies are printed in one piece each: take 1 under In how many parts",
-    ),
     ("--ranker x: classic, learned or the name", "Ranked as x: classic, learned or the name"),
     (
         "cut: taken away with part 3: --pause 3:15, --part 3:ironing=true (Undo brings them back)",
@@ -99,7 +95,6 @@ SAID = (
     "reading {}",
     "{}: has more than the 1 MiB that a page may send",
     "plan tee.toml: there is no model on the workbench to cut by it: open {} first",
-    "3 copies: {} is cut into 2 parts, copies are printed in one piece each: --parts 1",
     "uploading {}: 1.0 of 2.0 MB",
     "{} goes on printing on octoprint:printer: this page follows it no more",
     "{}: process.walls is -3: it must be a whole number from 0 to 50 (--force goes on)",

@@ -343,7 +343,7 @@ def test_copies_and_pauses_are_the_command_line_s_and_their_sentences_name_field
         page.do("add", normal=[0, 0, 1], offset_mm=2.0)
         page.until(lambda state: state["parts"] == 2 and not state["problem"])
         page.do("slice")
-        sentence = "2 copies: box.stl is cut into 2 parts, copies are printed in one piece each: take 1 under In how many parts"
+        sentence = "1:2.4mm under Copies and pauses: part 1 is only 2 mm high"  # both copies are sliced in their parts
         assert page.until(lambda state: state["problem"])["problem"] == sentence
         bench.send(folder / "box.stl")
         page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
