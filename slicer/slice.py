@@ -25,7 +25,7 @@ from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
-from slicer.fill.ends import hold_ends
+from slicer.fill.ends import CARRYING, Plastic, cut_anchors, hold_ends, plastic_of
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from slicer.heights import shell_layers
@@ -168,7 +168,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
     aligned = process.seam == "aligned" and process.walls > 0
     planned = plan_seams(sections, limits) if aligned else [NO_SEAMS] * len(limits)
     layers, raft = list[Layer](), [layer for layer in raft_layers(supports) if len(layer)]
-    below: list[Bead] = []
+    below: list[Plastic | None] = []
     bare: list[int] = []  # layers that hold something and print none of it
     tip, seams, last, count = raft[-1].points[-1] if raft else rear, np.zeros((0, 2)), 0, len(sections.outlines)
     usual = min(max(1, shell_layers(process)[1]), count) if process.spiral_vase else count
@@ -179,8 +179,10 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
             bare.append(i)
         around = Surroundings(rear, seams, tip, limits[i], i, planned[i])
         beads, seams = place_seams([*own, *auxiliary], process, around)
-        beads = hold_ends(beads, below, sections.own[i], sections.own[i - 1], process.line_width_mm) if i else beads
-        below = [*beads, *shells.layers[i].ending]
+        if i:
+            beads = hold_ends(beads, below[0], sections.own[i], sections.own[i - 1], process.line_width_mm)
+            beads = cut_anchors(beads, below)
+        below = [plastic_of([*beads, *shells.layers[i].ending]), *below][:CARRYING]
         if i and process.fuzzy_skin != "none":
             beads = fuzzy_walls(beads, process, _joints_near(sections, i), (sections.part.index, i))
         skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)

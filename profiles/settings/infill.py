@@ -24,7 +24,8 @@ class Infill(Frozen):
         2.5,
         ge=0,
         le=100,
-        description="run along the innermost wall that holds the end of a single infill line; 0: ends only touch the wall, mm",
+        description="run along the innermost wall that holds the end of a single infill line, as far as layers below carry it; "
+        "0: ends only touch the wall, mm",
     )
     infill_joint_mm: float = Field(
         12.0, ge=0, le=1000, description="infill lines whose ends are nearer than this along the wall are joined there, mm"

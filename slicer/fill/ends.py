@@ -1,9 +1,12 @@
-"""Ends: strokes of skin end on the plastic of the layer below.
+"""Ends: strokes of skin end on the plastic of the layer below, those of infill on that of the layers below.
 
 Skins over sparse infill have grown to what holds them (slicer.fill.over_infill), but lines lie beside the rows by which they
 grew, turns leave wedges along the border of a skin, and lines of infill end before it. A stroke whose last line width lies on
 nothing is extended to plastic nearby if that keeps it inside the outline of its own layer. Otherwise, where the model continues
 below, it is cut back to the last place that has plastic below, and left out if there is none; a bridge over open air stays.
+
+The runs along walls that anchor lines of infill begin where no infill lies as soon as the lines move or part. They are cut back,
+too, and grow from layer to layer as far as each carries the next.
 """
 
 from collections.abc import Sequence
@@ -23,33 +26,57 @@ STEP = 0.125  # line widths between the places of a stroke under which plastic i
 CARRIES = 0.35  # line widths from the middle of a line that it carries the middle of what lies on it
 ONWARD = 1.0  # line widths that a stroke may go on to plastic
 HOLD = 0.5  # line widths that a stroke which ends on plastic reaches over it or beyond it
+CARRYING = 3  # layers below that carry infill: the lines of a pattern lie in the same place in every third layer at least
 HELD, EXTEND, CUT = range(3)  # an end on plastic, one that may be extended to it, and one that may also be cut back
 
 Plastic = tuple[EdgeIndex, Floats]  # the middle lines of beads, and for each segment how far from it a bead carries, mm
 
 
+def plastic_of(beads: Sequence[Bead]) -> Plastic | None:
+    """What the beads of a layer carry; None where there are none."""
+    lying = [bead for bead in beads if len(bead.points) > 1]
+    if not lying:
+        return None
+    carries_mm = np.repeat([CARRIES * bead.width_mm for bead in lying], [len(bead.points) - 1 for bead in lying])
+    return index_segments(np.concatenate([np.hstack([bead.points[:-1], bead.points[1:]]) for bead in lying])), carries_mm
+
+
 def hold_ends(
-    beads: Sequence[Bead], below: Sequence[Bead], section: Polygons, section_below: Polygons, width_mm: float
+    beads: Sequence[Bead], below: Plastic | None, section: Polygons, section_below: Polygons, width_mm: float
 ) -> list[Bead]:
     """The beads of a layer, whose skin strokes end on the plastic of the layer below where the model is there or near.
 
-    below: the beads of the layer below; section, section_below: the model's sections in this layer and in the one below.
+    section, section_below: the model's sections in this layer and in the one below.
     """
     skins = [k for k, bead in enumerate(beads) if bead.kind in SKINS and not bead.closed]
-    if not skins or not below:
+    if not skins or below is None:
         return list(beads)
-    lying = [bead for bead in below if len(bead.points) > 1]
-    if not lying:
-        return list(beads)
-    carries_mm = np.repeat([CARRIES * bead.width_mm for bead in lying], [len(bead.points) - 1 for bead in lying])
-    plastic = index_segments(np.concatenate([np.hstack([bead.points[:-1], bead.points[1:]]) for bead in lying])), carries_mm
     lines = [line for k in skins for line in (beads[k].points, np.ascontiguousarray(beads[k].points[::-1]))]
-    ends = np.array([_first_held(line, plastic, width_mm, width_mm) < 0.0 for line in lines]).reshape(-1, 2)
+    ends = np.array([_first_held(line, below, width_mm, width_mm) < 0.0 for line in lines]).reshape(-1, 2)
     if not ends.any():
         return list(beads)
     inside_mm = depths(np.concatenate([beads[k].points[[0, -1]] for k in skins]), index_edges(section_below)).reshape(-1, 2)
     loose = np.where(ends & (inside_mm > 0.0), CUT, np.where(ends & (inside_mm > -width_mm), EXTEND, HELD))
-    return _held_beads(beads, dict(zip(skins, loose.tolist(), strict=True)), plastic, index_edges(section), width_mm)
+    return _held_beads(beads, dict(zip(skins, loose.tolist(), strict=True)), below, index_edges(section), width_mm)
+
+
+def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[Bead]:
+    """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them.
+
+    What lies on nothing farther than an anchor reaches is none, and stays.
+    """
+    layers = [plastic for plastic in below if plastic is not None]
+    return [_cut_anchor(bead, layers) if bead.anchor_mm > 0.0 and not bead.closed else bead for bead in beads]
+
+
+def _cut_anchor(bead: Bead, layers: Sequence[Plastic]) -> Bead:
+    points, width_mm = bead.points, bead.width_mm
+    for _ in range(2):
+        points = np.ascontiguousarray(points[::-1])
+        ways = [_first_held(points, plastic, width_mm, bead.anchor_mm + width_mm) for plastic in layers]
+        way = min((way for way in ways if way >= 0.0), default=0.0)
+        points = _from(points, way - HOLD * width_mm) if way > width_mm else points
+    return bead if np.array_equal(points, bead.points) or length_mm(points) < width_mm else replace(bead, points=points)
 
 
 def _held_beads(
@@ -109,8 +136,11 @@ def _held(points: Floats, plastic: Plastic, outline: EdgeIndex, width_mm: float,
     if need == EXTEND:
         return points
     way = _first_held(points, plastic, width_mm, np.inf) - HOLD * width_mm
-    if way < 0.0:
-        return points[:0]
+    return _from(points, way) if way >= 0.0 else points[:0]
+
+
+def _from(points: Floats, way: float) -> Floats:
+    """A stroke from a place on the way along it."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
     begins = np.cumsum(lengths) - lengths
     k = int(np.searchsorted(begins, way, side="right")) - 1

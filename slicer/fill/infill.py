@@ -226,7 +226,7 @@ def infill_beads(
     lightning: the layer's lines of that pattern, which are planned for all layers together.
     """
     width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
-    inner = _inner(area, process, spacing)
+    inner, anchor_mm = _inner(area, process, spacing), 0.0
     if density <= 0 or inner.is_empty():
         return []
     if process.infill_pattern == "concentric":
@@ -238,8 +238,9 @@ def infill_beads(
         border = index_edges(inner)
         families = pattern_lines(process, layer, z_mm, spacing, density)
         pieces = merge_pieces([clip_pattern(border, angle_deg, draw) for angle_deg, draw in families])
-        lines = anchor_lines(pieces, border, process.infill_joint_mm, process.infill_anchor_mm, width)
-    return [Bead(Kind.INFILL, line, width, RANK) for line in lines if length_mm(line) > width]
+        anchor_mm = process.infill_anchor_mm
+        lines = anchor_lines(pieces, border, process.infill_joint_mm, anchor_mm, width)
+    return [Bead(Kind.INFILL, line, width, RANK, anchor_mm=anchor_mm) for line in lines if length_mm(line) > width]
 
 
 def _inner(area: Polygons, process: Process, spacing_mm: float) -> Polygons:
