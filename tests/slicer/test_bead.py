@@ -7,7 +7,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.paths import Kind
+from slicer.paths import SKINS, Kind
 from slicer.slice import slice_part
 from tests.shapes import box, standing, tee
 from tests.slicer.hand import SOLID, cut, of_kind, profile, volume_mm3, whole
@@ -71,7 +71,10 @@ def test_no_point_of_a_path_lies_farther_than_the_resolution_from_its_simplified
     for fine, coarse in zip(exact.layers, simple.layers, strict=True):
         for before, after in zip(fine.paths, coarse.paths, strict=True):
             line = shapely.LineString(after.points)
-            assert shapely.distance(shapely.points(before.points), line).max() <= resolution_mm + 1e-9
+            aside_mm = (
+                0.25 * before.width_mm if before.kind in SKINS else 0.0
+            )  # where a short step of a skin's line is lengthened
+            assert shapely.distance(shapely.points(before.points), line).max() <= resolution_mm + aside_mm + 1e-9
             assert (before.points[[0, -1]] == after.points[[0, -1]]).all(), "closed paths stay closed"
             assert before.speed_mm_s == after.speed_mm_s
     counts = [sum(len(path.points) for layer in each.layers for path in layer.paths) for each in (exact, simple)]
