@@ -12,6 +12,7 @@ import os
 import re
 import shutil
 import zipfile
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
@@ -187,14 +188,26 @@ def _profile_file(folder: Path, kind: str, name: str) -> str:
 
 def with_meshes(plan: PlanFile, folder: Path) -> PlanFile:
     """The plan with copies of the meshes of its marks and modifiers in a folder."""
+    return _with_mesh_files(plan, lambda file: (folder / _copied(file, folder, "modifier")).absolute())
 
-    def copied(volume: Any) -> Any:
-        if not isinstance(volume, MeshVolume):
-            return volume
-        return replace(volume, file=(folder / _copied(volume.file, folder, "modifier")).absolute())
 
-    marks = {kind: tuple(map(copied, getattr(plan.zones, kind))) for kind in ZONE_KINDS}
-    modifiers = tuple(replace(modifier, volume=copied(modifier.volume)) for modifier in plan.zones.modifiers)
+def with_meshes_beside(plan: PlanFile) -> tuple[PlanFile, dict[str, Path]]:
+    """The plan with meshes that lie beside it, under the names that `with_meshes` gives them, and their files by these."""
+    files = dict[str, Path]()
+
+    def beside(file: Path) -> Path:
+        files[_name_inside(file, "modifier")] = file
+        return Path(_name_inside(file, "modifier"))
+
+    return _with_mesh_files(plan, beside), files
+
+
+def _with_mesh_files(plan: PlanFile, file_of: Callable[[Path], Path]) -> PlanFile:
+    def named(volume: Any) -> Any:
+        return replace(volume, file=file_of(volume.file)) if isinstance(volume, MeshVolume) else volume
+
+    marks = {kind: tuple(map(named, getattr(plan.zones, kind))) for kind in ZONE_KINDS}
+    modifiers = tuple(replace(modifier, volume=named(modifier.volume)) for modifier in plan.zones.modifiers)
     return replace(plan, zones=replace(plan.zones, modifiers=modifiers, **marks))
 
 
@@ -214,6 +227,10 @@ def _digest(file: Path) -> str:
         return hashlib.file_digest(source, "sha256").hexdigest()[:12]
 
 
+def _name_inside(file: Path, role: str) -> str:
+    return f"{role}-{_digest(file)}-{plain_name(_bare_name(file))}"
+
+
 def _bare_name(file: Path) -> str:
     """The name of a file as it was before it became one of a project."""
     return ADDED.sub("", file.name)
@@ -221,7 +238,7 @@ def _bare_name(file: Path) -> str:
 
 def _copied(file: Path, folder: Path, role: str) -> str:
     """The name in a folder of a copy of a file, which is made where it is not there yet."""
-    name = f"{role}-{_digest(file)}-{plain_name(_bare_name(file))}"
+    name = _name_inside(file, role)
     if not (folder / name).exists():
         with file.open("rb") as source, whole_file(folder / name) as copy:
             shutil.copyfileobj(source, copy)

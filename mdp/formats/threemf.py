@@ -223,8 +223,8 @@ class _Builder:
             if count
         ]
         if self._in_part:
-            triangles = f"{self._in_part} triangles painted in part are" if self._in_part > 1 else "1 triangle painted in part is"
-            notes.append(f"{triangles} taken as a whole: more than half of it is painted")
+            triangles = f"{self._in_part} triangles are" if self._in_part > 1 else "1 triangle is"
+            notes.append(f"{triangles} painted in part, more than half of the area, and taken as a whole")
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
         return Build(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._configs.objects), plates=self._plates)
 

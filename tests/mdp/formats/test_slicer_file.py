@@ -396,9 +396,9 @@ def test_triangles_that_are_painted_on_more_than_half_are_marked_wherever_the_mo
         assert faces == [[0, 4], [1], [2]]
     unpainted = "is not taken: only paints for and against support and against seams are, on more than half of a triangle"
     assert sorted(model.notes) == [
+        "1 triangle is painted in part, more than half of the area, and taken as a whole",
         f"1 triangle painted for seams {unpainted}",
         f"1 triangle painted for support {unpainted}",
-        "1 triangle painted in part is taken as a whole: more than half of it is painted",
         "paint against seams on 1 of its triangles is taken as [[no_seam]]",
         "paint against support on 1 of its triangles is taken as [[no_support]]",
         "paint for support on 2 of its triangles is taken as [[support]]",

@@ -32,6 +32,7 @@ class Keeping:
         self._path: Path | None = None  # of the model that is kept
         self._opening = False
         self._trouble = ""
+        self._reported: tuple[str, Path | None] = "", None  # trouble, and the model that it was reported for
         session.followers.append(self._follow)
 
     @property
@@ -91,11 +92,11 @@ class Keeping:
 
     async def _keep(self) -> None:
         async with self._writing:
-            before = self._trouble
             if not self._opening:
                 await self._write_newest()
-            if self._trouble and self._trouble != before:  # told once, not with every change
-                self._session.add_problem(f"this work cannot be kept for after a crash: {self._trouble}; Save keeps its plan")
+            reported, self._reported = self._reported, (self._trouble, self._path)
+            if self._trouble and reported != self._reported:  # once a model, not with every change
+                self._session.add_problem(f"this work cannot be kept for after a crash: {self._trouble}; Save > Project keeps it")
                 self._session.notify()
 
     async def _write_newest(self) -> None:

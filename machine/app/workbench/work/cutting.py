@@ -14,7 +14,7 @@ from machine.app.pictures.png import png_bytes
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import lies_freely, with_file_marks
 from machine.app.pipeline.pricing import pricing
-from machine.app.project import PICTURE_PX, project_bytes
+from machine.app.project import PICTURE_PX, project_bytes, with_meshes_beside
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.kept_work import work_of
@@ -123,7 +123,7 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
 
 def make_plan(tell: Tell, bench: Bench) -> str:
     """The plan of the parts as the bench has them, as text."""
-    return _plan_text(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)
+    return _plan_and_meshes(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)[0]
 
 
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
@@ -140,14 +140,15 @@ def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     parts = [(part_file(part.index), stl(part.mesh)) for part in decomposition.parts]
     model, _, plan, scene = FOLDER_FILES
-    write_zip(
-        out,
-        [*parts, (model, threemf(decomposition)), (plan, _plan_text(decomposition, bench).encode()), (scene, glb(decomposition))],
-    )
+    text, meshes = _plan_and_meshes(decomposition, bench)
+    beside = [(name, file.read_bytes()) for name, file in meshes.items()]
+    write_zip(out, [*parts, *beside, (model, threemf(decomposition)), (plan, text.encode()), (scene, glb(decomposition))])
 
 
-def _plan_text(decomposition: Decomposition, bench: Bench) -> str:
-    return plan_text(plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts))
+def _plan_and_meshes(decomposition: Decomposition, bench: Bench) -> tuple[str, dict[str, Path]]:
+    """The plan as text, and the files of the meshes that it expects beside it, by their names there."""
+    plan, meshes = with_meshes_beside(plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts))
+    return plan_text(plan), meshes
 
 
 def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:

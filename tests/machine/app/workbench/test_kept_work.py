@@ -120,7 +120,7 @@ def test_a_full_disk_is_told_once_and_what_was_kept_before_is_still_there(bench:
         return told, kept
 
     told, kept = asyncio.run(change_twice())
-    assert told == ["this work cannot be kept for after a crash: no space left on device; Save keeps its plan", ""]
+    assert told == ["this work cannot be kept for after a crash: no space left on device; Save > Project keeps it", ""]
     assert read_folder(kept).copies == 1
 
 

@@ -4,6 +4,7 @@ import asyncio
 import gc
 import pickle
 import weakref
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,17 +15,18 @@ import pytest
 
 from machine.app.project import Project, project_bytes
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import plan_of_bench, with_rotation
+from machine.app.workbench.bench.bench import Bench, plan_of_bench, with_model, with_rotation
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.snapshot import snapshot
-from machine.app.workbench.work.cutting import cut_bench
+from machine.app.workbench.work.cutting import cut_bench, make_folder
 from machine.app.workbench.work.models import read_model
 from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile
+from mdp.plans.reading import read_plan
 from mdp.save import stl
 from mdp.zone import MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
@@ -113,6 +115,19 @@ def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more
         return undone, file.is_file()
 
     assert read(forget, tmp_path / "tee.stl") == (True, False)
+
+
+def test_the_parts_folder_has_the_meshes_that_its_plan_names(tmp_path: Path) -> None:
+    (tmp_path / "insert.stl").write_bytes(stl(ball(4.0, 16)))
+    insert = Modifier(MeshVolume(tmp_path / "insert.stl", ball(4.0, 16)), {"walls": 4})
+    bench = replace(with_model(Bench(load()), model(mesh=tee())), cuts=(), zones=Zones(modifiers=(insert,)))
+    make_folder(lambda report: None, bench, tmp_path / "parts.zip")
+    with zipfile.ZipFile(tmp_path / "parts.zip") as archive:
+        archive.extractall(tmp_path / "parts")
+    (read_back,) = read_plan(tmp_path / "parts" / "plan.toml").zones.modifiers
+    assert isinstance(read_back.volume, MeshVolume)
+    assert read_back.volume.file.parent == tmp_path / "parts"
+    assert read_back.volume.file.read_bytes() == stl(ball(4.0, 16))
 
 
 def project(path: Path, mesh: Mesh, given: Given, plan: PlanFile | None = None) -> Path:
