@@ -225,6 +225,8 @@ class _Builder:
         if self._in_part:
             triangles = f"{self._in_part} triangles are" if self._in_part > 1 else "1 triangle is"
             notes.append(f"{triangles} painted in part, more than half of the area, and taken as a whole")
+        strange = sorted(self._configs.heights.keys() - set(self._rank.values()))
+        notes += [f"the height ranges of object {number} are left out: there is no such object" for number in strange]
         notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
         return Build(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._configs.objects), plates=self._plates)
 

@@ -196,6 +196,14 @@ def test_a_height_range_ends_just_above_its_object_and_one_that_holds_nothing_is
     np.testing.assert_allclose(sizes, np.sort([32.0, 32.0, span_mm[1] - span_mm[0]]), atol=1e-9)
 
 
+def test_a_height_range_of_an_object_that_does_not_exist_is_left_out_with_a_note(tmp_path: Path) -> None:
+    option = '<option opt_key="perimeters">6</option>'
+    ranges = f'<objects><object id="77"><range min_z="1" max_z="2">{option}</range></object></objects>'
+    further = {"Metadata/Prusa_Slicer_layer_config_ranges.xml": ranges}
+    model = read_model(prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [AT_ORIGIN])], further))
+    assert model.notes == ("the height ranges of object 77 are left out: there is no such object",)
+
+
 def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
     beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 10.0]]))
     wide = m3.Manifold.cube((100.0, 5.0, 5.0), True)
