@@ -1,25 +1,21 @@
-"""CAD files, STEP and IGES: their boundary representation as triangles, by OpenCASCADE (cascadio, the extra `step`).
+"""CAD files, STEP and IGES: their boundary representation as triangles, by OpenCASCADE (mdp.formats.cad_library).
 
 STEP names its parts and its solids. An IGES file may have a solid (type 186), but most have a heap of trimmed faces (type 144)
 that tell of no common edge, each with corners of its own along it: they get a gap within which they are sewn when they are
 repaired.
 """
 
-import os
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from mdp.formats import glb
+from mdp.formats.cad_library import DEFLECTION_MM, to_glb
 from mdp.formats.surface import Surface
 from profiles.errors import MeshError
 
 KINDS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges"}
 MM = {"step": 1000.0, "iges": 1.0}  # cascadio delivers STEP in metres and IGES in mm, whatever unit the file has
-# So near the triangles are to the surface: a twentieth of a layer, and a circle in 36 corners at least.
-DEFLECTION_MM, DEFLECTION_RAD = 0.01, 0.17
 MOST_NAMED = 8  # parts that a sentence names
 
 
@@ -29,13 +25,8 @@ def read(path: Path) -> list[Surface]:
 
     Raises MeshError for a damaged file and where cascadio is not installed.
     """
-    try:
-        import cascadio
-    except ImportError:
-        raise MeshError(f"{path}: reading CAD files needs cascadio: pip install 'tiltprint[step]'") from None
     kind, content = KINDS[path.suffix.lower()], path.read_bytes()
-    with _silence():
-        scene = cascadio.load(content, kind, tol_linear=DEFLECTION_MM, tol_angular=DEFLECTION_RAD, use_parallel=False)
+    scene = to_glb(path, content, kind)
     if not scene:
         raise MeshError(f"{path}: is no {kind.upper()} file, or damaged")
     gap = 2.0 * DEFLECTION_MM if kind == "iges" else 0.0
@@ -52,18 +43,3 @@ def _assembly(surfaces: list[Surface]) -> tuple[str, ...]:
     shown = [f"{count} x {name}" if count > 1 else name for name, count in counts.most_common(MOST_NAMED)]
     more = f" and {len(counts) - MOST_NAMED} more" if len(counts) > MOST_NAMED else ""
     return (f"is an assembly of {len(names)} parts, printed as one model: {', '.join(shown)}{more}",)
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """What a compiled library says on standard output and error goes nowhere: results go there."""
-    duplicates = [os.dup(descriptor) for descriptor in (1, 2)]
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            for descriptor in (1, 2):
-                os.dup2(nowhere.fileno(), descriptor)
-        yield
-    finally:
-        for descriptor, own in zip((1, 2), duplicates, strict=True):
-            os.dup2(own, descriptor)
-            os.close(own)

@@ -19,6 +19,8 @@ from tests.mdp.files import refusal, save
 from tests.mdp.iges_file import iges_cylinder
 from tests.mdp.step_file import Corner, painted, step_box, step_cylinder, step_prism
 
+DAMAGED = "is damaged: the CAD library (OpenCASCADE) cannot read it"
+
 
 @pytest.mark.parametrize(("prefix", "scale"), [(".MILLI.", 1.0), (".CENTI.", 10.0), ("$", 1000.0)])
 def test_a_step_file_is_read_in_the_unit_that_it_names_with_z_up(tmp_path: Path, prefix: str, scale: float) -> None:
@@ -128,6 +130,12 @@ def test_a_damaged_step_file_ends_in_a_sentence_and_nothing_is_said_beside_it(
     assert refusal(save(tmp_path / "half.stp", half)) == "is no STEP file, or damaged"
     assert refusal(save(tmp_path / "box.iges", b"x")) == "is no IGES file, or damaged"
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_step_file_that_ends_the_cad_library_by_a_signal_is_refused_and_this_process_goes_on(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    damaged = step_box((20, 30, 40)).replace("=DIRECTION(", "=DIRECTOR(")
+    assert refusal(save(tmp_path / "box.step", damaged.encode())) == DAMAGED
 
 
 def test_without_the_extra_the_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
