@@ -5,6 +5,8 @@ that tell of no common edge, each with corners of its own along it: they get a g
 repaired.
 """
 
+import math
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +18,8 @@ from profiles.errors import MeshError
 
 KINDS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges"}
 MM = {"step": 1000.0, "iges": 1.0}  # cascadio delivers STEP in metres and IGES in mm, whatever unit the file has
+LARGE = re.compile(rb"[(,\s]([-+]?\d+\.?\d*[ED]\+?\d{3,})(?=[\s,;)])")  # numbers with an exponent of three digits and more
+LAST_LINE = re.compile(rb"T[ 0]*1\s*$", re.MULTILINE)  # the terminate section of an IGES file
 MOST_NAMED = 8  # parts that a sentence names
 
 
@@ -26,12 +30,23 @@ def read(path: Path) -> list[Surface]:
     Raises MeshError for a damaged file and where cascadio is not installed.
     """
     kind, content = KINDS[path.suffix.lower()], path.read_bytes()
+    _check_numbers(path, content)
     scene = to_glb(path, content, kind)
     if not scene:
         raise MeshError(f"{path}: is no {kind.upper()} file, or damaged")
+    if kind == "iges" and not LAST_LINE.search(content[-1000:]):
+        raise MeshError(f"{path}: is cut short: its last section (T, terminate) is missing")
     gap = 2.0 * DEFLECTION_MM if kind == "iges" else 0.0
     surfaces = [replace(surface, vertices=MM[kind] * surface.vertices, gap=gap) for surface in glb.read_scene(path, scene)]
-    return [replace(surfaces[0], notes=(*_assembly(surfaces), *surfaces[0].notes)), *surfaces[1:]]
+    notes = (*_assembly(surfaces), *_lost(glb.parts_without_faces(scene)), *surfaces[0].notes)
+    return [replace(surfaces[0], notes=notes), *surfaces[1:]]
+
+
+def _check_numbers(path: Path, content: bytes) -> None:
+    """Raises MeshError for a number that no computer word holds: the library leaves out what has it, or never ends."""
+    for number in LARGE.findall(content):
+        if math.isinf(float(number.replace(b"D", b"E"))):
+            raise MeshError(f"{path}: is damaged: it holds the number {number.decode()[:40]}, which is not finite")
 
 
 def _assembly(surfaces: list[Surface]) -> tuple[str, ...]:
@@ -39,7 +54,18 @@ def _assembly(surfaces: list[Surface]) -> tuple[str, ...]:
     names = [surface.name for surface in surfaces if surface.name]
     if len(names) < 2:
         return ()
+    return (f"is an assembly of {len(names)} parts, printed as one model: {_counted(names)}",)
+
+
+def _lost(names: list[str]) -> tuple[str, ...]:
+    """A sentence about the parts that arrive without a surface."""
+    if not names:
+        return ()
+    return (f"leaves out {_counted(names)}: {'it has' if len(names) == 1 else 'they have'} no surface that can be read",)
+
+
+def _counted(names: list[str]) -> str:
+    """Names with how often each is there."""
     counts = Counter(names)
     shown = [f"{count} x {name}" if count > 1 else name for name, count in counts.most_common(MOST_NAMED)]
-    more = f" and {len(counts) - MOST_NAMED} more" if len(counts) > MOST_NAMED else ""
-    return (f"is an assembly of {len(names)} parts, printed as one model: {', '.join(shown)}{more}",)
+    return ", ".join(shown) + (f" and {len(counts) - MOST_NAMED} more" if len(counts) > MOST_NAMED else "")

@@ -66,6 +66,27 @@ def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
         raise MeshError(f"{path}: its glTF document is malformed ({error})") from None
 
 
+def parts_without_faces(content: bytes) -> list[str]:
+    """The names of the nodes of such a file that place no face, nor does any node in them; where one holds another, its name."""
+    document, _ = _chunks(Path(), content)
+    nodes, meshes = document.get("nodes", []), document.get("meshes", [])
+    names: list[str] = []
+
+    def has_faces(number: int) -> bool:
+        node, first = nodes[number], len(names)
+        primitives = meshes[node["mesh"]]["primitives"] if "mesh" in node else ()
+        inner = [has_faces(child) for child in node.get("children", [])]
+        if any(inner) or any(primitive.get("mode", TRIANGLES) > LINES_TO for primitive in primitives):
+            return True
+        if name := _name(node, ""):
+            names[first:] = [name]
+        return False
+
+    for number in _roots(document):
+        has_faces(number)
+    return names
+
+
 def _roots(document: Any) -> list[int]:
     if document.get("scenes"):
         return list(document["scenes"][document.get("scene", 0)].get("nodes", []))
