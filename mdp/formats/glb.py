@@ -41,7 +41,7 @@ def read_scene(path: Path, content: bytes) -> list[Surface]:
     """The same for the content of such a file; path: what messages name."""
     document, binary = _chunks(path, content)
     try:
-        _check_extensions(path, document)
+        check_extensions(path, document)
         surfaces, bare = _scene_meshes(path, document, binary)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
         raise MeshError(f"{path}: is damaged: its glTF document holds something of a kind that does not belong there") from None
@@ -75,7 +75,7 @@ def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
         raise MeshError(f"{path}: is damaged: its glTF document holds text or a number that cannot be read") from None
 
 
-def _check_extensions(path: Path, document: Any) -> None:
+def check_extensions(path: Path, document: Any) -> None:
     """Raises MeshError for an extension that a document requires and that is not read."""
     for name in map(str, document.get("extensionsRequired", ())):
         if name not in READ_REQUIRED and not name.startswith(LOOKS_REQUIRED):
