@@ -18,7 +18,8 @@ from profiles.errors import MeshError
 
 KINDS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges"}
 MM = {"step": 1000.0, "iges": 1.0}  # cascadio delivers STEP in metres and IGES in mm, whatever unit the file has
-LARGE = re.compile(rb"[(,\s]([-+]?\d+\.?\d*[ED]\+?\d{3,})(?=[\s,;)])")  # numbers with an exponent of three digits and more
+# Numbers with an exponent of three or four digits; the columns of an IGES file that end in D0000305 hold none.
+LARGE = re.compile(rb"[(,\s]([-+]?\d+\.\d*[ED]\+?\d{3,4})(?=[\s,;)])")
 LAST_LINE = re.compile(rb"T[ 0]*1\s*$", re.MULTILINE)  # the terminate section of an IGES file
 MOST_NAMED = 8  # parts that a sentence names
 

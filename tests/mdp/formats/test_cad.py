@@ -1,5 +1,6 @@
 """CAD files: solids of planes and curves become triangles in mm."""
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -152,6 +153,19 @@ def test_a_number_that_is_not_finite_is_refused_before_the_library_loses_its_par
     pytest.importorskip("cascadio")
     file = step_box((20, 30, 40)).replace("(20.0,", f"({number},")
     assert refusal(save(tmp_path / "box.step", file.encode())) == f"is damaged: it holds the number {number}, which is not finite"
+
+
+def test_the_number_of_a_line_in_an_iges_file_is_no_exponent(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    numbered = re.sub(
+        r"00000000D +(\d+)$",
+        lambda found: f"00010000D{int(found[1]):07}",
+        iges_cylinder(10.0, 20.0, points=160),
+        flags=re.MULTILINE,
+    )
+    assert "00010000D0000311" in numbered
+    mesh, _ = read_mesh(save(tmp_path / "cylinder.igs", numbered.encode()))
+    assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx([20.0, 20.0, 20.0], abs=0.02)
 
 
 def test_an_iges_file_that_was_cut_off_is_said_to_be_cut_short(tmp_path: Path) -> None:
