@@ -15,7 +15,7 @@ MOST_FILES = 15
 # Third party -> the beginnings of the module paths that may import it; nowhere else in the packages.
 CONFINED = {
     "trimesh": ("mdp/formats/scene", "mdp/mesh", "mdp/save"),
-    "cascadio": ("mdp/formats/cad",),
+    "cascadio": ("mdp/formats/cad_library",),
     "manifold3d": (
         "mdp/cut",
         "mdp/cost/footing",

@@ -1,25 +1,26 @@
-"""CAD files, STEP and IGES: their boundary representation as triangles, by OpenCASCADE (cascadio, the extra `step`).
+"""CAD files, STEP and IGES: their boundary representation as triangles, by OpenCASCADE (mdp.formats.cad_library).
 
 STEP names its parts and its solids. An IGES file may have a solid (type 186), but most have a heap of trimmed faces (type 144)
 that tell of no common edge, each with corners of its own along it: they get a gap within which they are sewn when they are
 repaired.
 """
 
-import os
+import math
+import re
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from mdp.formats import glb
+from mdp.formats.cad_library import DEFLECTION_MM, to_glb
 from mdp.formats.surface import Surface
 from profiles.errors import MeshError
 
 KINDS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges"}
 MM = {"step": 1000.0, "iges": 1.0}  # cascadio delivers STEP in metres and IGES in mm, whatever unit the file has
-# So near the triangles are to the surface: a twentieth of a layer, and a circle in 36 corners at least.
-DEFLECTION_MM, DEFLECTION_RAD = 0.01, 0.17
+# Numbers with an exponent of three or four digits; the columns of an IGES file that end in D0000305 hold none.
+LARGE = re.compile(rb"[(,\s]([-+]?\d+\.\d*[ED]\+?\d{3,4})(?=[\s,;)])")
+LAST_LINE = re.compile(rb"T[ 0]*1\s*$", re.MULTILINE)  # the terminate section of an IGES file
 MOST_NAMED = 8  # parts that a sentence names
 
 
@@ -29,18 +30,24 @@ def read(path: Path) -> list[Surface]:
 
     Raises MeshError for a damaged file and where cascadio is not installed.
     """
-    try:
-        import cascadio
-    except ImportError:
-        raise MeshError(f"{path}: reading CAD files needs cascadio: pip install 'tiltprint[step]'") from None
     kind, content = KINDS[path.suffix.lower()], path.read_bytes()
-    with _silence():
-        scene = cascadio.load(content, kind, tol_linear=DEFLECTION_MM, tol_angular=DEFLECTION_RAD, use_parallel=False)
+    _check_numbers(path, content)
+    scene = to_glb(path, content, kind)
     if not scene:
         raise MeshError(f"{path}: is no {kind.upper()} file, or damaged")
+    if kind == "iges" and not LAST_LINE.search(content[-1000:]):
+        raise MeshError(f"{path}: is cut short: its last section (T, terminate) is missing")
     gap = 2.0 * DEFLECTION_MM if kind == "iges" else 0.0
     surfaces = [replace(surface, vertices=MM[kind] * surface.vertices, gap=gap) for surface in glb.read_scene(path, scene)]
-    return [replace(surfaces[0], notes=(*_assembly(surfaces), *surfaces[0].notes)), *surfaces[1:]]
+    notes = (*_assembly(surfaces), *_lost(glb.parts_without_faces(scene)), *surfaces[0].notes)
+    return [replace(surfaces[0], notes=notes), *surfaces[1:]]
+
+
+def _check_numbers(path: Path, content: bytes) -> None:
+    """Raises MeshError for a number that no computer word holds: the library leaves out what has it, or never ends."""
+    for number in LARGE.findall(content):
+        if math.isinf(float(number.replace(b"D", b"E"))):
+            raise MeshError(f"{path}: is damaged: it holds the number {number.decode()[:40]}, which is not finite")
 
 
 def _assembly(surfaces: list[Surface]) -> tuple[str, ...]:
@@ -48,22 +55,18 @@ def _assembly(surfaces: list[Surface]) -> tuple[str, ...]:
     names = [surface.name for surface in surfaces if surface.name]
     if len(names) < 2:
         return ()
+    return (f"is an assembly of {len(names)} parts, printed as one model: {_counted(names)}",)
+
+
+def _lost(names: list[str]) -> tuple[str, ...]:
+    """A sentence about the parts that arrive without a surface."""
+    if not names:
+        return ()
+    return (f"leaves out {_counted(names)}: {'it has' if len(names) == 1 else 'they have'} no surface that can be read",)
+
+
+def _counted(names: list[str]) -> str:
+    """Names with how often each is there."""
     counts = Counter(names)
     shown = [f"{count} x {name}" if count > 1 else name for name, count in counts.most_common(MOST_NAMED)]
-    more = f" and {len(counts) - MOST_NAMED} more" if len(counts) > MOST_NAMED else ""
-    return (f"is an assembly of {len(names)} parts, printed as one model: {', '.join(shown)}{more}",)
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """What a compiled library says on standard output and error goes nowhere: results go there."""
-    duplicates = [os.dup(descriptor) for descriptor in (1, 2)]
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            for descriptor in (1, 2):
-                os.dup2(nowhere.fileno(), descriptor)
-        yield
-    finally:
-        for descriptor, own in zip((1, 2), duplicates, strict=True):
-            os.dup2(own, descriptor)
-            os.close(own)
+    return ", ".join(shown) + (f" and {len(counts) - MOST_NAMED} more" if len(counts) > MOST_NAMED else "")

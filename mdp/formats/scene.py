@@ -1,11 +1,13 @@
 """Scenes: formats beyond our own readers, glTF with its buffers outside and COLLADA, by trimesh."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
 
+from mdp.formats.glb import check_extensions
 from mdp.formats.surface import Surface, check_meshes, check_surface
 from mdp.mesh import Floats
 from profiles.errors import MeshError
@@ -41,6 +43,8 @@ def read(path: Path) -> list[Surface]:
         ) from None
     except Exception as error:  # noqa: BLE001 - trimesh names no errors of its own: whatever it meets, the file is not what it says
         raise MeshError(f"{path}: cannot be read as {path.suffix} ({type(error).__name__}: {str(error)[:200]})") from None
+    if path.suffix.lower() == ".gltf":
+        check_extensions(path, json.loads(path.read_bytes()))
     placed = [(matrix, mesh) for matrix, name in nodes if isinstance(mesh := scene.geometry[name], trimesh.Trimesh)]
     if not placed:
         raise MeshError(f"{path}: its scene places no mesh")

@@ -85,14 +85,18 @@ def listen(pipe: IO[bytes], take: Callable[[Any], None], end: Callable[[], None]
 
 
 class Interpreter:
-    """A fresh interpreter that imports from where this one does and runs some code; we speak with it through its pipes."""
+    """A fresh interpreter that imports from where this one does and runs some code; we speak with it through its pipes.
 
-    def __init__(self, code: str, environment: dict[str, str] | None = None) -> None:
+    leads: whether it leads a session of its own. One that does not ends with all of this process's session, whatever it is at.
+    """
+
+    def __init__(self, code: str, environment: dict[str, str] | None = None, *, leads: bool = True) -> None:
         command = [sys.executable, "-c", f"import sys; sys.path[:] = {sys.path!r}\n{code}"]
         pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
         self.process = subprocess.Popen(
-            command, stdin=pipe, stdout=pipe, stderr=nowhere, env=os.environ | (environment or {}), start_new_session=True
+            command, stdin=pipe, stdout=pipe, stderr=nowhere, env=os.environ | (environment or {}), start_new_session=leads
         )
+        self._leads = leads
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self._in, self._out = self.process.stdin, self.process.stdout
@@ -109,10 +113,10 @@ class Interpreter:
         self.process.wait()
 
     def end(self) -> None:
-        """Kill the process and everything it started, and wait until it is gone."""
+        """Kill the process, with everything it started where it leads a session, and wait until it is gone."""
         if self.process.poll() is None:
             with suppress(ProcessLookupError, PermissionError):
-                if hasattr(os, "killpg"):
+                if self._leads and hasattr(os, "killpg"):
                     os.killpg(self.process.pid, signal.SIGKILL)
                 else:
                     self.process.kill()

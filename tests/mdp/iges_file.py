@@ -32,8 +32,9 @@ def pointer(number: int) -> int:
     return 2 * number + 1
 
 
-def iges_cylinder(radius: float, height: float, unit: str = "MM") -> str:
-    """A group of three faces that share no edge: a cylinder's side, and two planes trimmed by circles that begin elsewhere."""
+def iges_cylinder(radius: float, height: float, unit: str = "MM", points: int = 0) -> str:
+    """A group of three faces that share no edge: a cylinder's side, and two planes trimmed by circles that begin elsewhere; and
+    points beside it."""
     x, y = radius * cos(1.3), radius * sin(1.3)
     entities: list[Entity] = [(100, 0, [0.0, 0.0, 0.0, radius, 0.0, radius, 0.0]), (122, 0, [pointer(0), radius, 0.0, height])]
     for z in (0.0, height):
@@ -46,6 +47,7 @@ def iges_cylinder(radius: float, height: float, unit: str = "MM") -> str:
             (144, 0, [plane, 1, 0, boundary]),
         ]
     entities.append((402, 7, [3, pointer(1), pointer(5), pointer(9)]))
+    entities += [(116, 0, [0.0, 0.0, float(k), 0]) for k in range(points)]
     return iges_file(entities, unit)
 
 

@@ -36,6 +36,16 @@ def step_box(sides: tuple[float, float, float], prefix: str = ".MILLI.") -> str:
     return step_prism([(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)], z, prefix=prefix)
 
 
+def step_assembly(*boxes: tuple[str, tuple[float, float, float]]) -> str:
+    """The file of named boxes with a corner at the origin, which no product holds together."""
+    rows: list[str] = []
+    for name, sides in boxes:
+        shift = len(rows)
+        own = re.findall(r"^#.*;$", step_box(sides).replace("'box'", f"'{name}'"), re.MULTILINE)
+        rows += [re.sub(r"#(\d+)", lambda found, shift=shift: f"#{int(found[1]) + shift}", row) for row in own]
+    return "\n".join([HEADER, *rows, "ENDSEC;", "END-ISO-10303-21;", ""])
+
+
 def painted(file: str, colours: Mapping[int, tuple[float, float, float]]) -> str:
     """The file with a colour (red, green, blue, 0 to 1) for faces by their place in it, -1: for the solid."""
     ids = [re.findall(rf"#(\d+)={name}", file) for name in ("ADVANCED_FACE", "MANIFOLD_SOLID_BREP", r"\(?GEOMETRIC_REP")]

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from mdp.kernels.workers import tell
+from mdp.kernels.workers import Interpreter, tell
 
 
 def greet(name: str) -> str:
@@ -22,6 +22,13 @@ def squares(count: int) -> str:
 
 def process() -> int:
     return os.getpid()
+
+
+def wait_for_another() -> None:
+    """Tell the number of a process in the session of this one, and wait for it."""
+    other = Interpreter("import time; time.sleep(60.0)", leads=False)
+    tell(other.process.pid)
+    other.process.wait()
 
 
 def refuse(note: Path) -> None:

@@ -1,5 +1,6 @@
 """CAD files: solids of planes and curves become triangles in mm."""
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,9 @@ from tests.checks import assert_closed
 from tests.mdp import files
 from tests.mdp.files import refusal, save
 from tests.mdp.iges_file import iges_cylinder
-from tests.mdp.step_file import Corner, painted, step_box, step_cylinder, step_prism
+from tests.mdp.step_file import Corner, painted, step_assembly, step_box, step_cylinder, step_prism
+
+DAMAGED = "is damaged: the CAD library (OpenCASCADE) cannot read it"
 
 
 @pytest.mark.parametrize(("prefix", "scale"), [(".MILLI.", 1.0), (".CENTI.", 10.0), ("$", 1000.0)])
@@ -128,6 +131,48 @@ def test_a_damaged_step_file_ends_in_a_sentence_and_nothing_is_said_beside_it(
     assert refusal(save(tmp_path / "half.stp", half)) == "is no STEP file, or damaged"
     assert refusal(save(tmp_path / "box.iges", b"x")) == "is no IGES file, or damaged"
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_step_file_that_ends_the_cad_library_by_a_signal_is_refused_and_this_process_goes_on(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    damaged = step_box((20, 30, 40)).replace("=DIRECTION(", "=DIRECTOR(")
+    assert refusal(save(tmp_path / "box.step", damaged.encode())) == DAMAGED
+
+
+def test_a_part_of_an_assembly_that_has_lost_its_surface_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    whole = step_assembly(("lid", (20, 20, 5)), ("base", (30, 30, 10)))
+    _, notes = read_mesh(save(tmp_path / "whole.step", whole.encode()))
+    assert notes[0] == "is an assembly of 2 parts, printed as one model: lid, base"
+    mesh, notes = read_mesh(save(tmp_path / "lost.step", whole.replace("=CLOSED_SHELL", "=CLOSED_SHELF", 1).encode()))
+    assert (mesh.volume_mm3, notes) == (pytest.approx(9_000), ("leaves out lid: it has no surface that can be read",))
+
+
+@pytest.mark.parametrize("number", ["1.E400", "-2.5E+0309"])
+def test_a_number_that_is_not_finite_is_refused_before_the_library_loses_its_part_or_itself(tmp_path: Path, number: str) -> None:
+    pytest.importorskip("cascadio")
+    file = step_box((20, 30, 40)).replace("(20.0,", f"({number},")
+    assert refusal(save(tmp_path / "box.step", file.encode())) == f"is damaged: it holds the number {number}, which is not finite"
+
+
+def test_the_number_of_a_line_in_an_iges_file_is_no_exponent(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    numbered = re.sub(
+        r"00000000D +(\d+)$",
+        lambda found: f"00010000D{int(found[1]):07}",
+        iges_cylinder(10.0, 20.0, points=160),
+        flags=re.MULTILINE,
+    )
+    assert "00010000D0000311" in numbered
+    mesh, _ = read_mesh(save(tmp_path / "cylinder.igs", numbered.encode()))
+    assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx([20.0, 20.0, 20.0], abs=0.02)
+
+
+def test_an_iges_file_that_was_cut_off_is_said_to_be_cut_short(tmp_path: Path) -> None:
+    pytest.importorskip("cascadio")
+    lines = iges_cylinder(10.0, 20.0).splitlines(keepends=True)
+    sentence = refusal(save(tmp_path / "cut.igs", "".join(lines[:-1]).encode()))
+    assert sentence == "is cut short: its last section (T, terminate) is missing"
 
 
 def test_without_the_extra_the_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

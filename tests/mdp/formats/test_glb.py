@@ -71,12 +71,48 @@ def test_without_a_scene_the_nodes_that_no_other_holds_are_placed(tmp_path: Path
         ({"nodes": [{"children": [1]}, {"children": [0], "mesh": 0}]}, "its nodes contain each other"),
         ({"nodes": [*({"children": [k + 1, k + 1]} for k in range(30)), {}]}, "places more than 20000 objects by reference"),
         ({"buffers": [{"uri": "other.bin", "byteLength": 9}]}, "data in another file"),
-        ({"scene": 5}, "its glTF document is malformed (IndexError"),
+        ({"scene": 5}, "is damaged: it names 5 of its scenes, there are 1 (counted from 0)"),
+        ({"nodes": [{"mesh": -1}]}, "is damaged: it names -1 of its meshes, there are 1 (counted from 0)"),
+        ({"nodes": [{"mesh": 0, "matrix": [1, 2]}]}, "is damaged: matrix of a node is [1, 2], it must be 16 finite numbers"),
+        ({"meshes": 5}, "is damaged: meshes of its glTF document is no list"),
+        ({"meshes": [{"primitives": [{"attributes": {}}]}]}, "is damaged: a mesh has no vertices (POSITION)"),
+        (
+            {"accessors": [{"componentType": 7, "bufferView": 0}] * 2},
+            "is damaged: componentType of accessor 1 is 7, it must be one of",
+        ),
+        ({"accessors": [{}] * 2}, "is damaged: accessor 1 names no bufferView"),
+        ({"accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC2"}] * 2}, "is 'VEC2', it must be VEC3 here"),
+        ({"meshes": [[]]}, "its glTF document holds something of a kind that does not belong there"),
+        (
+            {"extensionsRequired": ["EXT_meshopt_compression"]},
+            "requires EXT_meshopt_compression, a glTF extension that is not read",
+        ),
         ({"nodes": [{}]}, "its scene places no mesh"),
     ],
 )
 def test_a_scene_that_cannot_be_read_is_refused(tmp_path: Path, changes: dict[str, object], words: str) -> None:
     assert words in refusal(save(tmp_path / "a.glb", _edited(**changes)))
+
+
+def test_a_document_that_is_no_json_is_refused_with_the_place(tmp_path: Path) -> None:
+    sentence = refusal(save(tmp_path / "a.glb", _edited().replace(b'"asset"', b'{asset"', 1)))
+    assert sentence == "is damaged: its glTF document is no JSON from character 2 on"
+
+
+def test_a_file_may_require_extensions_of_looks_and_whole_numbers_for_positions(tmp_path: Path) -> None:
+    accessors = json.loads(_document())["accessors"]
+    corners = files.placed(10, 10, 10)
+    points = np.where(corners.vertices > 5.0, 32767, 0).astype("<i2")
+    changes = {
+        "extensionsRequired": ["KHR_materials_unlit", "KHR_mesh_quantization"],
+        "accessors": [accessors[0], {**accessors[1], "componentType": 5122, "normalized": True}],
+        "nodes": [{"mesh": 0, "scale": [20, 30, 40]}],
+    }
+    content = _edited(**changes)
+    place = content.index(corners.vertices.astype("<f4").tobytes())
+    content = content[:place] + points.tobytes().ljust(len(content) - place, b"\0")
+    mesh, notes = read_mesh(save(tmp_path / "a.glb", content))
+    assert (notes, mesh.volume_mm3) == ((), pytest.approx(24_000))
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,14 @@ def test_a_gltf_with_its_buffers_beside_it_is_read_as_a_glb_is(tmp_path: Path) -
     assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx([20, 30, 40])
 
 
+def test_a_gltf_that_requires_an_extension_that_is_not_read_is_refused_by_its_name(tmp_path: Path) -> None:
+    for name, content in export_gltf(trimesh.Scene({"a": trimesh.creation.box((20, 30, 40))})).items():
+        required = content.replace(b'{"', b'{"extensionsRequired": ["EXT_meshopt_compression"], "', 1)
+        (tmp_path / name).write_bytes(required if name.endswith(".gltf") else content)
+    sentence = refusal(tmp_path / "model.gltf")
+    assert sentence == "requires EXT_meshopt_compression, a glTF extension that is not read: export it without"
+
+
 def test_what_the_nodes_mirror_and_move_is_read_so(tmp_path: Path) -> None:
     mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])
     mirrored[0, 3] = 60.0

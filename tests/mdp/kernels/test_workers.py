@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mdp.kernels.workers import LENGTH, CallError, Interpreter, KilledError, Worker, frame, listen
-from tests.mdp.batch.calls import greet, process, sleep, squares
+from tests.mdp.batch.calls import greet, process, sleep, squares, wait_for_another
 from tests.mdp.batch.test_isolation import until_gone
 
 WHOLE, LATER = ("load_kernels", ()), ("slice_bench", (Path("here"), "a file"))
@@ -69,6 +69,19 @@ def test_what_a_process_has_started_ends_with_it() -> None:
     copy = next(started.hear())
     started.end()
     until_gone(copy)
+
+
+def test_a_process_that_leads_no_session_ends_with_the_worker_that_waits_for_it() -> None:
+    worker = Worker()
+    _, other = next(worker.ask(wait_for_another))
+    worker.end()
+    until_gone(other)
+
+
+def test_a_process_that_leads_no_session_is_ended_without_the_one_that_has_started_it() -> None:
+    alone = Interpreter("import time; time.sleep(60.0)", leads=False)
+    alone.end()
+    assert alone.process.returncode == -signal.SIGKILL
 
 
 def test_a_worker_that_was_asked_nothing_for_long_is_not_asked_again_and_ends() -> None:

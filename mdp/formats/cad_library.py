@@ -1,0 +1,56 @@
+"""CAD library: OpenCASCADE (cascadio, the extra `step`) in a process of its own: some damaged files end it by a signal.
+
+The process stays in this one's session, so whatever ends that session ends it too: the library holds Python's lock while it
+works, and the process could not hear that nobody waits for it any more.
+"""
+
+import signal
+from importlib.util import find_spec
+from pathlib import Path
+
+from mdp.kernels.workers import ONE_CORE, Interpreter, frame, read_frames, take_pipes
+from profiles.errors import MeshError
+
+CODE = "from mdp.formats.cad_library import answer; answer()"
+# So near the triangles are to the surface: a twentieth of a layer, and a circle in 36 corners at least.
+DEFLECTION_MM, DEFLECTION_RAD = 0.01, 0.17
+SIGKILL = getattr(signal, "SIGKILL", 0)  # by which Linux ends what takes the last of the memory; Windows has none
+DAMAGED = "is damaged: the CAD library (OpenCASCADE) cannot read it"
+KILLED = "the CAD library (OpenCASCADE) was killed while it read it: there may be too little memory"
+
+
+def to_glb(path: Path, content: bytes, kind: str) -> bytes:
+    """The content of a file ("step" or "iges") as that of a GLB file; nothing where the library finds no such file in it.
+
+    Raises MeshError where the library is missing, and where it ends without an answer.
+    """
+    if find_spec("cascadio") is None:
+        raise MeshError(f"{path}: reading CAD files needs cascadio: pip install 'tiltprint[step]'")
+    library = Interpreter(CODE, ONE_CORE, leads=False)
+    try:
+        library.say((content, kind))
+        scene, trouble = next(library.hear(), (b"", None))
+    finally:
+        library.end()
+    if trouble is None:
+        trouble = KILLED if library.process.returncode == -SIGKILL else DAMAGED
+    if trouble:
+        raise MeshError(f"{path}: {trouble}")
+    return bytes(scene)
+
+
+def answer() -> None:
+    """In the process of the library: read one file and answer with (scene, what has kept it from that)."""
+    asked, answers = take_pipes()
+    content, kind = next(read_frames(asked))
+    answers.write(frame(_loaded(content, kind)))
+    answers.flush()
+
+
+def _loaded(content: bytes, kind: str) -> tuple[bytes, str]:
+    try:
+        import cascadio
+    except ImportError as error:  # it is there: a library that it needs is not
+        return b"", f"cascadio, which reads CAD files, does not start here ({error})"
+    tolerances = {"tol_linear": DEFLECTION_MM, "tol_angular": DEFLECTION_RAD}
+    return cascadio.load(content, kind, use_parallel=False, **tolerances), ""
