@@ -38,7 +38,7 @@ CONFINED = {
     "starlette": ("machine/app/workbench/", "machine/app/serving/"),
     "uvicorn": ("machine/app/workbench/", "machine/app/serving/"),
     "websockets": (),
-    "pydantic": ("profiles/",),
+    "pydantic": ("profiles/", "machine/app/project_record.py"),
     "rich": ("machine/app/", "mdp/batch/"),
     "prompt_toolkit": ("machine/app/",),
     "PIL": ("machine/app/pictures/",),

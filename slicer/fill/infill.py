@@ -39,7 +39,7 @@ from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
-MIDDLE = 0.5  # line widths: a wall that lies so far beside the one below has its middle over the infill
+MIDDLE = 0.4  # line widths: a wall that lies so far beside the one below has its middle at the edge of that, or over the infill
 BEYOND = 0.5  # line widths that a line under walls goes on beyond where they lean out
 SHORTEST = 2.0  # line widths: a wall spans less without a line under it
 RANK = 3  # behind skins (slicer.fill.skin)
