@@ -227,7 +227,7 @@ def _loops_around(
 
 
 def _near_base(loops: Sequence[Bead], near: Polygons, count: int) -> list[Bead]:
-    """What of a brim's loops lies near a base, one piece of the base after the other; count: ranks of loops."""
+    """The pieces of a brim's loops that lie near a base, piece by piece of the base; count: ranks of loops."""
     return [
         replace(loop, points=run, rank=loop.rank - count * number)
         for number, place in enumerate(islands(near))

@@ -92,8 +92,8 @@ def in_hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch, *co
     medium = steps.on_wire(printer.medium)
     monkeypatch.setattr(at_hand, "open_port", medium.open)
     monkeypatch.setattr(at_hand, "CommandSession", partial(CommandSession, medium=medium))
-    told = type("Configs", (), {"tell": steps.take, "heard": None})()
-    person = AtPage(told)
+    reporter = type("Reporter", (), {"tell": steps.take, "heard": None})()
+    person = AtPage(reporter)
     for command in commands:
         person.by_hand.put(command)
     return by_hand(HandOrder(PROFILE, PrintRequest(PATH)), person, Checks(told))

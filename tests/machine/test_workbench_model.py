@@ -77,12 +77,12 @@ def test_plates_and_settings_of_a_slicer_file_are_taken_by_buttons(browser: Brow
     browser.wait("$('size-x').value === '30.00' && $('plates').children[1].disabled")
     browser.click("#file-settings")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: take the settings of two.3mf'")
-    browser.wait("$('file-settings-told').textContent.startsWith('two.3mf: uses the settings of OrcaSlicer inside: ')")
+    browser.wait("$('file-settings-note').textContent.startsWith('two.3mf: uses the settings of OrcaSlicer inside: ')")
     with bench.line() as line:
         settings = line.until(lambda state: state["model"]["plates"][1]["taken"])["given"]["settings"]
     assert {"process.walls=5", "process.infill_density=0.33"} <= set(settings)
     open_model(browser, bench, "tee.stl", stl(tee()))
-    assert browser.value("$('plates').childElementCount === 0 && $('inside').hidden && $('file-settings-told').hidden")
+    assert browser.value("$('plates').childElementCount === 0 && $('inside').hidden && $('file-settings-note').hidden")
 
 
 def test_a_click_on_the_edge_between_two_faces_meets_one_of_them(browser: Browser, bench: Running) -> None:

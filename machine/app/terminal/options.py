@@ -112,7 +112,7 @@ class SearchOptions:
 
 @dataclass(frozen=True)
 class FileOptions(SearchOptions):
-    """The same for one model, and what of its file is taken."""
+    """Options of a command for one model: how it is cut, and its plate and settings in a slicer file."""
 
     plate: Annotated[
         int | None,

@@ -153,7 +153,7 @@ class Wire:
         self._said, self.now_s = said, 0.0
 
     def write(self, data: bytes) -> None:
-        """Configs."""
+        """Takes bytes and does nothing with them."""
 
     def read(self) -> bytes:
         self.now_s += 0.1

@@ -169,7 +169,7 @@ def test_a_stream_is_consumed_only_as_fast_as_it_is_printed() -> None:
 
 
 def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], None]:
-    """Configs of the progress of a print, does something as soon as so many commands are sent."""
+    """A listener to a print that acts once, as soon as this number of commands is sent."""
     waiting = [act]
 
     def watch(progress: Progress) -> None:

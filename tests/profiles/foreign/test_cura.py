@@ -44,8 +44,8 @@ def test_what_is_on_top_of_a_stack_holds_wherever_it_stands_in_the_file(tmp_path
         "c.extruder": ("position = 0\nenabled = True", ["first", "empty_intent", "first_printer"]),
     }
     config = read_slicer_settings(project(tmp_path / "a.3mf", containers, stacks)).config
-    told = [config.number(key) for key in ("layer_height", "travel_speed", "raft_expansion", "perimeters", "nozzle_diameter")]
-    assert told == [0.25, 150, 3, 3, 0.6]
+    numbers = [config.number(key) for key in ("layer_height", "travel_speed", "raft_expansion", "perimeters", "nozzle_diameter")]
+    assert numbers == [0.25, 150, 3, 3, 0.6]
 
 
 def test_the_first_extruder_that_is_switched_on_is_read(tmp_path: Path) -> None:

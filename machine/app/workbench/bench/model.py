@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_hex
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,8 +53,20 @@ class Model:
         if zones.shapes != NO_ZONES:
             shapes_file = mesh_file.with_suffix(".marks")
             shapes_file.write_bytes(pickle.dumps(zones.shapes))
-        more: dict[str, Any] = {"zones": zones.boxes, "plate": plate, "plates": read.plates, "has_settings": has_settings}
-        return cls(name, path, mesh_file, len(mesh.faces), size_mm, mesh.volume_mm3, read.notes, shapes_file=shapes_file, **more)
+        return cls(
+            name,
+            path,
+            mesh_file,
+            len(mesh.faces),
+            size_mm,
+            mesh.volume_mm3,
+            read.notes,
+            zones=zones.boxes,
+            plate=plate,
+            shapes_file=shapes_file,
+            plates=read.plates,
+            has_settings=has_settings,
+        )
 
     def shapes(self) -> Zones:
         """What its file marks that is no box, on the model as it is read."""

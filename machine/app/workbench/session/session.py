@@ -85,7 +85,7 @@ class _UnscaledError(MeshError):
 
 class Session(SessionBase):
     """A bench with all work on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
-    this one too; unscaled: the model that waits for its unit; told_settings: key of a model, and the note on those taken from
+    this one too; unscaled: the model that waits for its unit; settings_note: key of a model, and the note on those taken from
     its file."""
 
     def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
@@ -103,7 +103,7 @@ class Session(SessionBase):
         self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
         self.unscaled: OfUnknownUnit | None = None
-        self.told_settings = ("", "")
+        self.settings_note = ("", "")
         self._named: tuple[str, ...] = ()
 
     @property
@@ -220,7 +220,7 @@ class Session(SessionBase):
         assert model is not None
         inside, note = await asyncio.to_thread(settings_inside, model.path, model.name)
         await self.take_given(f"take the settings of {model.name}", lambda given: with_given(given, inside))
-        self.told_settings = model.key, note
+        self.settings_note = model.key, note
 
     async def open_demo(self, name: str) -> None:
         """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""

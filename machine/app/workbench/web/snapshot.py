@@ -127,7 +127,7 @@ def _modifier(modifier: Modifier) -> dict[str, Any]:
 
 def _model(model: Model, session: Session) -> dict[str, Any]:
     plate = model.plate or next(iter(model.plates), None)
-    key, told = session.told_settings
+    key, note = session.settings_note
     return {
         "key": model.key,
         "name": model.name,
@@ -137,7 +137,7 @@ def _model(model: Model, session: Session) -> dict[str, Any]:
         "notes": in_page_words(model.notes, session.names),
         "plates": [{"number": number, "name": name, "taken": number == plate} for number, name in model.plates.items()],
         "has_settings": model.has_settings,
-        "settings_told": page_words(told, session.names) if key == model.key else "",
+        "settings_note": page_words(note, session.names) if key == model.key else "",
         "drawn": model.faces <= MOST_FACES,
     }
 

@@ -57,13 +57,13 @@ function tellTiny({ model }) {
 }
 
 /** The plates of a slicer file to choose from, and whether it keeps settings. */
-function tellFile({ plates, has_settings: has, settings_told: told }) {
+function tellFile({ plates, has_settings: has, settings_note: note }) {
   const shown = plates.length > 1 ? plates : [];
   if ($("plates").dataset.shown !== JSON.stringify(shown)) $("plates").replaceChildren(...shown.map(({ number, name, taken }) =>
     button(`Plate ${number}${name && ` (${name})`}`, () => send({ do: "plate", plate: number }), { ariaPressed: String(taken), disabled: taken })));
   $("plates").dataset.shown = JSON.stringify(shown);
   $("inside").hidden = !has;
-  sayIn("file-settings-told", told);
+  sayIn("file-settings-note", note);
 }
 
 const scaleBy = (factor) => String(Number((store.state.scale * factor).toPrecision(9)));

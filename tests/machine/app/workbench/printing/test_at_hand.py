@@ -30,7 +30,7 @@ def wait_until(condition: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
-class Configs:
+class Reporter:
     """A reporter that only remembers."""
 
     def __init__(self) -> None:
@@ -41,8 +41,8 @@ class Configs:
 
 
 @contextmanager
-def in_hand() -> Iterator[tuple[AtPage, Configs]]:
-    told = Configs()
+def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
+    told = Reporter()
     person = AtPage(told)  # type: ignore[arg-type]
 
     def serve() -> None:
