@@ -96,7 +96,7 @@ def in_hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch, *co
     person = AtPage(reporter)
     for command in commands:
         person.by_hand.put(command)
-    return by_hand(HandOrder(PROFILE, PrintRequest(PATH)), person, Checks(told))
+    return by_hand(HandOrder(PROFILE, PrintRequest(PATH)), person, Checks(reporter))
 
 
 def hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:

@@ -71,7 +71,7 @@ def test_plates_and_settings_of_a_slicer_file_are_taken_by_buttons(browser: Brow
     bambu(tmp_path / "two.3mf", [cube(20.0, 0.0, 1), cube(30.0, 300.0, 2)], np.random.default_rng(0), inside)
     open_model(browser, bench, "two.3mf", (tmp_path / "two.3mf").read_bytes())
     browser.click("#tab-model")
-    assert browser.value("$('size-x').value") == "20.00"
+    browser.wait("$('size-x').value === '20.00'")
     assert "another can be taken below: 2" in browser.value("$('model-notes').textContent")
     browser.click("#plates button:nth-child(2)")
     browser.wait("$('size-x').value === '30.00' && $('plates').children[1].disabled")
