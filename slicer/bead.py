@@ -51,7 +51,7 @@ class Bead:
     rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
     each outer wall, what is below all ranks of walls comes before them. over_infill: a bridge over the sparse infill of the
     layer below, which has a speed and a fan of its own. follows: printed right after the bead before it in the list. line: a
-    wall that does not run round. anchor_mm: the most that a line of infill runs along walls at its ends. course: (k, 3) x, y and
+    wall that is no loop. anchor_mm: the most that a line of infill runs along walls at its ends. course: (k, 3) x, y and
     width where the width varies; width_mm is then their mean, and the points lie on the course.
     """
 

@@ -25,7 +25,16 @@ import numpy as np
 
 from machine.app.output import plain_name
 from machine.app.profile_file import profile_text
-from machine.app.project_record import RECORD, VERSION, GivenRecord, NewerError, Record, is_file_name_anywhere, read_record
+from machine.app.project_record import (
+    RECORD,
+    VERSION,
+    GivenRecord,
+    NewerError,
+    Record,
+    checked_record,
+    is_file_name_anywhere,
+    read_record,
+)
 from machine.app.requests import Given, ModelRequest
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
@@ -36,7 +45,7 @@ from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
-from profiles.errors import PlanError, reason
+from profiles.errors import PlanError, first_line, reason
 from profiles.files import DAMAGED_ZIP, lock_folder, remove_locked, whole_file, write_whole
 from profiles.frozen import Vector
 from profiles.places import KINDS, PARENT, is_file_name, own, shipped
@@ -142,14 +151,14 @@ class Project:
 def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     """Write a project's folder. Older models in it go; profiles and meshes stay, for a step that is undone may name them.
 
-    Raises OSError and ProfileError; the record is written last, so that it names only what is there.
+    Raises OSError, ProfileError and PlanError; the record is written last, so that it names only what is there.
     """
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
     model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
         write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
     given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
-    record = Record(
+    record = checked_record(
         version=VERSION,
         program=PROGRAM,
         name=project.name,
@@ -283,6 +292,8 @@ def _check_inside(folder: Path, project: Project) -> None:
     """Raise PlanError where the files of an unpacked project are not those that it names, or not as they were saved."""
     if project.model is None and not project.name.startswith(DEMO):
         raise PlanError(f"{RECORD}: model is missing")
+    if project.model is not None and not project.model.name.startswith("model-"):
+        raise PlanError(f"{RECORD}: model is {project.model.name!r}: a file model-... of the project is expected")
     named = [project.model, *(Path(getattr(project.given, kind)) for kind in project.own_names), folder / PLAN]
     for file in named:
         if file is not None and not file.is_file():
@@ -395,7 +406,7 @@ def unpack(path: Path, folder: Path) -> Project:
     except PlanError as error:
         raise PlanError(f"{path}: this project is damaged: {error}") from None
     except DAMAGED as error:
-        raise PlanError(f"{path}: this project is damaged: it is no whole zip archive ({type(error).__name__})") from None
+        raise PlanError(f"{path}: this project is damaged: it is no whole zip archive ({first_line(error)})") from None
     if changed:
         raise PlanError(
             f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
@@ -415,6 +426,8 @@ def _extract(archive: zipfile.ZipFile, folder: Path) -> bool:
     if len(entries) > MOST_FILES or sum(entry.file_size for entry in read) > LARGEST_BYTES:
         raise PlanError(f"it unpacks to more than {MOST_FILES} files or {LARGEST_BYTES} bytes")
     for entry in entries:
+        if entry.is_dir():
+            continue  # as zip -r writes them
         name = entry.filename.removeprefix(INSIDE)
         if not FILE_NAME.fullmatch(name) or (folder / name).exists():
             raise PlanError(f"{entry.filename!r} is no name of a file of a project, or there twice")

@@ -11,7 +11,7 @@ from machine.planning.stops import Stop, parse_stops
 from profiles.errors import PlanError, SliceError
 from profiles.part_settings import MOST_PARTS
 from profiles.places import KINDS
-from profiles.wording import sentences
+from profiles.wording import LONGEST_VALUE, sentences
 
 VERSION = 1
 RECORD = "work.json"
@@ -22,7 +22,7 @@ class NewerError(PlanError):
     """A record of a newer version of this program."""
 
 
-def _one_version(value: object) -> object:
+def _not_newer(value: object) -> object:
     if isinstance(value, int) and not isinstance(value, bool) and value > VERSION:
         raise NewerError(f"{RECORD} has version {value}")
     return value
@@ -44,7 +44,7 @@ class GivenRecord(_Table):
 class Record(_Table):
     """A project's record, with the values of machine.app.project.Project. model: a file of the project; "": it is a demo."""
 
-    version: Annotated[int, BeforeValidator(_one_version), Field(ge=1)]
+    version: Annotated[int, BeforeValidator(_not_newer), Field(ge=1)]
     program: str = ""
     name: str
     model: str
@@ -64,15 +64,14 @@ class Record(_Table):
     @model_validator(mode="after")
     def _agrees(self) -> "Record":
         matrix = np.array(self.rotation) if [len(row) for row in self.rotation] == [3, 3, 3] else np.zeros((3, 3))
+        matrix = np.clip(matrix, -2.0, 2.0)  # none of a rotation is as large, and products of larger ones overflow
         if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0.0:
             raise ValueError(f"rotation is {self.rotation}: it must be three rows of a rotation")
         if not self.own_profiles.keys() <= set(KINDS):
             raise ValueError(f"own_profiles is of {', '.join(self.own_profiles)}: {', '.join(KINDS)} are known")
         if any(k >= max(self.parts, 1) - 1 for k in self.locked):
             raise ValueError(f"locked is {self.locked}: it must be places of the {max(self.parts, 1) - 1} planes, from 0")
-        for stop in self.stops:
-            if stop.part > max(self.parts, 1):
-                raise ValueError(f"pauses and changes name part {stop.part}: there are {max(self.parts, 1)}")
+        _ = self.stops
         if not is_file_name_anywhere(self.name):
             raise ValueError(f"name is {self.name!r}: it must be the name of a file")
         return self
@@ -87,7 +86,7 @@ class Record(_Table):
 
 
 def is_file_name_anywhere(name: str) -> bool:
-    """Whether a file of any disk can have a name."""
+    """Whether a file on any disk could have this name."""
     try:
         size = len(name.encode())
     except UnicodeEncodeError:
@@ -105,7 +104,26 @@ def read_record(folder: Path) -> Record:
     try:
         return Record.model_validate_json(text)
     except ValidationError as error:
-        problems: list[Any] = error.errors(include_url=False)
-        if problems[0]["type"] == "json_invalid":
-            raise PlanError(f"{RECORD} is not JSON") from None
-        raise PlanError(f"{RECORD}: {sentences(problems, Record)[0]}") from None
+        raise PlanError(_in_words(error)) from None
+
+
+def checked_record(**values: Any) -> Record:
+    """The record of these values. Raises PlanError with a sentence on what is wrong with them."""
+    try:
+        return Record(**values)
+    except ValidationError as error:
+        raise PlanError(_in_words(error)) from None
+
+
+def _in_words(error: ValidationError) -> str:
+    """What is wrong with a record, its first problem alone."""
+    problem: Any = error.errors(include_url=False)[0]
+    *_, last = path = problem["loc"] or ("",)
+    if problem["type"] == "json_invalid":
+        return f"{RECORD} is not JSON"
+    if not problem["loc"] and problem["type"] != "value_error":
+        return f"{RECORD} is {str(problem['input'])[:LONGEST_VALUE]}: a table of keys is expected"
+    if isinstance(last, int) or path[0] in ("figures", "own_profiles"):  # of a list, or of a table with any keys
+        key, expected = ".".join(map(str, path)), problem["msg"].removeprefix("Input should be ")
+        return f"{RECORD}: {key} is {str(problem['input'])[:LONGEST_VALUE]}: it must be {expected}"
+    return f"{RECORD}: {sentences([problem], Record)[0]}"

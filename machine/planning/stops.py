@@ -36,11 +36,18 @@ def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ..
 
 def _parse(text: str, change: bool) -> Stop:
     match = WRITTEN.fullmatch(text.strip())
-    if match is None:
+    if match is None or 0 in (int(match[1]), int(match[2] or 1)):
         option = "--filament-change" if change else "--pause"
         raise SliceError(f"{option} {text}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
     layer, height = match[2], match[3]
     return Stop(int(match[1]), None if layer is None else int(layer), None if height is None else float(height), change)
+
+
+def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
+    """Raise SliceError for a stop before a layer of a part that does not exist. count: of the parts."""
+    for stop in stops:
+        if stop.part > count:
+            raise SliceError(f"{stop.option}: there is no part {stop.part}, the parts are 1 to {count}")
 
 
 def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:
@@ -52,9 +59,8 @@ def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dic
 
 
 def _layer_of(stop: Stop, sliced: Sequence["SlicedPart"]) -> int:
-    piece = next((piece for piece in sliced if piece.index == stop.part), None)
-    if piece is None:
-        raise SliceError(f"{stop.option}: there is no part {stop.part}, the parts are 1 to {max(p.index for p in sliced)}")
+    check_stop_parts((stop,), max(piece.index for piece in sliced))
+    piece = next(piece for piece in sliced if piece.index == stop.part)
     if stop.layer is not None:
         if not 1 <= stop.layer <= len(piece.layers):
             raise SliceError(

@@ -1,4 +1,4 @@
-"""CAD library: OpenCASCADE (cascadio, the extra `step`) in a process of its own: some damaged files end it by a signal.
+"""CAD library: OpenCASCADE (cascadio, the extra `step`) in a process of its own, for some damaged files crash it.
 
 The process stays in this one's session, so whatever ends that session ends it too: the library holds Python's lock while it
 works, and the process could not hear that nobody waits for it any more.
@@ -12,9 +12,9 @@ from mdp.kernels.workers import ONE_CORE, Interpreter, frame, read_frames, take_
 from profiles.errors import MeshError
 
 CODE = "from mdp.formats.cad_library import answer; answer()"
-# So near the triangles are to the surface: a twentieth of a layer, and a circle in 36 corners at least.
+# How far triangles may lie from the surface: a twentieth of a layer, and a circle in 36 corners at least.
 DEFLECTION_MM, DEFLECTION_RAD = 0.01, 0.17
-SIGKILL = getattr(signal, "SIGKILL", 0)  # by which Linux ends what takes the last of the memory; Windows has none
+SIGKILL = getattr(signal, "SIGKILL", 0)  # sent by Linux to what takes the last of the memory; Windows has none
 DAMAGED = "is damaged: the CAD library (OpenCASCADE) cannot read it"
 KILLED = "the CAD library (OpenCASCADE) was killed while it read it: there may be too little memory"
 
@@ -33,7 +33,7 @@ def to_glb(path: Path, content: bytes, kind: str) -> bytes:
     finally:
         library.end()
     if trouble is None:
-        trouble = KILLED if library.process.returncode == -SIGKILL else DAMAGED
+        trouble = KILLED if SIGKILL and library.process.returncode == -SIGKILL else DAMAGED
     if trouble:
         raise MeshError(f"{path}: {trouble}")
     return bytes(scene)

@@ -63,7 +63,7 @@ def hold_ends(
 def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[Bead]:
     """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them.
 
-    What lies on nothing farther than an anchor reaches is none, and stays.
+    An end that lies on nothing for longer than an anchor is part of the pattern, and stays.
     """
     layers = [plastic for plastic in below if plastic is not None]
     return [_cut_anchor(bead, layers) if bead.anchor_mm > 0.0 and not bead.closed else bead for bead in beads]

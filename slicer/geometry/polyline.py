@@ -195,7 +195,7 @@ def _next_corner(corner: Mask, at: int) -> int:
 
 @kernel
 def lengthen_steps(points: Floats, starts: Indices, shortest_mm: Floats, most_mm: Floats) -> tuple[Floats, Mask]:
-    """Polylines without steps shorter than that where no place of them need move farther; and (n,) which points are left.
+    """Polylines without steps shorter than shortest_mm where no place moves by more than most_mm; and (n,) which points are left.
 
     One end of a short step goes back along the step beside it, or is left out with it, whichever moves the line less. First and
     last points stay. points: (n, 2 or more), one polyline after the other; shortest_mm, most_mm: (k,); shortest 0: as it is.

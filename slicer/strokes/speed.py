@@ -44,10 +44,16 @@ def speeds_mm_s(
     asked = _of_strokes(strokes, process) if fixed_mm_s is None else _by_kind(fixed_mm_s)[strokes.kind]
     for number, own in enumerate(of_places, start=1):
         asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
-    areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
-    speeds = steady(np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas), strokes.lengths_mm)
+    speeds = steady(np.minimum(asked, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
     time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
     return _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
+
+
+def melting_speeds_mm_s(strokes: Strokes, profile: Profile, height_mm: float, flow: float) -> Floats:
+    """(k,) speeds at which the hot end melts the most that it can; flow multiplies every stroke's flow."""
+    areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
+    speeds: Floats = profile.material.volumetric_limit_mm3_s / areas
+    return speeds
 
 
 @kernel

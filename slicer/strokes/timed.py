@@ -11,7 +11,7 @@ from profiles.profile import Profile
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import lengthen_steps, mark_corners
 from slicer.paths import SKINS, Kind, Layer
-from slicer.strokes.speed import fan_share, own_fans, speeds_mm_s, travel_time_s
+from slicer.strokes.speed import fan_share, melting_speeds_mm_s, own_fans, speeds_mm_s, travel_time_s
 from slicer.strokes.strokes import Strokes, in_pieces
 from slicer.strokes.travels import may_wipe_over
 
@@ -33,7 +33,8 @@ def timed(
     speeds = speeds_mm_s(strokes, profile, height_mm, fixed_mm_s, flow, of_places)
     corners = mark_corners(strokes.points, strokes.starts, profile.process.resolution_mm)
     strokes = replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts])
-    return _without_short_steps(strokes), speeds
+    eased = _without_short_steps(strokes)
+    return eased, np.minimum(speeds, melting_speeds_mm_s(eased, profile, height_mm, flow))
 
 
 def _without_short_steps(strokes: Strokes) -> Strokes:

@@ -10,6 +10,7 @@ from machine.app.pipeline.pipeline import Decomposed, decompose_model
 from machine.app.project import PICTURE_PX, STANDING, SUFFIX, Project, figures_of, project_bytes
 from machine.app.requests import Given, ModelRequest
 from machine.app.terminal.plain import show
+from machine.planning.stops import check_stop_parts
 from mdp.model_file import DEMO
 from profiles.errors import OutputError
 from profiles.profile import DEFAULTS
@@ -23,6 +24,7 @@ def save(request: ModelRequest, out: Path) -> int:
     check_model_files(request, (("project", out),))
     decomposed = decompose_model(request)
     decomposition = decomposed.decomposition
+    check_stop_parts(request.stops, len(decomposition.parts))
     picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
     write_bytes(out, project_bytes(_project(request, decomposed), decomposed.plan, decomposition.mesh, picture))
     count = len(decomposed.plan.parts) + 1

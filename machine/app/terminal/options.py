@@ -234,7 +234,7 @@ def model_request(
     if project is not None:
         given, profile = _over_project(given, project.given, search, model)
     else:
-        given = given.over(_given_by(model)) if file.settings_of_file else given
+        given = given.over(_given_by(model, given)) if file.settings_of_file else given
         profile = given.profile(search)
     request = replace(
         ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names),
@@ -260,19 +260,26 @@ def _over_project(
         raise ProfileError(f"{model}: {error}") from None
 
 
-def _given_by(model: str) -> Given:
-    """The settings inside a slicer file; a note on stderr says how many are used. Raises ProfileError for a model without."""
+def _given_by(model: str, given: ProfileOptions) -> Given:
+    """The settings inside a slicer file for the profiles that nobody has named; a note on stderr says how many are used.
+
+    Raises ProfileError for a model without, and where both profiles are named.
+    """
     from machine.app.file_settings import settings_inside
     from machine.app.terminal.progress import say
     from profiles.errors import ProfileError
 
-    file = Path(model)
+    file, kinds = Path(model), [kind for kind in ("material", "process") if getattr(given, kind) is None]
+    if not kinds:
+        raise ProfileError(
+            "--settings-of-file: --material and --process name both profiles, so none of its settings would be used"
+        )
     try:
-        given, note = settings_inside(file, file.name)
+        inside, note = settings_inside(file, file.name, kinds)
     except ProfileError as error:
         raise ProfileError(f"--settings-of-file: {error}") from None
     say(note)
-    return given
+    return inside
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:

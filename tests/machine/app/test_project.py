@@ -241,7 +241,8 @@ def test_a_name_with_letters_of_all_kinds_is_kept() -> None:
         ("parts", -3.5, "parts is -3.5: it must be a whole number from 0 to"),
         ("parts", 2, "work.json: parts is 2: plan.toml has 1"),
         ("locked", [1], "locked is [1]: it must be places of the 0 planes, from 0"),
-        ("pauses", ["7:3"], "pauses and changes name part 7: there are 1"),
+        ("pauses", ["0:3"], "pauses and changes: 0:3: PART:LAYER or PART:HEIGHTmm is expected"),
+        ("figures", {"time_s": "1"}, "work.json: figures.time_s is 1: it must be a valid number"),
         ("changes", ["a"], "pauses and changes: a: PART:LAYER or PART:HEIGHTmm is expected"),
         ("model", None, "model is null: it must be a text"),
         ("model", "", "work.json: model is missing"),
@@ -263,6 +264,20 @@ def test_a_record_that_no_project_has_is_damage(
     said = capsys.readouterr().err
     assert said.startswith("tiltprint: tee.3mf: this project is damaged: ")
     assert sentence in said
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_project_that_was_zipped_with_its_folders_opens() -> None:
+    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+    changed(Path("tee.3mf"), INSIDE, b"")
+    run("decompose", "tee.3mf", "-o", "parts")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_pause_before_a_part_that_does_not_exist_is_not_saved(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["save", "tee.stl", *FAST, "--parts", "1", "--as-is", "--pause", "2:5", "-o", "tee.3mf"]) == 1
+    assert "--pause 2:5: there is no part 2, the parts are 1 to 1" in capsys.readouterr().err
+    assert not Path("tee.3mf").exists()
 
 
 @pytest.mark.usefixtures("folder")

@@ -64,3 +64,13 @@ def test_a_skin_line_that_reaches_into_a_corner_has_no_short_steps_and_keeps_its
     assert np.hypot(*np.diff(printed.points[:, :2], axis=0).T).min() == pytest.approx(least_mm, abs=0.015)
     assert [printed.points[0, :2].tolist(), printed.points[-1, :2].tolist()] == [line[0].tolist(), line[-1].tolist()]
     assert float(printed.flow[0] * printed.lengths_mm[0]) == pytest.approx(float(np.hypot(*np.diff(line, axis=0).T).sum()))
+
+
+def test_a_line_that_is_shortened_asks_the_hot_end_for_no_more_than_it_melts() -> None:
+    line = np.array([[-8.0, -6.0], [-0.55, 0.0], [0.0, 0.0], [0.0, -0.149], [-0.173, -0.173], [-7.0, -7.0]])
+    strokes = strokes_of([Bead(Kind.SKIN, line, 0.42, 0)], np.array([True]), {}, 0.0)
+    profile = load(settings=["process.skin_speed_mm_s=500", "process.least_layer_time_s=0"])
+    printed, speeds = timed(strokes, profile, 0.2, None, 1.0)
+    assert printed.flow[0] > 1.0  # shorter, with the same plastic
+    melted_mm3_s = speeds[0] * 0.2 * (0.42 - 0.2 * (1.0 - np.pi / 4.0)) * printed.flow[0]
+    assert melted_mm3_s == pytest.approx(profile.material.volumetric_limit_mm3_s)

@@ -32,7 +32,7 @@ def with_setting(given: Given, key: str, value: str | None) -> Given:
 
 
 def with_given(given: Given, inside: Given) -> Given:
-    """The same with the material and the settings of another, which stand in place of its own."""
+    """The same with another material and further settings, which replace those of the same keys."""
     keys = {setting.partition("=")[0].strip() for setting in inside.settings}
     others = (setting for setting in given.settings if setting.partition("=")[0].strip() not in keys)
     return replace(given, material=inside.material, settings=(*others, *inside.settings))

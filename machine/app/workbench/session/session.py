@@ -206,7 +206,7 @@ class Session(SessionBase):
         """Put another plate of the slicer file on the bench there. Raises UserError."""
         model = self.bench.model
         numbers = [] if model is None else list(model.plates)
-        if model is None or not isinstance(plate, int) or plate not in numbers:
+        if model is None or not isinstance(plate, int) or isinstance(plate, bool) or plate not in numbers:
             allowed = f"one of {', '.join(map(str, numbers))} is expected" if numbers else "the model has no plates"
             raise PlanError(f"plate is {plate!r}: {allowed}")
         await self.open_model(model.path, model.name, anew=False, plate=plate)
@@ -384,7 +384,7 @@ class Session(SessionBase):
 
 
 def _remove_files(*files: Path | None) -> None:
-    """Remove the files of a model that nobody has any more."""
+    """Remove the files of a model that is not used any more."""
     for file in filter(None, files):
         file.unlink(missing_ok=True)
 

@@ -18,6 +18,7 @@ from machine.app.project import PICTURE_PX, project_bytes, with_meshes_beside
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.kept_work import work_of
+from machine.planning.stops import check_stop_parts
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import standing_still
 from mdp.joint import is_sound
@@ -129,6 +130,7 @@ def make_plan(tell: Tell, bench: Bench) -> str:
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
     """The project file of what lies on the bench."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    check_stop_parts(bench.stops, len(decomposition.parts))
     compilers.wait_for(compilers.PICTURES)
     picture = png_bytes(parts_together(decomposition, bench.profile, PICTURE_PX))
     plan = plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts)

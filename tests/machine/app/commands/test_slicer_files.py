@@ -114,6 +114,18 @@ def settings_of(kind: str) -> dict[str, str]:
     }
 
 
+def test_the_settings_of_a_file_leave_out_the_profile_that_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = {1: files.threemf_mesh(from_manifold(POST))}
+    files.threemf(Path("a.3mf"), mesh, '<item objectid="1"/>', parts=settings_of("PrusaSlicer"))
+    export("a.3mf", "--settings-of-file", "--process", "draft")
+    note = capsys.readouterr().err
+    assert "of the material" in note
+    assert "of the process" not in note
+    named = ["--settings-of-file", "--process", "draft", "--material", "pla"]
+    assert main(["export", "a.3mf", "-o", "out.gcode", *named]) == 1
+    assert "name both profiles, so none of its settings would be used" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("kind", ["PrusaSlicer", "OrcaSlicer", "Cura"])
 def test_a_project_is_printed_by_its_own_settings_where_asked(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     files.threemf(Path("a.3mf"), {1: files.threemf_mesh(from_manifold(POST))}, '<item objectid="1"/>', parts=settings_of(kind))
