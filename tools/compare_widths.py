@@ -83,6 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--rankers", default=CLASSIC)
     parser.add_argument("--faces", type=int, default=None, help="models with more faces are made coarser")
     parser.add_argument("--side", choices=list(Side), default=None, help="only models on one side of the split by source")
+    parser.add_argument("--fold", type=int, default=0, help="which split by source")
     parser.add_argument("--manifest", type=Path, default=None, help="id, source_repo and source_path of the models")
     parser.add_argument("--paper-terms", action="store_true")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
@@ -123,7 +124,7 @@ def _models(options: argparse.Namespace) -> list[Path]:
     if options.side is None:
         return paths
     sources = read_sources(options.manifest)
-    return [path for path in paths if path.stem in sources and side(sources[path.stem]) == options.side]
+    return [path for path in paths if path.stem in sources and side(sources[path.stem], options.fold) == options.side]
 
 
 def _widths(text: str) -> list[int]:

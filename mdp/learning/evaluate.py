@@ -69,7 +69,7 @@ def _compare(options: argparse.Namespace) -> None:
     learnt = COLUMN_SETS[options.columns or "paper"]
     columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for ranker in given.values() for name in ranker.columns)]))
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
-    cut, known = (_sides(options.folder, some, columns) for some in (lists, followed(lists)))
+    cut, known = (_sides(options, some, columns) for some in (lists, followed(lists)))
     rankers: dict[str, Scores] = {f"{ranker.kind}, {file}": as_searched(ranker.scores) for file, ranker in given.items()}
     rankers |= _fitted(BASELINES, options.without, cut, learnt) | _fitted(REGRET_BASELINES, options.without, known, learnt)
     for text in (*tables(rankers, cut[Side.TEST]), *regret_tables(rankers, known[Side.TEST])):
@@ -79,12 +79,12 @@ def _compare(options: argparse.Namespace) -> None:
         _analyse(as_searched(ranker.scores), ranker.columns, cut[Side.TEST], options.repeats, picture)
 
 
-def _sides(folder: Path, lists: Sequence[TrainingList], columns: Sequence[str]) -> Sides:
+def _sides(options: argparse.Namespace, lists: Sequence[TrainingList], columns: Sequence[str]) -> Sides:
     """The lists of each side that have something to tell apart; LearningError where a side has none."""
-    sides = {side: [rated for rated in rate(of_side(lists, side), columns) if rated.teaches] for side in Side}
+    sides = {side: [rated for rated in rate(of_side(lists, side, options.fold), columns) if rated.teaches] for side in Side}
     for side, some in sides.items():
         if not some:
-            raise LearningError(f"folder {folder}: no list of it is on the side {side}; record models of more sources")
+            raise LearningError(f"folder {options.folder}: no list of it is on the side {side}; record models of more sources")
     return sides
 
 

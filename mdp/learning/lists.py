@@ -12,7 +12,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.learning.sources import Side, model_id, read_sources, side
+from mdp.learning.sources import Side, model_id, place, read_sources, side
 from mdp.mesh import Floats
 from mdp.ranking.features import PAPER_COLUMNS
 from mdp.ranking.record import VERSION, Arrays
@@ -125,6 +125,11 @@ def _censored(record: Arrays) -> Mask:
     return censored
 
 
-def of_side(lists: Sequence[TrainingList], wanted: Side) -> list[TrainingList]:
-    """The lists whose source is on one side of the split."""
-    return [recorded for recorded in lists if side(recorded.source) is wanted]
+def of_side(lists: Sequence[TrainingList], wanted: Side, fold: int = 0) -> list[TrainingList]:
+    """The lists whose source is on one side of a split."""
+    return [recorded for recorded in lists if side(recorded.source, fold) is wanted]
+
+
+def of_some_models(lists: Sequence[TrainingList], share: float) -> list[TrainingList]:
+    """The lists of a share of the models; those of a smaller share are among those of a larger one."""
+    return [recorded for recorded in lists if place(f"share of {recorded.model}") < share]

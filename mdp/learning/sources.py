@@ -13,6 +13,7 @@ from profiles.errors import LearningError
 
 NEEDED = ("id", "source_repo", "source_path")
 TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest judges
+FOLDS = 4  # splits of which each judges other sources, so that all of them together judge every model
 
 
 class Side(StrEnum):
@@ -23,12 +24,17 @@ class Side(StrEnum):
     TEST = "test"
 
 
-def side(source: str) -> Side:
-    """The side of a source."""
-    share = int.from_bytes(sha256(source.encode()).digest()[:8], "big") / 2**64
+def side(source: str, fold: int = 0) -> Side:
+    """The side of a source in one of the FOLDS splits; it judges in exactly one of them."""
+    share = (place(source) + fold / FOLDS) % 1.0
     if share < TRAIN_SHARE:
         return Side.TRAIN
     return Side.VALIDATION if share < TRAIN_SHARE + VALIDATION_SHARE else Side.TEST
+
+
+def place(name: str) -> float:
+    """A number from 0 to 1 that depends on nothing but the name."""
+    return int.from_bytes(sha256(name.encode()).digest()[:8], "big") / 2**64
 
 
 def model_id(file: Path) -> str:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
 from mdp.learning.labels import RatedList, followed, rate
-from mdp.learning.lists import of_side, read_lists
+from mdp.learning.lists import of_side, of_some_models, read_lists
 from mdp.learning.ndcg import as_searched, at, best_within, full_lists, regret
 from mdp.learning.sources import Side
 from profiles.errors import LearningError
@@ -50,7 +50,8 @@ def train(arguments: Sequence[str] | None) -> None:
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
     if options.loss == "regret":
         lists = followed(lists)
-    teach, stop, judge = (rate(of_side(lists, side), columns) for side in (Side.TRAIN, Side.VALIDATION, Side.TEST))
+    sides = [of_side(lists, side, options.fold) for side in (Side.TRAIN, Side.VALIDATION, Side.TEST)]
+    teach, stop, judge = (rate(some, columns) for some in (of_some_models(sides[0], options.share), *sides[1:]))
     checkpoints = [options.output.with_name(f"{options.output.name}.checkpoint")]
     checkpoints += [
         options.output.with_name(f"{options.output.name}.checkpoint{member}") for member in range(1, options.ensemble)
@@ -123,8 +124,16 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--batch", type=int, metavar="N", help="lists a step; default 8, 64; the paper takes 1")
     parser.add_argument("--rate", type=float, metavar="R", help="learning rate of Adam; default 1e-4, 2e-3")
     parser.add_argument("--seed", type=int, default=0, metavar="N")
+    parser.add_argument("--share", type=float, default=1.0, metavar="S", help="of the models that train, for a learning curve")
     options = parser.parse_args(arguments)
-    for name, least, most in (("epochs", 1, 1e6), ("patience", 1, 1e6), ("batch", 1, 1e5), ("rate", 0.0, 10.0), ("seed", 0, 1e9)):
+    for name, least, most in (
+        ("epochs", 1, 1e6),
+        ("patience", 1, 1e6),
+        ("batch", 1, 1e5),
+        ("rate", 0.0, 10.0),
+        ("seed", 0, 1e9),
+        ("share", 0.0, 1.0),
+    ):
         check_range(options, name, least, most)
     check_range(options, "ensemble", 1, MOST_NETWORKS)
     if options.ensemble > 1 and options.loss != "regret":
