@@ -8,7 +8,6 @@ run, it goes on when it is started again.
 
 import argparse
 import sys
-from collections import Counter
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
@@ -19,9 +18,10 @@ from mdp.batch.rows import append_row, writing_alone
 from mdp.kernels.threads import THREADS
 from mdp.kernels.workers import CallError
 from mdp.learning import command
-from mdp.learning.collection.index import FAILED, INDEX, LOCK, Row, Search, read_index, unfinished, write_index
-from mdp.learning.collection.models import model_files, name_of
-from mdp.learning.collection.task import TERMS, Result, Settings, run
+from mdp.learning.index import FAILED, INDEX, LOCK, Row, Search, read_index, unfinished, write_index
+from mdp.learning.models import model_files, name_of
+from mdp.learning.summary import summary
+from mdp.learning.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
 from profiles.files import SHARED, write_whole
 from profiles.profile import DEFAULTS
@@ -81,7 +81,10 @@ def collect(arguments: Sequence[str] | None) -> None:
         if missing:
             _run(options, settings, {search: files[search.id] for search in missing}, rows)
             write_index(options.out, rows.values())
-    _report(options.out, [rows[search] for search in wanted])
+    found = [rows[search] for search in wanted]
+    sys.stdout.write("\n\n".join(summary(found)) + "\n")
+    if all(row.excluded for row in found):
+        raise LearningError(f"folder {options.out}: nothing was collected")
 
 
 def _name_or_path(profile: str) -> str:
@@ -112,21 +115,6 @@ def _run(options: argparse.Namespace, settings: Settings, files: dict[Search, Pa
             append_row(options.out / INDEX, result.row)
             rows[search] = result.row
             progress.show(f"{search.file.removesuffix('.npz')}: {result.row.in_words}", result.row.excluded.startswith(FAILED))
-
-
-def _report(out: Path, rows: Sequence[Row]) -> None:
-    """Say what there is now, what there is not and why."""
-    recorded = [row for row in rows if not row.excluded]
-    sys.stderr.write(
-        f"{out}: {len(recorded)} of {len(rows)} searches have a record, {sum(row.lists for row in recorded)} lists\n"
-    )
-    for reason, count in Counter(row.excluded for row in rows if row.excluded and not row.excluded.startswith(FAILED)).items():
-        sys.stderr.write(f"  {count} without: {reason}\n")
-    for row in rows:
-        if row.excluded.startswith(FAILED):
-            sys.stderr.write(f"  {row.search.file} {row.excluded}\n")
-    if not recorded:
-        raise LearningError(f"folder {out}: nothing was collected")
 
 
 if __name__ == "__main__":

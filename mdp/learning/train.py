@@ -3,7 +3,7 @@
     python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--loss urank|ranknet|regret] [--terms NAME,...] ...
 
 The lists of the training side teach, those of the validation side say when to stop, those of the test side are only counted in
-the file's figures. An interrupted training goes on from RANKER.onnx.checkpoint when it is started again.
+the file's figures.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
 from mdp.learning.labels import RatedList, followed, rate
 from mdp.learning.lists import of_side, of_some_models, read_lists
-from mdp.learning.ndcg import as_searched, at, best_within, full_lists, regret
+from mdp.learning.ndcg import as_searched, at, regret
 from mdp.learning.sources import Side
 from profiles.errors import LearningError
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import torch
 
     from mdp.learning.ndcg import Scores
-    from mdp.learning.rankers.training import Epoch, Schedule
+    from mdp.learning.training import Epoch, Schedule
 
 Trained = tuple["Scores", Callable[[Mapping[str, str]], bytes]]  # what a ranker gives a list, and its file with metadata
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
@@ -38,13 +38,13 @@ OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Train and write the ranker; the exit code."""
-    return run(train, arguments, "started again, the training goes on where it stopped")
+    return run(train, arguments, "nothing was written")
 
 
 def train(arguments: Sequence[str] | None) -> None:
     """Train, write the ranker, say what it is worth on the lists that it never saw."""
     options = _options(arguments)
-    from mdp.learning.rankers.export import write
+    from mdp.learning.export import write
 
     columns = COLUMN_SETS[options.columns or LOSSES[options.loss]]
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
@@ -52,62 +52,50 @@ def train(arguments: Sequence[str] | None) -> None:
         lists = followed(lists)
     sides = [of_side(lists, side, options.fold) for side in (Side.TRAIN, Side.VALIDATION, Side.TEST)]
     teach, stop, judge = (rate(some, columns) for some in (of_some_models(sides[0], options.share), *sides[1:]))
-    checkpoints = [options.output.with_name(f"{options.output.name}.checkpoint")]
-    checkpoints += [
-        options.output.with_name(f"{options.output.name}.checkpoint{member}") for member in range(1, options.ensemble)
-    ]
     trained = _train_regret if options.loss == "regret" else _train_paper
-    scores, export = trained(options, columns, (teach, stop), checkpoints)
+    scores, export = trained(options, columns, (teach, stop))
     about = {
         "kind": options.loss,
         "data_set": f"{options.folder.resolve().name}: {counts(teach)}",
         "commit": commit(),
-        "figures": json.dumps(judged(options.loss, as_searched(scores), [rated for rated in judge if rated.teaches])),
+        "figures": json.dumps(judged(as_searched(scores), [rated for rated in judge if rated.teaches])),
     }
     write(options.output, export(about))
-    for file in checkpoints:
-        file.unlink(missing_ok=True)
     sys.stdout.write("\n".join(f"{name}: {value}" for name, value in {**about, "written": options.output}.items()) + "\n")
 
 
-def _train_paper(options: argparse.Namespace, columns: Sequence[str], lists: Sides, checkpoints: Sequence[Path]) -> Trained:
-    from mdp.learning.rankers import urank
-    from mdp.learning.rankers.export import export
+def _train_paper(options: argparse.Namespace, columns: Sequence[str], lists: Sides) -> Trained:
+    from mdp.learning import urank
+    from mdp.learning.export import export
 
     network = urank.Network(len(columns), seed=options.seed)
-    _run(network, columns, lists, _schedule(options), checkpoints[0])
+    _run(network, columns, lists, _schedule(options))
     return urank.scores(network, columns), lambda about: export(network.weights(), columns, about)
 
 
-def _train_regret(options: argparse.Namespace, columns: Sequence[str], lists: Sides, checkpoints: Sequence[Path]) -> Trained:
-    from mdp.learning.rankers import regret
+def _train_regret(options: argparse.Namespace, columns: Sequence[str], lists: Sides) -> Trained:
+    from mdp.learning import regret
 
     networks = []
-    for member, checkpoint in enumerate(checkpoints):
+    for member in range(options.ensemble):
         network = regret.Network(columns, seed=options.seed + member)
-        _run(network, columns, lists, _schedule(options, member), checkpoint)
+        _run(network, columns, lists, _schedule(options, member))
         networks.append(network)
     return regret.scores(networks, columns), lambda about: regret.export(networks, columns, about)
 
 
-def _run(
-    network: "torch.nn.Module",
-    columns: Sequence[str],
-    lists: Sides,
-    schedule: "Schedule",
-    checkpoint: Path,
-) -> None:
+def _run(network: "torch.nn.Module", columns: Sequence[str], lists: Sides, schedule: "Schedule") -> None:
     """Train a network and show how it goes."""
-    from mdp.learning.rankers import training
+    from mdp.learning import training
 
-    training.train(network, columns, lists, schedule, checkpoint, show)
+    training.train(network, columns, lists, schedule, show)
     if sys.stderr.isatty():
         sys.stderr.write("\n")
 
 
 def _schedule(options: argparse.Namespace, member: int = 0) -> "Schedule":
     """The schedule of the loss with what was given in its place; member: of an ensemble, each has a seed of its own."""
-    from mdp.learning.rankers.training import SCHEDULES
+    from mdp.learning.training import SCHEDULES
 
     given = {name: getattr(options, name) for name in OWN if getattr(options, name) is not None}
     return replace(SCHEDULES[options.loss], **given, seed=options.seed + member)
@@ -155,20 +143,11 @@ def counts(lists: Sequence[RatedList]) -> str:
     return f"{records} records, {len(lists)} lists, {models} models"
 
 
-def judged(loss: str, scores: "Scores", lists: Sequence[RatedList]) -> dict[str, float | int]:
-    """Counts and means with four digits: NDCG on all and on full lists, or regret by terms."""
-    figures: dict[str, float | int] = {"lists": len(lists)}
-    kinds: dict[str, Sequence[RatedList]] = {"NDCG": lists, "full NDCG": full_lists(lists)}
-    measures = {f"@{cut}": at(cut) for cut in CUTS}
-    if loss == "regret":
-        all_terms = sorted({rated.terms for rated in lists})
-        kinds = {f"{terms}:": [rated for rated in lists if rated.terms == terms] for terms in all_terms}
-        measures = {f" regret@{first}": regret(first) for first in FIRST}
-        measures |= {f" best in first {first}": best_within(first) for first in FIRST}
-    for kind, some in kinds.items():
-        for name, measure in measures.items() if some else ():
-            figures[f"{kind}{name}".strip()] = round(sum(measure(scores(rated), rated) for rated in some) / len(some), 4)
-    return figures
+def judged(scores: "Scores", lists: Sequence[RatedList]) -> dict[str, float | int]:
+    """How many lists, and the means of NDCG and regret over them with four digits."""
+    measures = {f"NDCG@{cut}": at(cut) for cut in CUTS} | {f"regret of first {first}": regret(first) for first in FIRST}
+    means = {name: sum(measure(scores(rated), rated) for rated in lists) / len(lists) for name, measure in measures.items()}
+    return {"lists": len(lists), **{name: round(mean, 4) for name, mean in means.items()}}
 
 
 if __name__ == "__main__":

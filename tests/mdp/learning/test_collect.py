@@ -12,7 +12,7 @@ import pytest
 
 from mdp.formats.readers import READERS
 from mdp.learning.collect import main
-from mdp.learning.collection.index import INDEX, read_index
+from mdp.learning.index import INDEX, read_index
 from mdp.mesh import Mesh
 from tests import shapes
 
@@ -37,7 +37,7 @@ def test_what_is_done_is_not_done_again_and_what_is_missing_comes_out_the_same_o
     reasons = {row.id: row.excluded for row in read_index(out) if row.orientation == 0}
     assert (reasons["tee"], reasons["flat"]) == ("", "nothing feasible")
     assert reasons["broken"].startswith("failed: ")
-    assert f"broken.0.paper.npz failed: {models}/broken.stl: is not an STL file" in capsys.readouterr().err
+    assert f"- broken.0.paper.npz: {models}/broken.stl: is not an STL file" in capsys.readouterr().out
 
     (out / "tee.1.paper.npz").unlink()
     (models / "broken.stl").unlink()

@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdp.learning.lists import of_side, read_lists
-from mdp.learning.sources import Side, side
+from mdp.learning.lists import of_side, of_some_models, read_lists
+from mdp.learning.sources import FOLDS, Side, side
 from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
 from profiles.errors import LearningError
 from tests.mdp.learning.records import write_record
@@ -63,6 +63,20 @@ def test_sources_are_split_as_in_the_paper_and_always_alike() -> None:
     sides = [side(f"source {number}") for number in range(2000)]
     assert [sides.count(wanted) / 2000 for wanted in Side] == pytest.approx([0.60, 0.15, 0.25], abs=0.02)
     assert [side(name) for name in ("a", "b", "c")] == [Side.TEST, Side.TRAIN, Side.TRAIN]
+
+
+def test_every_source_judges_in_exactly_one_fold_and_trains_in_others() -> None:
+    sides = np.array([[side(f"source {number}", fold) for fold in range(FOLDS)] for number in range(500)])
+    assert ((sides == Side.TEST).sum(axis=1) == 1).all()
+    assert ((sides == Side.TRAIN).sum(axis=1) >= 2).all()
+
+
+def test_a_share_of_the_models_is_part_of_a_larger_share(tmp_path: Path) -> None:
+    for number in range(60):
+        write_record(tmp_path / f"m{number}.0.x.npz", OUTCOME)
+    quarter, half, whole = ({rated.model for rated in of_some_models(read_lists(tmp_path), share)} for share in (0.25, 0.5, 1.0))
+    assert 8 <= len(quarter) <= 22 < len(half) < 40 < len(whole) == 60
+    assert quarter < half
 
 
 def test_a_list_is_on_the_side_of_its_source(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
-"""Baselines: orders without learning, a line in two features, and the learners that the paper and method hold uRank against.
+"""Baselines: orders without learning, a line in two features, and the learners that the paper compares uRank with.
 
-Boosted trees get the features scaled by list as uRank does; LambdaMART the unscaled ones beside them. REGRET_BASELINES are held
-against what is trained for little regret: lines with the least regret, and LambdaMART on grades of regret.
+Boosted trees get the features scaled by list as uRank does; LambdaMART the unscaled ones beside them.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,12 +9,11 @@ from zlib import crc32
 import numpy as np
 
 from mdp.learning.labels import RatedList, Singles, scale
-from mdp.learning.ndcg import Scores, ndcg, regret
+from mdp.learning.ndcg import Scores, ndcg
 from mdp.mesh import Floats, Ints
 
 WEIGHTS = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 53)])  # of M6 against M2, tried in turn
 FITTED_AT = 5  # the NDCG that the line is fitted by and that LambdaMART stops by
-GRADES = (0.2, 0.06, 0.02, 0.005, 1e-6)  # a candidate's grade is how many of these its regret is not above
 # The settings of XGBoost's own ranking demo, which the paper names, with the paper's depth and rounds.
 XGBOOST = {"max_depth": 8, "eta": 0.1, "gamma": 1.0, "min_child_weight": 0.1, "tree_method": "hist", "nthread": 1, "seed": 0}
 XGBOOST_PAIRS = {"lambdarank_pair_method": "mean", "lambdarank_num_pair_per_sample": 1}  # as that demo drew them in 2020
@@ -45,11 +43,11 @@ def random_order(rated: RatedList) -> Floats:
     return np.random.default_rng(crc32(rated.features.tobytes())).random(len(rated.ratings))
 
 
-def trade_off(weight: float, lost: str = "M6") -> Scores:
-    """M2 - weight M6: what is saved so far less what is lost for ever; lost: another feature in the place of M6."""
+def trade_off(weight: float) -> Scores:
+    """M2 - weight M6: what the cuts so far save less what they lose for ever."""
 
     def of_list(rated: RatedList) -> Floats:
-        gain, loss = rated.table(("M2", lost)).T.astype(np.float64)
+        gain, loss = rated.table(("M2", "M6")).T.astype(np.float64)
         scores: Floats = gain - weight * loss
         return scores
 
@@ -63,17 +61,6 @@ def fit_trade_off(training: Lists, validation: Lists, columns: Columns) -> Score
     return trade_off(float(WEIGHTS[int(np.argmax(means))]))
 
 
-def fit_least_regret(lost: str) -> Fit:
-    """The trade-off with a feature whose first candidate has the least regret on the training lists."""
-
-    def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
-        del validation, columns
-        means = [np.mean([regret(1)(trade_off(weight, lost)(rated), rated) for rated in training]) for weight in WEIGHTS]
-        return trade_off(float(WEIGHTS[int(np.argmin(means))]), lost)
-
-    return fit
-
-
 def fit_xgboost(objective: str) -> Fit:
     """RankNet (rank:pairwise) or LambdaRank (rank:ndcg) as the paper ran them: 500 rounds, come what may."""
 
@@ -81,7 +68,7 @@ def fit_xgboost(objective: str) -> Fit:
         del validation
         import xgboost
 
-        rows = xgboost.DMatrix(np.vstack([_scaled(rated, columns) for rated in training]), label=_joined(training, _ratings))
+        rows = xgboost.DMatrix(np.vstack([_scaled(rated, columns) for rated in training]), label=_ratings(training))
         rows.set_group([len(rated.ratings) for rated in training])
         booster = xgboost.train({**XGBOOST, **XGBOOST_PAIRS, "objective": objective}, rows, XGBOOST_ROUNDS)
         return lambda rated: booster.inplace_predict(_scaled(rated, columns)).astype(np.float64)
@@ -89,42 +76,23 @@ def fit_xgboost(objective: str) -> Fit:
     return fit
 
 
-def fit_lambdamart(labels: Callable[[RatedList], Ints]) -> Fit:
-    """LightGBM's LambdaMART on labels, stopped when the validation lists are ordered no better."""
+def fit_lambdamart(training: Lists, validation: Lists, columns: Columns) -> Scores:
+    """LightGBM's LambdaMART, stopped when the validation lists are ordered no better."""
+    import lightgbm
 
-    def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
-        import lightgbm
+    def rows(lists: Lists, reference: object = None) -> object:
+        table = np.vstack([_scaled_and_raw(rated, columns) for rated in lists])
+        groups = [len(rated.ratings) for rated in lists]
+        return lightgbm.Dataset(table, label=_ratings(lists), group=groups, reference=reference)
 
-        def rows(lists: Lists, reference: object = None) -> object:
-            table = np.vstack([_scaled_and_raw(rated, columns) for rated in lists])
-            groups = [len(rated.ratings) for rated in lists]
-            return lightgbm.Dataset(table, label=_joined(lists, labels), group=groups, reference=reference)
-
-        train = rows(training)
-        booster = lightgbm.train(
-            LIGHTGBM,
-            train,
-            LIGHTGBM_ROUNDS,
-            valid_sets=[rows(validation, train)],
-            callbacks=[lightgbm.early_stopping(LIGHTGBM_PATIENCE, verbose=False)],
-        )
-        return lambda rated: np.asarray(booster.predict(_scaled_and_raw(rated, columns), num_threads=1), dtype=np.float64)
-
-    return fit
+    train = rows(training)
+    stopping = lightgbm.early_stopping(LIGHTGBM_PATIENCE, verbose=False)
+    booster = lightgbm.train(LIGHTGBM, train, LIGHTGBM_ROUNDS, valid_sets=[rows(validation, train)], callbacks=[stopping])
+    return lambda rated: np.asarray(booster.predict(_scaled_and_raw(rated, columns), num_threads=1), dtype=np.float64)
 
 
-def grades(rated: RatedList) -> Ints:
-    """(n,) 5 for the best candidates, less for more regret, as GRADES says."""
-    grade: Ints = (rated.regrets[:, np.newaxis] <= GRADES).sum(axis=1).astype(np.int32)
-    return grade
-
-
-def _ratings(rated: RatedList) -> Ints:
-    return rated.ratings
-
-
-def _joined(lists: Lists, labels: Callable[[RatedList], Ints]) -> Ints:
-    return np.concatenate([labels(rated) for rated in lists])
+def _ratings(lists: Lists) -> Ints:
+    return np.concatenate([rated.ratings for rated in lists])
 
 
 def _scaled(rated: RatedList, columns: Columns) -> Singles:
@@ -137,8 +105,8 @@ def _scaled_and_raw(rated: RatedList, columns: Columns) -> Singles:
 
 def fit_ranknet(training: Lists, validation: Lists, columns: Columns) -> Scores:
     """uRank's network and training with RankNet's loss."""
-    from mdp.learning.rankers.training import Schedule, train
-    from mdp.learning.rankers.urank import Network, scores
+    from mdp.learning.training import Schedule, train
+    from mdp.learning.urank import Network, scores
 
     network = Network(len(columns))
     train(network, columns, (training, validation), Schedule(loss="ranknet"))
@@ -152,10 +120,5 @@ BASELINES: dict[str, Fit] = {
     "RankNet": fit_ranknet,
     "RankNet (XGBoost)": fit_xgboost("rank:pairwise"),
     "LambdaRank (XGBoost)": fit_xgboost("rank:ndcg"),
-    "LambdaMART (LightGBM)": fit_lambdamart(_ratings),
-}
-REGRET_BASELINES: dict[str, Fit] = {
-    "M2 - lambda M6 (regret)": fit_least_regret("M6"),
-    "M2 - lambda wasted (regret)": fit_least_regret("wasted"),
-    "LambdaMART (regret)": fit_lambdamart(grades),
+    "LambdaMART (LightGBM)": fit_lambdamart,
 }

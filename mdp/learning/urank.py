@@ -12,7 +12,7 @@ from torch.nn.functional import softplus
 
 from mdp.learning.labels import RatedList, Singles, scale
 from mdp.learning.ndcg import Scores, ndcg
-from mdp.learning.rankers.objective import FAR_BELOW, Figures, Loss, Objective, Targets
+from mdp.learning.objective import FAR_BELOW, Figures, Loss, Objective, Targets
 from mdp.mesh import Floats
 
 HIDDEN = (100, 100)  # as the paper's network

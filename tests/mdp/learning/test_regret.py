@@ -9,12 +9,12 @@ onnx = pytest.importorskip("onnx", reason="the extra `train` is not installed")
 onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
 
 from mdp.learning.command import COLUMN_SETS
+from mdp.learning.export import write
 from mdp.learning.labels import RatedList, followed, rate, ratings
 from mdp.learning.lists import read_lists
 from mdp.learning.ndcg import best_within
-from mdp.learning.rankers.export import write
-from mdp.learning.rankers.regret import OBJECTIVE, Network, export, regret_loss, scores, thin
-from mdp.learning.rankers.training import SCHEDULES, Epoch, train
+from mdp.learning.regret import OBJECTIVE, Network, export, regret_loss, scores, thin
+from mdp.learning.training import SCHEDULES, Epoch, train
 from mdp.mesh import Floats
 from mdp.ranking.features import COLUMNS
 from mdp.ranking.network import Network as SearchNetwork
@@ -23,7 +23,7 @@ from mdp.ranking.ranker import ranker_named
 pytestmark = pytest.mark.train
 
 CHEAP = COLUMN_SETS["cheap"]
-SMALL_SET = Path(__file__).parents[1] / "data"
+SMALL_SET = Path(__file__).parent / "data"
 
 
 def planted(seed: int, size: int = 20) -> RatedList:
@@ -129,14 +129,3 @@ def test_the_file_of_the_largest_ensemble_is_below_200_kb() -> None:
     content = export([Network(COLUMNS, seed=seed) for seed in range(12)], COLUMNS, {"kind": "regret"})
     assert len(content) < 200_000
     assert onnx.load_model_from_string(content).metadata_props[0].value == ",".join(COLUMNS)
-
-
-def test_a_training_that_goes_on_ends_at_the_same_weights(tmp_path: Path) -> None:
-    lists = ([planted(seed) for seed in range(70)], [planted(seed) for seed in range(70, 80)])
-    whole, halves = Network(CHEAP, (8,)), Network(CHEAP, (8,))
-    schedule = replace(SCHEDULES["regret"], epochs=4)
-    train(whole, CHEAP, lists, schedule)
-    train(Network(CHEAP, (8,)), CHEAP, lists, replace(schedule, epochs=2), tmp_path / "a.pt")
-    train(halves, CHEAP, lists, schedule, tmp_path / "a.pt")
-    for trained, resumed in zip(whole.state_dict().values(), halves.state_dict().values(), strict=True):
-        assert torch.equal(trained, resumed)

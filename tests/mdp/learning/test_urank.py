@@ -5,7 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from mdp.learning.rankers.urank import OBJECTIVES, Network, ranknet_loss, scores, urank_loss
+from mdp.learning.urank import OBJECTIVES, Network, ranknet_loss, scores, urank_loss
 from mdp.ranking.features import PAPER_COLUMNS
 from tests.mdp.learning.records import drawn_list
 from tests.mdp.learning.reference import reference_lists

@@ -7,8 +7,8 @@ torch = pytest.importorskip("torch", reason="the extra `train` is not installed"
 onnx = pytest.importorskip("onnx", reason="the extra `train` is not installed")
 onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
 
-from mdp.learning.rankers.export import export, write
-from mdp.learning.rankers.urank import Network, scores
+from mdp.learning.export import export, write
+from mdp.learning.urank import Network, scores
 from mdp.ranking.features import PAPER_COLUMNS
 from profiles.errors import LearningError
 from tests.mdp.learning.records import drawn_list

@@ -7,8 +7,8 @@ from time import process_time
 
 import numpy as np
 
-from mdp.learning.collection.index import FAILED, NO_CUT, NO_RISK, NO_SIDE, Row, Search
-from mdp.learning.collection.models import coarser, oriented, read_model
+from mdp.learning.index import FAILED, NO_CUT, NO_RISK, NO_SIDE, Row, Search
+from mdp.learning.models import coarser, oriented, read_model
 from mdp.search.search import decompose
 from profiles.errors import UserError
 from profiles.profile import DEFAULTS, Profile, load

@@ -3,17 +3,8 @@ from math import log2
 import numpy as np
 import pytest
 
-from mdp.learning.labels import RatedList, ratings
-from mdp.learning.ndcg import Scores, at, regret
-from mdp.learning.rankers.baselines import (
-    BASELINES,
-    REGRET_BASELINES,
-    fit_least_regret,
-    fit_trade_off,
-    grades,
-    random_order,
-    trade_off,
-)
+from mdp.learning.baselines import BASELINES, fit_trade_off, random_order, trade_off
+from mdp.learning.ndcg import at
 from mdp.mesh import Floats
 from mdp.ranking.features import PAPER_COLUMNS
 from tests.mdp.learning.records import drawn_list
@@ -50,30 +41,6 @@ def test_the_fitted_trade_off_finds_the_weight_that_the_outcomes_were_drawn_with
 
 def test_what_is_saved_alone_orders_worse_than_less_what_is_lost() -> None:
     assert mean_ndcg("random") < mean_ndcg("M2") < mean_ndcg("M2 - lambda M6")
-
-
-def mean_regret(scores: Scores) -> float:
-    return float(np.mean([regret(1)(scores(rated), rated) for rated in TEST]))
-
-
-def test_the_line_with_the_least_regret_has_less_than_m2_alone_and_looks_at_the_feature_that_it_is_told() -> None:
-    fitted = fit_least_regret("M6")(TRAINING, VALIDATION, PAPER_COLUMNS)
-    by_m1 = fit_least_regret("M1")(TRAINING, VALIDATION, PAPER_COLUMNS)
-    assert mean_regret(fitted) < 0.2 * mean_regret(trade_off(0.0))
-    assert mean_regret(fitted) < 0.2 * mean_regret(by_m1)
-
-
-def test_grades_fall_with_regret() -> None:
-    outcome = np.array([0.5, 0.502, 0.508, 0.52, 0.58, 0.9])
-    rated = RatedList(np.zeros((6, 0), np.float32), (), outcome, ratings(outcome), "a")
-    assert grades(rated).tolist() == [5, 4, 3, 2, 1, 0]
-
-
-@pytest.mark.train
-def test_boosted_trees_on_grades_learn_to_have_little_regret() -> None:
-    pytest.importorskip("lightgbm", reason="the extra `train` is not installed")
-    fitted = REGRET_BASELINES["LambdaMART (regret)"](TRAINING, VALIDATION, PAPER_COLUMNS)
-    assert mean_regret(fitted) < 0.5 * mean_regret(trade_off(0.0))
 
 
 @pytest.mark.train

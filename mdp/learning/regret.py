@@ -12,10 +12,10 @@ from itertools import pairwise
 import numpy as np
 import torch
 
+from mdp.learning.export import Graph, scale_by_list
 from mdp.learning.labels import RatedList, Singles
 from mdp.learning.ndcg import Scores, order
-from mdp.learning.rankers.export import Graph, scale_by_list
-from mdp.learning.rankers.objective import FAR_BELOW, Figures, Objective, Padded, Targets
+from mdp.learning.objective import FAR_BELOW, Figures, Objective, Padded, Targets
 from mdp.mesh import Floats
 from mdp.ranking.network import INPUT
 

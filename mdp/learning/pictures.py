@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mdp.learning.evaluation.widths import Comparison
+from mdp.learning.widths import Comparison
 from mdp.mesh import Floats
 from profiles.errors import LearningError
 
@@ -16,21 +16,22 @@ PLAIN, LEARNED = "#4472a8", "#e0a030"
 
 
 def draw_widths(comparisons: Sequence[Comparison]) -> Figure:
-    """A row a comparison: what each width takes off the mean J of the narrowest classic beam, and the time it takes."""
+    """A row a comparison: what each width takes off the mean J of the narrowest plain beam, and the time it takes."""
     figure = Figure(figsize=(2 * INCHES, INCHES * len(comparisons)), layout="constrained")
     for comparison, (left, right) in zip(comparisons, figure.subplots(len(comparisons), 2, squeeze=False), strict=True):
-        narrowest = comparison.series[0]
-        first = narrowest.share[0]
-        less_j = f"mean J less than {narrowest.ranker} at width {narrowest.widths[0]}, %"
-        for colour, series in zip(_colours(len(comparison.series)), comparison.series, strict=True):
-            less = [100.0 * (1.0 - share / first) if first > 0.0 else 0.0 for share in series.share]
-            left.plot(series.widths, less, "o-", color=colour, label=series.ranker)
-            right.plot(series.widths, series.core_s, "o-", color=colour, label=series.ranker)
-        for axes, label in ((left, less_j), (right, "processor time a model, s")):
-            _name_widths(axes, sorted({width for series in comparison.series for width in series.widths}))
+        first = float(next(iter(comparison.shares.values())).mean())
+        rankers = list(dict.fromkeys(ranker for ranker, _ in comparison.shares))
+        for colour, ranker in zip(_colours(len(rankers)), rankers, strict=True):
+            widths = [width for name, width in comparison.shares if name == ranker]
+            means = [float(comparison.shares[ranker, width].mean()) for width in widths]
+            less = [100.0 * (1.0 - mean / first) if first > 0.0 else 0.0 for mean in means]
+            left.plot(widths, less, "o-", color=colour, label=ranker)
+            right.plot(widths, [comparison.core_s[ranker, width].mean() for width in widths], "o-", color=colour)
+        for axes, label in ((left, "mean J less than the first one, %"), (right, "processor time a model, s")):
+            _name_widths(axes, sorted({width for _, width in comparison.shares}))
             axes.set_ylabel(label)
         left.legend()
-        left.set_title(f"{comparison.method}, {comparison.models} models", fontsize="medium")
+        left.set_title(f"{comparison.method}, {len(comparison.models)} models", fontsize="medium")
         right.set_title(comparison.settings or "default settings", fontsize="x-small", wrap=True)
     return figure
 

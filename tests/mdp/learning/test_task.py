@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from mdp.batch.rows import append_row
-from mdp.learning.collection.index import INDEX, Row, Search, read_index, unfinished, write_index
-from mdp.learning.collection.models import coarser, model_files, oriented, read_model
-from mdp.learning.collection.task import Settings, run
-from mdp.learning.summary import main as summarize
+from mdp.learning.index import INDEX, Row, Search, read_index, unfinished, write_index
+from mdp.learning.models import coarser, model_files, oriented, read_model
+from mdp.learning.summary import summary
+from mdp.learning.task import Settings, run
 from mdp.mesh import Mesh
 from profiles.errors import LearningError, MeshError
 from profiles.profile import load
 from tests import shapes
-from tests.mdp.learning.records import write_record
 
 
 def _npz(path: Path, mesh: Mesh) -> Path:
@@ -106,14 +105,10 @@ def test_what_failed_or_lost_its_record_is_done_again(tmp_path: Path) -> None:
     assert [search.id for search in missing] == ["b", "d", "e"]
 
 
-def test_a_collection_is_told_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = [Row("a", 0, "paper", "B=3", outcome=0.5, seconds=36.0), Row("b", 0, "paper", "B=3", excluded="failed: no mesh")]
-    write_index(tmp_path, rows)
-    write_record(tmp_path / "a.0.paper.npz", np.zeros(9), np.repeat([1, 2, 3], [4, 4, 1]))
-    assert summarize([str(tmp_path)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert "| paper | B=3 | 2 | 2 | 1 | 3 | 9 | 3.0 | 4 | 0.5000 | 0.01 | 0 |" in lines
-    assert "| paper | 3 | 0 | 0 | 0 | 0 | 0 | 0 | 0 | 0 |" in lines
-    assert "| paper | failed | 1 |" in lines
-    assert "- b.0.paper.npz: no mesh" in lines
-    assert summarize([str(tmp_path / "none")]) == 1
+def test_a_collection_is_told_as_tables() -> None:
+    done = Row("a", 0, "paper", "B=3", lists=3, mean_list_length=3.0, outcome=0.5, seconds=36.0)
+    alike = Row("a", 1, "paper", "B=3", lists=1, mean_list_length=5.0, outcome=0.7)
+    counts, reasons, failed = summary([done, alike, Row("b", 0, "paper", "B=3", excluded="failed: no mesh")])
+    assert counts.splitlines()[-1] == "| paper | B=3 | 3 | 2 | 2 | 4 | 3.5 | 0.6000 | 0.01 | 0 |"
+    assert reasons.splitlines()[-1] == "| paper | failed | 1 |"
+    assert failed == "- b.0.paper.npz: no mesh"

@@ -1,22 +1,18 @@
-"""Training: steps over shuffled batches of lists until the validation lists are ordered no better, resumable at every epoch.
+"""Training: steps over shuffled batches of lists until the validation lists are ordered no better.
 
 Adam, the norm of all gradients together cut off. The network with the highest figures on the validation lists is kept.
-One thread, and an order of lists drawn anew from seed and epoch: the same lists give the same weights, interrupted or not.
+One thread, and an order of lists drawn anew from seed and epoch: the same lists give the same weights.
 """
 
-import os
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
-from hashlib import sha256
-from pathlib import Path
-from typing import Any
 
 import torch
 
+from mdp.learning import regret, urank
 from mdp.learning.labels import RatedList
-from mdp.learning.rankers import regret, urank
-from mdp.learning.rankers.objective import Figures, Objective, Padded
+from mdp.learning.objective import Figures, Objective, Padded
 from profiles.errors import LearningError
 
 OBJECTIVES: dict[str, Objective] = {**urank.OBJECTIVES, "regret": regret.OBJECTIVE}
@@ -63,7 +59,7 @@ class Epoch:
 
 @dataclass(eq=False)
 class _State:
-    """All that a training needs to go on."""
+    """Where a training is, and the best that it has met."""
 
     network: torch.nn.Module
     optimizer: torch.optim.Optimizer
@@ -78,13 +74,11 @@ def train(
     columns: Sequence[str],
     lists: tuple[Sequence[RatedList], Sequence[RatedList]],
     schedule: Schedule,
-    checkpoint: Path | None = None,
     on_epoch: Callable[[Epoch], None] | None = None,
 ) -> Figures:
     """Train a network in place on the named features of lists for training and for validation; the best figures.
 
-    Lists with a single rating are left out. Where the checkpoint file is there, the training goes on from it. Raises
-    LearningError for no lists, and for a checkpoint of another training or one that cannot be written.
+    Lists with a single rating are left out; LearningError where no others are there.
     """
     torch.set_num_threads(1)
     training, validation = ([rated for rated in side if rated.teaches] for side in lists)
@@ -96,17 +90,12 @@ def train(
     objective.prepare(network, padded)
     adam = torch.optim.Adam(network.parameters(), lr=schedule.rate, weight_decay=schedule.decay)
     state = _State(network, adam, deepcopy(network.state_dict()))
-    key = _key(network, schedule, padded, held_out)
-    if checkpoint is not None and checkpoint.exists():
-        _resume(checkpoint, key, state)
     while state.epoch < schedule.epochs and state.epoch - state.best_epoch < schedule.patience:
         state.epoch += 1
         loss = _steps(state, padded, schedule)
         figures = _validate(network, held_out, objective)
         if figures > state.best:
             state.best, state.best_epoch, state.best_weights = figures, state.epoch, deepcopy(network.state_dict())
-        if checkpoint is not None:
-            _save(checkpoint, key, state)
         if on_epoch is not None:
             on_epoch(Epoch(state.epoch, loss, figures, objective.measures, state.best_epoch))
     network.load_state_dict(state.best_weights)
@@ -135,44 +124,3 @@ def _validate(network: torch.nn.Module, lists: Padded, objective: Objective) -> 
     targets, present = lists.targets.numpy(), lists.present.numpy()
     figures = [objective.figures(scores[row][here], targets[row][here]) for row, here in enumerate(present)]
     return tuple(sum(values) / len(figures) for values in zip(*figures, strict=True))
-
-
-def _key(network: torch.nn.Module, schedule: Schedule, *lists: Padded) -> str:
-    """What tells a training from others: its network as it starts, its schedule but for the end, its lists."""
-    digest = sha256(repr((schedule.loss, schedule.batch, schedule.rate, schedule.clip, schedule.decay, schedule.seed)).encode())
-    of_lists = (tensor for padded in lists for tensor in (padded.features, padded.targets, padded.present))
-    tensors = [*network.state_dict().values(), *of_lists]
-    for tensor in tensors:
-        digest.update(repr(tensor.shape).encode() + tensor.numpy().tobytes())
-    return digest.hexdigest()
-
-
-def _save(file: Path, key: str, state: _State) -> None:
-    """Write a checkpoint beside its file and rename it, so that a torn one never stands in its place."""
-    content = {
-        "key": key,
-        "network": state.network.state_dict(),
-        "optimizer": state.optimizer.state_dict(),
-        "best_weights": state.best_weights,
-        "counts": (state.epoch, state.best_epoch, state.best),
-    }
-    beside = file.with_name(f"{file.name}.new")
-    try:
-        torch.save(content, beside)
-        os.replace(beside, file)
-    except (OSError, RuntimeError) as error:
-        raise LearningError(f"checkpoint {file}: cannot be written ({error})") from None
-
-
-def _resume(file: Path, key: str, state: _State) -> None:
-    try:
-        content: dict[str, Any] = torch.load(file, weights_only=True)
-        same = content["key"] == key
-    except Exception as error:  # noqa: BLE001 - torch raises whatever its reader of archives and pickles does
-        raise LearningError(f"checkpoint {file}: cannot be read ({error}); delete it to begin anew") from None
-    if not same:
-        raise LearningError(f"checkpoint {file}: is of a training with other lists or settings; delete it to begin anew")
-    state.network.load_state_dict(content["network"])
-    state.optimizer.load_state_dict(content["optimizer"])
-    state.best_weights = content["best_weights"]
-    state.epoch, state.best_epoch, state.best = content["counts"]

@@ -1,1 +1,0 @@
-"""Judging rankers: the paper's table, the analysis of its features, and its pictures."""

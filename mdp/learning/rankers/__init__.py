@@ -1,1 +1,0 @@
-"""Rankers that are learnt: the network of the paper and its training, others to hold it against, and its export."""
