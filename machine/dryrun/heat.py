@@ -121,12 +121,12 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Findin
     beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
     if not beads.any():
         return
-    blows = fan_shares(program, profile.machine) > 0.0
+    blows, way_mm = fan_shares(program, profile.machine) > 0.0, program.way_mm
     seconds, blown = np.zeros((2, program.layer_key_count))
     first = np.full(len(seconds), len(beads))
     for some in pieces(len(beads)):
         mine = some.start + np.flatnonzero(beads[some])
-        layer, length = program.layer_keys(mine), np.linalg.norm(program.end[mine, :3] - program.start[mine, :3], axis=1)
+        layer, length = program.layer_keys(mine), way_mm[mine]
         np.add.at(seconds, layer, length / np.maximum(program.feed[mine], 1e-9) * 60.0)
         np.add.at(blown, layer, length * blows[mine])
         np.minimum.at(first, layer, mine)
@@ -166,10 +166,10 @@ def _without_fan(part: int, profile: Profile) -> int:
 def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
     """Plastic per second at the asked speed, against what the hot end melts."""
     material = profile.material
-    area, flow = pi * material.diameter_mm**2 / 4.0, np.zeros(len(program.line))
-    for some in pieces(len(flow)):
-        length = np.linalg.norm(program.end[some, :3] - program.start[some, :3], axis=1) + ROUNDING_MM
-        flow[some] = program.e_mm[some] * area / length * program.feed[some] / 60.0
+    flow = program.e_mm * (pi * material.diameter_mm**2 / 4.0)
+    flow /= program.way_mm + ROUNDING_MM
+    flow *= program.feed
+    flow /= 60.0
     most = material.volumetric_limit_mm3_s
     message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
     much = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (flow > most * SLACK))

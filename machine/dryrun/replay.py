@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, highest_first, lay_bead
-from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
+from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of, turned_box
 from machine.kinematics.table import machine_points
-from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces, pose_runs
+from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pose_runs
 from mdp.head import Head, head_of
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, no_nrt
@@ -112,10 +112,15 @@ def _field(
     (before, after), (pose, least_mm) = laid, place
     turn = np.column_stack([rotation(machine, pose), shift(machine, pose)])
     extent = np.array([[np.inf] * 2, [-np.inf] * 2])
-    for some in pieces(after):
+    for some, box in deposited.boxes(after):
+        least, most = turned_box(box, turn)[:, :2]
+        if (least >= extent[0]).all() and (most <= extent[1]).all():
+            continue
         _widen(extent, deposited.segments(some) if segments is None else segments[some], turn)
     field = empty_field(extent[0] - 3.0, extent[1] + 3.0)
-    for some in pieces(before):
+    for some, box in deposited.boxes(before):
+        if turned_box(box, turn)[1, 2] + np.array([0.5, 1.0]) @ deposited.sizes.max(axis=0) < least_mm:
+            continue
         run_of = np.searchsorted(directions[1], np.arange(some.start, some.stop), side="right") - 1
         own = deposited.segments(some) if segments is None else segments[some]
         mine = (own, deposited.rows[some], deposited.sizes, deposited.size[some])

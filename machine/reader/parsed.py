@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from machine.firmware import dialect_of
 from machine.gcode.settings import PartTotals
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
 from profiles.machine import Machine
@@ -137,18 +138,12 @@ class ParsedProgram:
     @cached_property
     def bounds(self) -> Floats:
         """(2, 5) least and greatest place of each axis at the ends of moves; infinite where there is none."""
-        least, most = np.full(5, np.inf), np.full(5, -np.inf)
-        for some in pieces(len(self.line)):
-            least, most = np.minimum(least, self.end[some].min(axis=0)), np.maximum(most, self.end[some].max(axis=0))
-        return np.stack([least, most])
+        return np.transpose([(axis.min(initial=np.inf), axis.max(initial=-np.inf)) for axis in self.end.T])
 
     @property
     def way_mm(self) -> Floats:
         """(n,) how far X Y Z go in each move."""
-        way_mm = np.empty(len(self.line))
-        for some in pieces(len(way_mm)):
-            way_mm[some] = np.linalg.norm(self.end[some, :3] - self.start[some, :3], axis=1)
-        return way_mm
+        return _ways(self.start, self.end)
 
     def changes(self, rows: Indices | slice = slice(None)) -> Floats:
         """(m, 6) of X Y Z tilt turn E, in some rows."""
@@ -180,6 +175,15 @@ class ParsedProgram:
         """(n,) which rows belong to these ;TYPE: names."""
         marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.remarks.type]
         return marked[self.remark]
+
+
+@kernel
+def _ways(start: Floats, end: Floats) -> Floats:
+    ways_mm = np.empty(len(start))
+    for k in range(len(start)):
+        a, b = start[k], end[k]
+        ways_mm[k] = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+    return ways_mm
 
 
 def pieces(count: int) -> Iterator[slice]:
