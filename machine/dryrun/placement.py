@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, Beads, highest_of
-from machine.planning.fit import over_edge_mm
+from machine.planning.limits import over_edge_mm
 from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.profile import Profile
@@ -145,10 +145,16 @@ def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
     if not len(purged) or not len(laid):
         return []
     half_mm = 0.5 * deposited.width_mm
-    import shapely  # 30 ms, for programs that purge on the plate
-
-    lines, beads = (shapely.linestrings(deposited.segments(which)[:, :, :2]) for which in (purged, laid))
     reach_mm = float(half_mm[purged].max() + half_mm[laid].max()) - ROUNDING_MM
+    lines, beads = (deposited.segments(which)[:, :, :2] for which in (purged, laid))
+    near = (
+        (beads.max(axis=1) > lines.min(axis=(0, 1)) - reach_mm) & (beads.min(axis=1) < lines.max(axis=(0, 1)) + reach_mm)
+    ).all(axis=1)
+    if not near.any():
+        return []
+    import shapely  # 30 ms, for programs that lay beads beside their purge
+
+    laid, lines, beads = laid[near], shapely.linestrings(lines), shapely.linestrings(beads[near])
     line, bead = shapely.STRtree(beads).query(lines, "dwithin", reach_mm)
     between_mm = shapely.distance(lines[line], beads[bead]) - half_mm[purged[line]] - half_mm[laid[bead]]
     overlapping = np.flatnonzero(between_mm < -ROUNDING_MM)

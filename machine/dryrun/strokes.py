@@ -15,9 +15,8 @@ from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from profiles.machine import Machine
 from profiles.profile import Profile
-from slicer.fill.infill import infill_cell_mm
+from slicer.bead import infill_cell_mm, support_cell_mm
 from slicer.paths import Kind
-from slicer.support.sturdy import support_cell_mm
 
 ROUNDING_MM = 1e-6
 SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded

@@ -98,6 +98,8 @@ def _about(middle: Floats, axis: Floats, angle: Floats, point: Point) -> Point:
     """A point turned about an axis through a middle, seen from there; angle: (3,) with its cosine and sine at the end."""
     cosine, sine = angle[1], angle[2]
     x, y, z = point[0] - middle[0], point[1] - middle[1], point[2] - middle[2]
+    if sine == 0.0 and cosine == 1.0:
+        return x, y, z
     along = x * axis[0] + y * axis[1] + z * axis[2]
     return (
         x * cosine + (axis[1] * z - axis[2] * y) * sine + axis[0] * along * (1.0 - cosine),

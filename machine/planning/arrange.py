@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning.fit import Place, over_edge_mm
+from machine.planning.fit import Place
+from machine.planning.limits import over_edge_mm
 from profiles.machine import Machine
 from profiles.settings.plate import MIDDLE
 

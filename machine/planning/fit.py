@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from machine.kinematics.table import machine_points
-from machine.planning.limits import ROUNDING, axis_limits
+from machine.planning.limits import ROUNDING, axis_limits, over_edge_mm
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.plane import Plane
 from profiles.errors import MoveError
-from profiles.machine import Table
 from profiles.profile import Profile
 from profiles.settings.plate import MIDDLE
 from slicer.paths import SlicedPart
@@ -78,16 +77,6 @@ def _advice(profile: Profile) -> str:
         return "process.scale makes the model smaller"
     x, y = profile.process.place_mm
     return f"process.place_mm moves it from {x:g}, {y:g} mm back towards the middle"
-
-
-def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
-    """(...) how far places (..., 2) lie over the plate's edge, below 0 on it; the edge in words."""
-    if table.size_mm is None:
-        over: Floats = np.hypot(points_mm[..., 0], points_mm[..., 1]) - table.radius_mm
-        return over, f"{table.radius_mm:g} mm from its middle"
-    x, y = table.size_mm
-    over = (np.abs(points_mm) - 0.5 * np.array([x, y])).max(axis=-1)
-    return over, f"it measures {x:g} x {y:g} mm"
 
 
 def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.0) -> Decomposition:

@@ -12,7 +12,7 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from profiles.errors import MoveError
 from profiles.frozen import Limits
-from profiles.machine import Machine
+from profiles.machine import Machine, Table
 from profiles.profile import Profile
 from slicer.strokes.speed import travel_mm_s2
 
@@ -116,6 +116,16 @@ def path_speed(points_mm: Floats, first: int, end: int, speed_mm_s: float, axes_
             step = points_mm[k, axis] - points_mm[k - 1, axis]
             speed_mm_s = min(speed_mm_s, along(axes_mm_s[axis], step, np.sqrt(squared)))
     return speed_mm_s
+
+
+def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
+    """(...) how far places (..., 2) lie over the plate's edge, below 0 on it; the edge in words."""
+    if table.size_mm is None:
+        over: Floats = np.hypot(points_mm[..., 0], points_mm[..., 1]) - table.radius_mm
+        return over, f"{table.radius_mm:g} mm from its middle"
+    x, y = table.size_mm
+    over = (np.abs(points_mm) - 0.5 * np.array([x, y])).max(axis=-1)
+    return over, f"it measures {x:g} x {y:g} mm"
 
 
 def turn_speed(tilt_deg: float, turn_deg: float, machine: Machine) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import pi, radians, sqrt, tan
 
 from profiles.process import Process
-from slicer.bead import spacing_mm
+from slicer.bead import spacing_mm, support_cell_mm
 from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, union
 from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
 
@@ -145,9 +145,3 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
             (filling if has_lines else empty).append(piece)
         hollow[m], filled, dense_above = union(empty), union(filling), dense[m]
     return hollow
-
-
-def support_cell_mm(process: Process) -> float:
-    """The distance between sparse lines of support, mm, which dense lines on top of them have to span."""
-    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
-    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density
