@@ -121,9 +121,9 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
     What spans the cells of sparse infill is a bridge, however much of a layer that is (machine.dryrun.replay).
     """
     counted = ~program.rows_of_types(*LOOSE)[deposited.rows] & ~_begins(program, deposited.rows)[program.remark[deposited.rows]]
-    loose, air, whole = np.zeros((3, program.layer_key_count))
+    (loose, air, whole), tallest_mm = np.zeros((3, program.layer_key_count)), deposited.sizes[:, 1].max(initial=0.0)
     for some, box in deposited.boxes():
-        if box[0, 2] - deposited.sizes[:, 1].max() < ON_PLATE_MM:
+        if box[0, 2] - tallest_mm < ON_PLATE_MM:
             lowest_mm = deposited.segments(some)[:, :, 2].min(axis=1)
             counted[some] &= lowest_mm - deposited.sizes[deposited.size[some], 1] >= ON_PLATE_MM
         rows = deposited.rows[some][counted[some]]

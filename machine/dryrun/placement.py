@@ -119,8 +119,9 @@ def off_plate(program: ParsedProgram, deposited: Beads, profile: Profile) -> Ite
     remark_mm = program.remarks.height_mm
     heights = np.where(remark_mm > 0, remark_mm, profile.process.first_layer_height_mm)
     purge, beyond, over_mm, edge = program.rows_of_types(PURGE), [np.zeros(0, np.int64)], [np.zeros(0)], ""
+    most_mm = heights.max(initial=0.0) + ROUNDING_MM
     for some, box in deposited.boxes():
-        if box[0, 2] > heights.max() + ROUNDING_MM:
+        if box[0, 2] > most_mm:
             continue
         segments, rows = deposited.segments(some), deposited.rows[some]
         low = np.flatnonzero((highest_of(segments) <= heights[program.remark[rows]] + ROUNDING_MM) & ~purge[rows])
@@ -138,8 +139,9 @@ def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
     if not purge.any():
         return []
     low, low_mm = np.zeros(len(purge), np.bool_), ON_PLATE * np.maximum(deposited.sizes[:, 1], ROUNDING_MM)
+    most_mm = low_mm.max()
     for some, box in deposited.boxes():
-        if box[0, 2] <= low_mm.max():
+        if box[0, 2] <= most_mm:
             low[some] = highest_of(deposited.segments(some)) <= low_mm[deposited.size[some]]
     purged, laid = np.flatnonzero(low & purge), np.flatnonzero(low & ~purge)
     if not len(purged) or not len(laid):

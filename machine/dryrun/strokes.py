@@ -163,8 +163,9 @@ def lengths_of(segments: Floats) -> Floats:
     """(k,) lengths of (k, 2, 3) segments."""
     lengths_mm = np.empty(len(segments))
     for k in range(len(segments)):
-        a, b = segments[k, 0], segments[k, 1]
-        lengths_mm[k] = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+        x, y = segments[k, 1, 0] - segments[k, 0, 0], segments[k, 1, 1] - segments[k, 0, 1]
+        z = segments[k, 1, 2] - segments[k, 0, 2]
+        lengths_mm[k] = np.sqrt(x * x + y * y + z * z)
     return lengths_mm
 
 

@@ -181,8 +181,8 @@ class ParsedProgram:
 def _ways(start: Floats, end: Floats) -> Floats:
     ways_mm = np.empty(len(start))
     for k in range(len(start)):
-        a, b = start[k], end[k]
-        ways_mm[k] = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+        x, y, z = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1], end[k, 2] - start[k, 2]
+        ways_mm[k] = np.sqrt(x * x + y * y + z * z)
     return ways_mm
 
 
