@@ -41,7 +41,6 @@ from mdp.decomposition import FrontRow
 from mdp.mesh import Mesh
 from mdp.model_file import DEMO
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile
-from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
 from profiles.errors import PlanError, first_line, reason
@@ -155,6 +154,8 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
     model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
+        from mdp.plans.writing import plan_text  # tomlkit, for projects alone
+
         write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
     given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
     record = checked_record(

@@ -175,7 +175,7 @@ def summary(run: DryRun) -> dict[str, Any]:
         "time_s": run.time_s,
         "filament_mm": float(np.max(program.filament_mm, initial=0.0)),
         "extruded_mm3": float(run.segment_mm3.sum()),
-        "travel_mm": float(program.way_mm[travels].sum()),
+        "travel_mm": float(program.ways_mm()[travels].sum()),
         "layers": program.layers,
         "parts": len(program.parts),
         "reorientations": int((program.kind == MoveKind.ROTATE).sum()),

@@ -95,9 +95,10 @@ def blocks_of(
     if most_mm_s2 is not None:
         acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
     moving = measure < 3
-    halts = np.diff(np.cumsum(stop)[moving], prepend=0) > 0
-    direction = deltas[moving] / length[moving][:, None]
-    return Blocks(direction, length[moving], cruise[moving], acceleration[moving], measure[moving], halts), moving
+    which = slice(None) if moving.all() else moving  # mostly all of them, which need not be copied
+    halts = np.diff(np.cumsum(stop)[which], prepend=0) > 0
+    direction = deltas[which] / length[which, None]
+    return Blocks(direction, length[which], cruise[which], acceleration[which], measure[which], halts), moving
 
 
 @kernel

@@ -140,10 +140,9 @@ class ParsedProgram:
         """(2, 5) least and greatest place of each axis at the ends of moves; infinite where there is none."""
         return np.transpose([(axis.min(initial=np.inf), axis.max(initial=-np.inf)) for axis in self.end.T])
 
-    @property
-    def way_mm(self) -> Floats:
-        """(n,) how far X Y Z go in each move."""
-        return _ways(self.start, self.end)
+    def ways_mm(self, rows: Indices | slice = slice(None)) -> Floats:
+        """(m,) how far X Y Z go in some moves."""
+        return _ways(self.start[rows], self.end[rows])
 
     def changes(self, rows: Indices | slice = slice(None)) -> Floats:
         """(m, 6) of X Y Z tilt turn E, in some rows."""
