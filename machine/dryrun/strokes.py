@@ -67,16 +67,17 @@ class Beads:
 
     def boxes(self, count: int | None = None) -> Iterator[tuple[slice, Floats]]:
         """The first beads, all if no number is given, in pieces, and what contains each: (2, 3) least and greatest X Y Z."""
-        return zip(pieces(len(self.rows) if count is None else count), self._measures[1], strict=False)
+        last = len(self.rows) if count is None else count
+        return ((slice(some.start, min(some.stop, last)), box) for some, box in self._measures[1] if some.start < last)
 
     @cached_property
-    def _measures(self) -> tuple[Floats, list[Floats]]:
-        length_mm, boxes = np.empty(len(self.rows)), list[Floats]()
+    def _measures(self) -> tuple[Floats, list[tuple[slice, Floats]]]:
+        length_mm, boxes = np.empty(len(self.rows)), list[tuple[slice, Floats]]()
         for some in pieces(len(length_mm)):
             segments = self.segments(some)
             length_mm[some] = lengths_of(segments)
             ends = segments.reshape(-1, 3).T
-            boxes.append(np.transpose([(axis.min(), axis.max()) for axis in ends]))
+            boxes.append((some, np.transpose([(axis.min(), axis.max()) for axis in ends])))
         return length_mm, boxes
 
 

@@ -17,7 +17,7 @@ from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
 from profiles.machine import Machine
 
-AT_ONCE = 16_384  # rows
+AT_ONCE = 8_192  # rows
 Indices32 = NDArray[np.int32]
 OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
 
