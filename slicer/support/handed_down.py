@@ -254,7 +254,7 @@ def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supp
     both = unite_layers(printed, _padded(own.areas, count))
     if sections.on_platform:
         if not sections.on_raft:
-            foot = widen_foot(printed[0], whole, (room.window ^ sections.plate) - room.shut)
+            foot = widen_foot(printed, whole, (room.window ^ sections.plate) - room.shut)
             both[0] = union([both[0], foot])
     else:
         low = _hanging_low(areas, missed)

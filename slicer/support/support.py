@@ -41,6 +41,7 @@ SLACK_MM = 0.01  # what rounding may add to the lean
 LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
+UNDER = 0.5  # of a disc's radius: how far it may stand aside of what it holds
 MOST = 0.5  # share of a place that one reason has to hold for
 
 
@@ -90,7 +91,7 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     printed, dense = stand(*grow(wanted, {}, areas), areas)
     missed = find_missed(wanted, printed, areas)
     if sections.on_platform and not sections.on_raft:
-        printed[0] = widen_foot(printed[0], areas, sections.plate - blocked[0])
+        printed[0] = widen_foot(printed, areas, sections.plate - blocked[0])
     hollow, rest = hollow_places(printed, dense, process), nothing[len(printed) :]
     return Supports(sections, [*printed, *rest], [*dense, *rest], [*hollow, *rest], wanted, missed, unwanted)
 
@@ -179,7 +180,10 @@ def _body(area: Polygons, radius: float) -> Polygons:
 
 
 def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float) -> Polygons:
-    """Reached places whose discs cover a hanging place as far as can be, beside the support already present."""
+    """Reached places whose discs cover a hanging place as far as can be, beside the support already present.
+
+    A disc beside the place has to come under it by half its radius: a bead that merely touches it would hold nothing.
+    """
     bare = drop_slivers(hanging - body)
     if bare.area() < LEAST_MM2:
         return Polygons()
@@ -187,7 +191,7 @@ def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: flo
     core = offset(bare, -radius)
     contact = (bare if core.is_empty() else core + (bare - offset(core, radius))) ^ reachable
     beside = drop_slivers(bare - dilate(contact, radius))
-    return contact if beside.is_empty() else contact + (dilate(beside, radius) ^ reachable)
+    return contact if beside.is_empty() else contact + (dilate(beside, UNDER * radius) ^ reachable)
 
 
 def stand(
@@ -284,11 +288,21 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
     return Polygons.compose(standing) if standing else Polygons()
 
 
-def widen_foot(area: Polygons, areas: ReachableAreas, free: Polygons) -> Polygons:
-    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate."""
+def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
+    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
+
+    Support is wider there by half its height, up to support_foot_mm: what is low needs no foot.
+    """
     outlines, process = areas.sections.outlines, areas.process
+    highest = int(np.searchsorted(areas.heights.tip_mm[: len(printed)], 2.0 * process.support_foot_mm))
+    tall: list[tuple[Polygons, float]] = []
+    for layer in reversed(range(min(highest + 1, len(printed)))):
+        tip_mm = float(areas.heights.tip_mm[layer])
+        pieces = islands(printed[layer])
+        tall = [(piece, max([tip_mm, *(top_mm for over, top_mm in tall if not (over ^ piece).is_empty())])) for piece in pieces]
+    wide = union([dilate(piece, min(0.5 * top_mm, process.support_foot_mm)) for piece, top_mm in tall])
     beside = offset(outlines[0], process.support_distance_mm)
-    return (dilate(area, process.support_foot_mm) - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
+    return (wide - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
