@@ -8,7 +8,19 @@ import numpy as np
 
 from mdp.clearance import least_tip_height_mm
 from mdp.mesh import Floats
-from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, larger, offset, opening, union
+from slicer.geometry.polygons import (
+    Polygons,
+    bounding_box,
+    close_loop,
+    closing,
+    contours,
+    islands,
+    larger,
+    offset,
+    opening,
+    union,
+)
+from slicer.geometry.polyline import length_mm
 from slicer.heights import SAME_MM
 from slicer.overhangs import LEAST_MM2, Overhang
 from slicer.paths import Unsupported
@@ -41,6 +53,7 @@ SLACK_MM = 0.01  # what rounding may add to the lean
 LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
+HIGH = 4.0  # widths of the foot: what stands higher on it counts no more
 UNDER = 0.5  # of a disc's radius: how far it may stand aside of what it holds
 MOST = 0.5  # share of a place that one reason has to hold for
 
@@ -267,7 +280,7 @@ def _only_slivers(places: Polygons) -> bool:
 def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
     """The share that does not stand of support which no support carries: discs reach beyond placeable places, but nothing stands
     beside one alone."""
-    placeable = areas.placeable[m]
+    placeable = areas.placeable[m] ^ bounding_box(rest, areas.radius_mm)
     beside = rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm)
     alone = [piece for piece in islands(rest) if _only_slivers(piece ^ placeable)]
     return union([beside, *alone])
@@ -291,33 +304,38 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
 def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
     """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
 
-    Support is wider there by half its height, up to support_foot_mm: what is low needs no foot.
+    Each piece of it gets as wide as a branch and its own height together, up to support_foot_mm on each side.
     """
     outlines, process = areas.sections.outlines, areas.process
-    highest = int(np.searchsorted(areas.heights.tip_mm[: len(printed)], 2.0 * process.support_foot_mm))
+    highest = int(np.searchsorted(areas.heights.tip_mm[: len(printed)], HIGH * process.support_foot_mm))
     tall: list[tuple[Polygons, float]] = []
     for layer in reversed(range(min(highest + 1, len(printed)))):
-        tip_mm = float(areas.heights.tip_mm[layer])
-        pieces = islands(printed[layer])
-        tall = [(piece, max([tip_mm, *(top_mm for over, top_mm in tall if not (over ^ piece).is_empty())])) for piece in pieces]
-    wide = union([dilate(piece, min(0.5 * top_mm, process.support_foot_mm)) for piece, top_mm in tall])
+        tip_mm, over, tall = float(areas.heights.tip_mm[layer]), tall, []
+        for piece in islands(printed[layer]):
+            tall.append((piece, max([tip_mm, *(top_mm for upper, top_mm in over if not (upper ^ piece).is_empty())])))
+    lacking_mm = [0.5 * (process.support_branch_mm + top_mm - _width_mm(piece)) for piece, top_mm in tall]
+    feet = [dilate(piece, min(lack, process.support_foot_mm)) for (piece, _), lack in zip(tall, lacking_mm, strict=True)]
     beside = offset(outlines[0], process.support_distance_mm)
-    return (wide - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
+    return (union(feet) - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
+
+
+def _width_mm(piece: Polygons) -> float:
+    """The diameter of a disc; of a strip twice its width."""
+    return 4.0 * piece.area() / sum(length_mm(close_loop(loop)) for loop in contours(piece))
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
     """Where printed support is next to the part: under the overhangs that it holds and over the surface that it stands on."""
     process = areas.process
     roofs, floors = process.support_interface_layers, process.support_bottom_interface_layers
-    reach_mm = (1.0 - BEYOND) * areas.radius_mm
-    dense = []
+    reach_mm, dense = (1.0 - BEYOND) * areas.radius_mm, []
+    feet = [foot if foot.is_empty() else dilate(foot, reach_mm) for foot in areas.placeable]
     for m, area in enumerate(printed):
         if area.is_empty():
             dense.append(area)
             continue
         over = [contact for contact in contacts[m : m + roofs] if not contact.is_empty()]
-        stands = [foot for foot in areas.placeable[max(m - floors + 1, 0) : m + 1] if not foot.is_empty()]
-        near = union([*over, *(dilate(foot, reach_mm) for foot in stands)])
+        near = union([*over, *(foot for foot in feet[max(m - floors + 1, 0) : m + 1] if not foot.is_empty())])
         dense.append(opening(area ^ near, 0.45 * process.line_width_mm))
     return dense
 
