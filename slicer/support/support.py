@@ -54,7 +54,7 @@ LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's defini
 UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
 HIGH = 4.0  # widths of the foot: what stands higher on it counts no more
-UNDER = 0.5  # of a disc's radius: how far it may stand aside of what it holds
+UNDER = (0.2, 0.5)  # of a disc's radius: how far it may stand aside of what it holds, no farther than needed
 MOST = 0.5  # share of a place that one reason has to hold for
 
 
@@ -204,7 +204,10 @@ def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: flo
     core = offset(bare, -radius)
     contact = (bare if core.is_empty() else core + (bare - offset(core, radius))) ^ reachable
     beside = drop_slivers(bare - dilate(contact, radius))
-    return contact if beside.is_empty() else contact + (dilate(beside, UNDER * radius) ^ reachable)
+    for share in UNDER if not beside.is_empty() else ():
+        contact = contact + (dilate(beside, share * radius) ^ reachable)
+        beside = drop_slivers(beside - dilate(contact, radius))
+    return contact
 
 
 def stand(
