@@ -307,7 +307,7 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
 def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
     """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
 
-    Each piece of it gets as wide as a branch and its own height together, up to support_foot_mm on each side.
+    Each piece of it gets twice as wide as the support on it is high, as far as support_foot_mm on each side allows.
     """
     outlines, process = areas.sections.outlines, areas.process
     highest = int(np.searchsorted(areas.heights.tip_mm[: len(printed)], HIGH * process.support_foot_mm))
@@ -316,7 +316,7 @@ def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygon
         tip_mm, over, tall = float(areas.heights.tip_mm[layer]), tall, []
         for piece in islands(printed[layer]):
             tall.append((piece, max([tip_mm, *(top_mm for upper, top_mm in over if not (upper ^ piece).is_empty())])))
-    lacking_mm = [0.5 * (process.support_branch_mm + top_mm - _width_mm(piece)) for piece, top_mm in tall]
+    lacking_mm = [top_mm - 0.5 * _width_mm(piece) for piece, top_mm in tall]
     feet = [dilate(piece, min(lack, process.support_foot_mm)) for (piece, _), lack in zip(tall, lacking_mm, strict=True)]
     beside = offset(outlines[0], process.support_distance_mm)
     return (union(feet) - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
