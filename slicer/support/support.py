@@ -56,7 +56,7 @@ TIP_MM = 0.8  # height over which support may be thinner than a branch
 HIGH = 4.0  # widths of the foot: what stands higher on it counts no more
 UNDER = (0.2, 0.5)  # of a disc's radius: how far it may stand aside of what it holds, no farther than needed
 MOST = 0.5  # share of a place that one reason has to hold for
-
+NOWHERE = Polygons()
 
 HEAP = 12  # layers united at a time: a sweep over all of them at once meets many more crossings
 
@@ -103,6 +103,9 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     areas = reachable_areas(sections, blocked)
     printed, dense = stand(*grow(wanted, {}, areas), areas)
     missed = find_missed(wanted, printed, areas)
+    if any(not area.is_empty() for area in missed):
+        printed, dense = stand(*grow(wanted, {}, areas, seen_from_above(missed)), areas)
+        missed = find_missed(wanted, printed, areas)
     if sections.on_platform and not sections.on_raft:
         printed[0] = widen_foot(printed, areas, sections.plate - blocked[0])
     hollow, rest = hollow_places(printed, dense, process), nothing[len(printed) :]
@@ -147,11 +150,12 @@ def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
 
 
 def grow(
-    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas
+    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas, hard: Polygons = NOWHERE
 ) -> tuple[list[Polygons], list[Polygons]]:
     """Grow support from the top down. Returns one area per layer of all support, and one of the support that begins there.
 
-    wanted: the hanging places of each layer; begins: places of a layer at which support has to begin.
+    wanted: the hanging places of each layer; begins: places of a layer at which support has to begin; hard: where support may
+    merely touch what it holds.
     """
     count, radius = len(areas.reachable), areas.radius_mm
     is_tree, area, branches = areas.process.support_style == "tree", Polygons(), list[Branch]()
@@ -168,7 +172,7 @@ def grow(
         body = _body(area, radius)
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
-            contact = _contact(union(asked), body, areas.reachable[m], radius)
+            contact = _contact(union(asked), body, areas.reachable[m], radius, hard)
             if is_tree:
                 branches = add_contact(branches, contact, areas.reachable[m])
             elif not contact.is_empty():
@@ -192,10 +196,11 @@ def _body(area: Polygons, radius: float) -> Polygons:
     return area if area.is_empty() else dilate(area, radius).simplify(COARSE_MM)
 
 
-def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float) -> Polygons:
+def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float, hard: Polygons) -> Polygons:
     """Reached places whose discs cover a hanging place as far as can be, beside the support already present.
 
-    A disc beside the place has to come under it by half its radius: a bead that merely touches it would hold nothing.
+    A disc beside the place has to come under it by half its radius: a bead that merely touches it holds little,
+    and is taken only where a place is hard to reach.
     """
     bare = drop_slivers(hanging - body)
     if bare.area() < LEAST_MM2:
@@ -207,7 +212,8 @@ def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: flo
     for share in UNDER if not beside.is_empty() else ():
         contact = contact + (dilate(beside, share * radius) ^ reachable)
         beside = drop_slivers(beside - dilate(contact, radius))
-    return contact
+    touched = beside ^ hard
+    return contact if touched.is_empty() else contact + (dilate(touched, radius) ^ reachable)
 
 
 def stand(
@@ -324,7 +330,7 @@ def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygon
 
 def _width_mm(piece: Polygons) -> float:
     """The diameter of a disc; of a strip twice its width."""
-    return 4.0 * piece.area() / sum(length_mm(close_loop(loop)) for loop in contours(piece))
+    return float(4.0 * piece.area() / sum(length_mm(close_loop(loop)) for loop in contours(piece)))
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
