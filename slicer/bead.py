@@ -20,11 +20,7 @@ FILL, LAST = 1, 99  # beads of these ranks fill what the walls enclose, in any o
 ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: what two half circles leave of their square, as in PrusaSlicer's Flow
 INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin bead so wide stays under the flat of the tip
 EVEN_MM = 0.03  # widths that differ by less are one
-
-
 NARROWEST = 0.6  # diameters of the nozzle
-
-
 NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 

@@ -44,10 +44,7 @@ def travels(
     """
     retracts: Mask = np.hypot(*(to - since).T) >= process.retract_travel_mm
     detours: dict[int, Floats] = {}
-    widths_mm = (
-        min(process.line_width_mm, outer_wall_width_mm(process)),
-        process.support_line_width_mm or process.line_width_mm,
-    )
+    widths_mm = (min(process.line_width_mm, outer_wall_width_mm(process)), process.support_line_width_mm or process.line_width_mm)
     if retracts.any():
         areas = zip((section, support), widths_mm, strict=True)
         inside = [Combing(area, width) for area, width in areas if not area.is_empty()]
