@@ -74,17 +74,11 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
     return Moves(ways, rows)
 
 
-@kernel
 def _ways(points_mm: Floats, flat_mm: Floats, starts: Indices, area_mm2: Floats, filament_mm2: float) -> Floats:
     """(n, 4) points of strokes with the filament of beads of (k,) areas; flat_mm (n, 2): the points before they were moved."""
-    ways: Floats = table(len(points_mm), 4)
-    for k in range(len(area_mm2)):
-        for i in range(starts[k], starts[k + 1]):
-            for axis in range(3):
-                ways[i, axis] = points_mm[i, axis]
-            if i > starts[k]:
-                ways[i, 3] = _step_mm(flat_mm, i) * area_mm2[k] / filament_mm2
-    return ways
+    steps_mm = np.hypot(*np.diff(flat_mm, axis=0, prepend=flat_mm[:1]).T)
+    steps_mm[starts[:-1]] = 0.0
+    return np.column_stack([points_mm, steps_mm * np.repeat(area_mm2, np.diff(starts)) / filament_mm2])
 
 
 @no_nrt

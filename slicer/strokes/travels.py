@@ -127,10 +127,7 @@ def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, 
         n = _pull_taut(safe, path, n)
         if n == 0:
             return 0
-    total = 0.0
-    for i in range(1, n):
-        total += np.hypot(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
-    return n if total <= longest else 0
+    return n if length_between(path, 0, n) <= longest else 0
 
 
 @helper
