@@ -17,11 +17,11 @@ from machine.gcode.settings import totals_comment
 from machine.gcode.words import PAUSE_REMARK
 from machine.planning.limits import stroke_filament_mm_s, wipe_filament_mm_s
 from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, straight_moves
-from machine.planning.timing import move_times
 from mdp.mesh import Floats, Indices
 from mdp.pose import level
 from profiles.machine import Machine
 from profiles.profile import Profile
+from slicer.estimate.timing import move_times
 from slicer.paths import KINDS, NUMBER, Kind
 from slicer.strokes.speed import travel_mm_s2
 

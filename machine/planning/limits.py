@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from machine.planning.moves import REORIENT, RICHER, BeginLayer, BeginPart, MachineProgram, Reorient
-from machine.planning.timing import along, axis_speeds
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
@@ -14,6 +13,7 @@ from profiles.errors import MoveError
 from profiles.frozen import Limits
 from profiles.machine import Machine
 from profiles.profile import Profile
+from slicer.estimate.timing import along, axis_speeds
 from slicer.strokes.speed import travel_mm_s2
 
 ROUNDING = 5e-4
