@@ -297,7 +297,7 @@ def _before_stroke(
     yield from _set_fan(pen.layer_fan if isnan(fan) else fan, pen)
     if not isinf(acceleration_mm_s2) and round(acceleration_mm_s2) != pen.acceleration and pen.dialect.acceleration:
         pen.acceleration = round(acceleration_mm_s2)
-        yield pen.dialect.acceleration.format(pen.acceleration, round(travel_mm_s2(profile) or pen.acceleration))
+        yield pen.dialect.acceleration.format(pen.acceleration, round(travel_mm_s2(profile)))
     if kind != pen.kind:
         pen.kind = kind
         yield f";TYPE:{KINDS[kind].value}"

@@ -6,11 +6,11 @@ infill or support it makes that a little thicker, where nobody sees or feels it.
 """
 
 from itertools import pairwise
-from math import inf, pi
+from math import pi
 
 import numpy as np
 
-from machine.planning.limits import Speeds, path_speeds, stroke_filament_mm_s
+from machine.planning.limits import path_speeds, stroke_filament_mm_s
 from machine.planning.moves import POINTS, RETRACT, SPEED, Moves, add_point, add_row
 from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
 from mdp.kernels.arrays import floats, longs, table
@@ -18,7 +18,8 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from profiles.profile import Profile
-from slicer.paths import KINDS, Kind, Layer, bead_area_mm2
+from slicer.estimate.timing import Speeds
+from slicer.paths import Kind, Layer, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
 from slicer.strokes.travels import STANDING_MM
 
@@ -64,11 +65,10 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
     area_mm2 = bead_area_mm2(layer.width_mm, layer.height_mm) * layer.flow
     with np.errstate(divide="ignore"):
         fastest = stroke_filament_mm_s(profile) * filament_mm2 / np.maximum(area_mm2, 0.0)
-    accelerations = stroke_accelerations(profile, on_plate)
-    by_kind = np.array([inf if accelerations is None else accelerations[kind] for kind in KINDS])
     speeds = path_speeds(points, layer.starts, np.minimum(layer.speed_mm_s, fastest), tip.speeds.axes_mm_s)
+    accelerations = stroke_accelerations(profile, on_plate)[layer.kind]
     ways = _ways(points, layer.points, layer.starts, area_mm2, filament_mm2)
-    rows = np.column_stack([layer.kind, counts, speeds, layer.width_mm, layer.own_fan, by_kind[layer.kind]])
+    rows = np.column_stack([layer.kind, counts, speeds, layer.width_mm, layer.own_fan, accelerations])
     if material.coast_mm > 0.0:
         return _coasted(Moves(ways, rows), layer.points, np.append(layer.retract[1:], False), material.coast_mm)
     return Moves(ways, rows)

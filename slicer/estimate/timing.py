@@ -14,8 +14,21 @@ from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 from profiles.machine import Machine
+from profiles.profile import Profile
+from slicer.strokes.speed import travel_mm_s2
 
 TINY = 1e-9
+
+
+class Speeds(NamedTuple):
+    """What moves without extruding may have at most: mm/s straight up and down, across, and of the filament alone; mm/s2, inf
+    where the axes decide; (3,) mm/s of X, Y and Z."""
+
+    lift_mm_s: float
+    travel_mm_s: float
+    filament_mm_s: float
+    acceleration_mm_s2: float
+    axes_mm_s: Floats
 
 
 class Blocks(NamedTuple):
@@ -29,6 +42,18 @@ class Blocks(NamedTuple):
     acceleration: Floats
     measure: NDArray[np.int8]
     halts: NDArray[np.bool_]
+
+
+def speeds_of(profile: Profile) -> Speeds:
+    """What the process asks for, as far as the axes and the extruder allow it."""
+    process, machine, material = profile.process, profile.machine, profile.material
+    return Speeds(
+        lift_mm_s=min(process.lift_speed_mm_s, machine.z.speed_mm_s),
+        travel_mm_s=min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s),
+        filament_mm_s=min(material.retract_speed_mm_s, machine.extruder_speed_mm_s),
+        acceleration_mm_s2=travel_mm_s2(profile),
+        axes_mm_s=axis_speeds(machine)[:3],
+    )
 
 
 @no_nrt

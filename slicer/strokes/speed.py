@@ -188,17 +188,17 @@ def first_layer_speeds(process: Process) -> dict[Kind, float]:
     return dict.fromkeys(Kind, process.first_layer_speed_mm_s) | dict.fromkeys(INSIDE, inside)
 
 
-def stroke_accelerations(profile: Profile, first_layer: bool) -> dict[Kind, float] | None:
-    """mm/s2 by kind; None where the process sets no acceleration at all, so that the firmware's own rule."""
+def stroke_accelerations(profile: Profile, first_layer: bool) -> Floats:
+    """(number of kinds,) mm/s2; inf where the process sets no acceleration at all, so that the firmware's own rule."""
     process = profile.process
     if not sets_acceleration(process):
-        return None
+        return np.full(len(KINDS), np.inf)
     usual = process.acceleration_mm_s2 or axes_mm_s2(profile)
     if first_layer:
-        return dict.fromkeys(Kind, process.first_layer_acceleration_mm_s2 or usual)
+        return np.full(len(KINDS), process.first_layer_acceleration_mm_s2 or usual)
     infill = process.infill_acceleration_mm_s2 or usual
     hanging = process.bridge_acceleration_mm_s2 or usual
-    return dict.fromkeys(Kind, usual) | {
+    others = {
         Kind.OUTER_WALL: process.outer_wall_acceleration_mm_s2 or usual,
         Kind.INFILL: infill,
         Kind.SUPPORT: infill,
@@ -206,11 +206,12 @@ def stroke_accelerations(profile: Profile, first_layer: bool) -> dict[Kind, floa
         Kind.BRIDGE: hanging,
         Kind.OVERHANG: hanging,
     }
+    return np.array([others.get(kind, usual) for kind in KINDS])
 
 
-def travel_mm_s2(profile: Profile) -> float | None:
-    """mm/s2 of travels; None as for strokes."""
-    return (profile.process.travel_acceleration_mm_s2 or axes_mm_s2(profile)) if sets_acceleration(profile.process) else None
+def travel_mm_s2(profile: Profile) -> float:
+    """mm/s2 of travels; inf as for strokes."""
+    return (profile.process.travel_acceleration_mm_s2 or axes_mm_s2(profile)) if sets_acceleration(profile.process) else np.inf
 
 
 def sets_acceleration(process: Process) -> bool:
