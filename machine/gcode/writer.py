@@ -92,7 +92,8 @@ def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_m
             yield from _ended((*_begin_part(mark, len(parts), pen), *_contents(program, row)))
         else:
             yield from _ended((*_begin_layer(mark, profile, pen), *_progress(float(elapsed[row]), total, pen)))
-            yield from _before_layer(mark, top_mm[mark.part], pen)
+            heights = {"layer_z": float(mark.z_mm), "max_layer_z": float(top_mm[mark.part])}
+            yield from _ended(_block(BEFORE_LAYER, pen, layer_num=pen.layers - 1, **heights))
     yield from _moves(program, done, len(program), last_strokes, profile, pen)
     yield from _ended((*_end(pen), *_progress(total, total, pen), *_dialect_line(pen.dialect.last, pen)))
     yield from _ended(settings.foot(profile, filament_mm, total))
@@ -208,11 +209,6 @@ def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:
     """How hot the first layer among marks is printed; 0 where there is none."""
     coming = next((mark for mark in marks if isinstance(mark, BeginLayer)), None)
     return 0.0 if coming is None else _nozzle_c(coming, profile)
-
-
-def _before_layer(move: BeginLayer, top_mm: float, pen: Pen) -> Iterator[str]:
-    """The block before a layer; top_mm: height of the last layer of its part."""
-    return _ended(_block(BEFORE_LAYER, pen, layer_num=pen.layers - 1, layer_z=float(move.z_mm), max_layer_z=float(top_mm)))
 
 
 def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:

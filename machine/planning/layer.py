@@ -14,11 +14,12 @@ from machine.planning.limits import path_speeds, stroke_filament_mm_s
 from machine.planning.moves import POINTS, RETRACT, SPEED, Moves, add_point, add_row
 from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
 from mdp.kernels.arrays import floats, longs, table
-from mdp.kernels.kernel import kernel, no_nrt
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from profiles.profile import Profile
 from slicer.estimate.timing import Speeds
+from slicer.geometry.polyline import length_between
 from slicer.paths import Kind, Layer, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
 from slicer.strokes.travels import STANDING_MM
@@ -81,12 +82,6 @@ def _ways(points_mm: Floats, flat_mm: Floats, starts: Indices, area_mm2: Floats,
     return np.column_stack([points_mm, steps_mm * np.repeat(area_mm2, np.diff(starts)) / filament_mm2])
 
 
-@no_nrt
-def _step_mm(flat_mm: Floats, i: int) -> float:
-    """Length of the step to a point."""
-    return float(np.hypot(flat_mm[i, 0] - flat_mm[i - 1, 0], flat_mm[i, 1] - flat_mm[i - 1, 1]))
-
-
 @kernel
 def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> Moves:
     """The strokes, some of which push nothing over their last coast_mm; a step is cut where that begins. flat_mm: as in _ways."""
@@ -94,13 +89,11 @@ def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> 
     first = 0
     for k in range(len(coasts)):
         end = first + int(strokes.rows[k, POINTS])
-        total, run, pushes = 0.0, 0.0, True
-        for i in range(first + 1, end):
-            total += _step_mm(flat_mm, i)
+        total, run, pushes = length_between(flat_mm, first, end), 0.0, True
         until = total - coast_mm if coasts[k] and coast_mm < MOST_COASTED * total else np.inf
         for i in range(first, end):
             here, pushed = strokes.ways[i], strokes.ways[i, 3]
-            step = _step_mm(flat_mm, i) if i > first else 0.0
+            step = length_between(flat_mm, i - 1, i + 1) if i > first else 0.0
             run += step
             if i > first and pushes and run >= until:
                 before, share = strokes.ways[i - 1], 1.0 - (run - until) / step if step > 0.0 else 1.0

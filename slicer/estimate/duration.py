@@ -40,8 +40,8 @@ def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profi
     bounds = speeds_mm_s, stroke_accelerations(profile, first_layer)[strokes.kind]
     wipe_mm = material.wipe_mm if material.retract_mm > 0.0 else 0.0
     moves = _moves(places, tip, bounds, strokes.retract, speeds, (process.lift_mm, wipe_mm, material.retract_mm))
-    steps, speed, most_mm_s2, stands = (column[: moves.size[0]] for column in moves[:4])
-    moving_s = move_times(steps, speed, stands, machine, most_mm_s2).sum()
+    n = int(moves.size[0])
+    moving_s = move_times(moves.step[:n], moves.speed[:n], moves.stands[:n], machine, moves.most_mm_s2[:n]).sum()
     rise_s = line_s(process.layer_height_mm, speeds.lift_mm_s, machine.z.acceleration_mm_s2)
     return float(moving_s + rise_s + int(strokes.retract.sum()) * _standing_s(profile, speeds.filament_mm_s))
 
