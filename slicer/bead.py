@@ -21,11 +21,7 @@ ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: what two half circles leave o
 INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin bead so wide stays under the flat of the tip
 EVEN_MM = 0.03  # widths that differ by less are one
 FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
-
-
 NARROWEST = 0.6  # diameters of the nozzle
-
-
 NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 

@@ -20,6 +20,7 @@ from slicer.paths import SlicedPart
 from slicer.raft import lift_mm
 
 Place = tuple[float, float]
+STILL = np.eye(3)  # turns nothing
 
 
 def check_parts(parts: Sequence[Part], profile: Profile) -> None:
@@ -86,7 +87,7 @@ def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.
     shift = np.array([*place_mm, up_mm])
     rows = tuple(replace(row, planes=tuple(_plane_moved(plane, shift) for plane in row.planes)) for row in decomposition.front)
     parts = tuple(_part_moved(part, shift) for part in decomposition.parts)
-    return replace(decomposition, mesh=mesh_moved(decomposition.mesh, shift), parts=parts, front=rows)
+    return replace(decomposition, mesh=decomposition.mesh.transform(STILL, shift), parts=parts, front=rows)
 
 
 def lifted(
@@ -101,21 +102,15 @@ def lifted(
     return standing_at(decomposition, MIDDLE, float(up[2])), moved
 
 
-def mesh_moved(mesh: Mesh, shift_mm: Floats) -> Mesh:
-    """A mesh moved by x, y, z."""
-    return Mesh(mesh.vertices + shift_mm, mesh.faces, mesh.colours)
-
-
 def mesh_at_place(mesh: Mesh, profile: Profile) -> Mesh:
     """A mesh at its place on the plate, and on its raft, as it is printed."""
-    return mesh_moved(mesh, _shift(profile))
+    return mesh.transform(STILL, _shift(profile))
 
 
 def _part_moved(part: Part, shift: Floats) -> Part:
     lifted_mm = part.lifted_mm + float(shift[2]) if part.on_platform else 0.0
-    moved = replace(part, mesh=mesh_moved(part.mesh, shift), base=_plane_moved(part.base, shift), lifted_mm=lifted_mm)
-    still = np.eye(3)
-    return moved.with_marks(lambda mark: mark.transform(still, shift), lambda modifier: modifier.transform(still, shift))
+    moved = replace(part, mesh=part.mesh.transform(STILL, shift), base=_plane_moved(part.base, shift), lifted_mm=lifted_mm)
+    return moved.with_marks(lambda mark: mark.transform(STILL, shift), lambda modifier: modifier.transform(STILL, shift))
 
 
 def _plane_moved(plane: Plane, shift: Floats) -> Plane:

@@ -11,10 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mdp.kernels.arrays import longs
-from mdp.kernels.kernel import kernel
-from mdp.kernels.sorting import counting_sort
-from mdp.mesh import Floats, Indices, Ints
+from mdp.mesh import Floats, Ints
 from profiles.process import Process
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, WALLS, Bead
 from slicer.geometry.polygons import Polygons, area_mm2, contours
@@ -151,42 +148,14 @@ def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]
     inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
     members: list[list[Bead]] = [[] for _ in leaders]
     starts = np.array([bead.points[0] for bead in inner]).reshape(-1, 2)
-    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, starts)]
-    for bead, k in zip(inner, near, strict=True):
+    near = np.zeros(len(inner), np.int64)
+    if len(leaders) > 1 and inner:
+        import shapely  # as in _pieces_around
+
+        near = which[shapely.STRtree(shapely.points(points)).nearest(shapely.points(starts))]
+    for bead, k in zip(inner, near.tolist(), strict=True):
         members[k].append(bead)
     return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]
-
-
-@kernel
-def _nearest(points: Floats, places: Floats) -> Indices:
-    """The point nearest to each place; points sorted into square cells, searched ring by ring."""
-    low_x, high_x, low_y, high_y = points[0, 0], points[0, 0], points[0, 1], points[0, 1]
-    for k in range(len(points)):
-        low_x, high_x = min(low_x, points[k, 0]), max(high_x, points[k, 0])
-        low_y, high_y = min(low_y, points[k, 1]), max(high_y, points[k, 1])
-    cells = max(int(np.sqrt(len(points) / 2.0)), 1)
-    size = (max(high_x - low_x, high_y - low_y) + 1e-6) / cells
-    cell = longs(len(points), 0)
-    for k in range(len(points)):
-        cell[k] = int((points[k, 0] - low_x) / size) * cells + int((points[k, 1] - low_y) / size)
-    first, order = counting_sort(cell, cells * cells)
-    out: Indices = longs(len(places), 0)
-    for p in range(len(places)):
-        px, py = places[p, 0], places[p, 1]
-        column, row = min(max(int((px - low_x) / size), 0), cells - 1), min(max(int((py - low_y) / size), 0), cells - 1)
-        best, least, ring = 0, np.inf, 0
-        while ring <= cells and (ring - 1) * size < least:
-            for c in range(max(column - ring, 0), min(column + ring, cells - 1) + 1):
-                for r in range(max(row - ring, 0), min(row + ring, cells - 1) + 1):
-                    if max(abs(c - column), abs(r - row)) != ring:
-                        continue
-                    for k in range(first[c * cells + r], first[c * cells + r + 1]):
-                        distance = np.hypot(points[order[k], 0] - px, points[order[k], 1] - py)
-                        if distance < least:
-                            best, least = order[k], distance
-            ring += 1
-        out[p] = best
-    return out
 
 
 def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:

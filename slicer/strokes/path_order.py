@@ -40,11 +40,8 @@ def order_lines(
 
     fixed: (n,) must not be reversed; tip: (2,) where all begins; goal: (1, 2) where it ends up, or (0, 2).
     """
-    begun, held, cut = list(lines), fixed.copy(), [0] * len(lines)
-    if any(freedom):
-        for k, free in enumerate(freedom):
-            if free == CLOSED:
-                begun[k] = _begin_at(lines[k], _corner(lines[k], tip, tip, True))
+    held, cut, pairs = fixed.copy(), [0] * len(lines), zip(lines, freedom, strict=True)
+    begun = [_begin_at(line, _corner(line, tip, tip, True)) if free == CLOSED else line for line, free in pairs]
     for _ in range(TRIES if any(freedom) else 1):
         entries, exits = np.array([line[0] for line in begun]), np.array([line[-1] for line in begun])
         order, flips = order_paths(entries, exits, held, tip, goal)

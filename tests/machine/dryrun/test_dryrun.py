@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from machine.dryrun import DryRun, dry_run, summary
 from machine.dryrun.strokes import turned_box
-from machine.planning.timing import move_times
 from machine.reader import parsed
 from mdp.pose import Pose, rotation
 from profiles.errors import GcodeError
 from profiles.profile import load
+from slicer.estimate.timing import move_times
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import FAULTS
 from tests.machine.hand import printed, text, whole

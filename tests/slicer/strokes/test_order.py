@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from slicer.bead import OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import lengths_mm
-from slicer.paths import Kind
+from slicer.paths import KINDS, Kind
 from slicer.slice import slice_part
 from slicer.strokes.order import order_beads
 from slicer.strokes.speed import speeds_mm_s
@@ -116,7 +116,7 @@ def test_slowing_stops_at_the_least_speed() -> None:
 def test_beads_at_the_floor_leave_the_waiting_to_the_others() -> None:
     beads = [line(0, 0, 12, 0, kind=Kind.GAP), line(12, 0, 112, 0)]
     strokes = strokes_of(beads, np.zeros(2, np.bool_), {}, 0.0)
-    speeds = dict.fromkeys(Kind, 100.0) | {Kind.GAP: 12.0}
+    speeds = np.array([12.0 if kind is Kind.GAP else 100.0 for kind in KINDS])
     limits = ("process.least_layer_time_s=6", "process.least_speed_mm_s=10", "material.volumetric_limit_mm3_s=50")
     slowed = speeds_mm_s(strokes, profile(*limits), 0.2, speeds, 1.0)
     assert slowed[0] == pytest.approx(10.0)
