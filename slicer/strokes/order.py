@@ -135,7 +135,10 @@ def _middle(beads: Sequence[Bead]) -> Floats:
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
-    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together."""
+    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together.
+
+    Inner lines behind no outer wall's seam come with what fills the walls: most are as fast, and lie beside it.
+    """
     leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
     walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
     phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
@@ -148,8 +151,7 @@ def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
         else:
             phases[phase].append([bead])
     for chain in _families(walls, leaders) if walls else ():
-        # Lines inside that stand behind no outer wall are as fast as the skin, and lie where it lies.
-        phases[FILL if all(bead.line and bead.kind is Kind.INNER_WALL for bead in chain) else 0].append(chain)
+        phases[FILL if chain[0].line and chain[0].kind is Kind.INNER_WALL and len(chain) == 1 else 0].append(chain)
     return [phases[rank] for rank in sorted(phases)]
 
 
@@ -202,7 +204,7 @@ def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
     """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
 
     The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
-    print them first would mean to go there and back.
+    print them first would mean to go there and back. Lines among them, which begin beside nothing, stay by themselves.
     """
     chain, others = [leader], list[Bead]()
     for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
@@ -211,8 +213,10 @@ def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
         chain.append(equal[0])
         others += equal[1:]
     yield sorted(chain, key=lambda bead: bead.rank)
-    if others:
-        yield from _chains(others[0], others[1:])
+    yield from ([bead] for bead in others if bead.line)
+    loops = [bead for bead in others if not bead.line]
+    if loops:
+        yield from _chains(loops[0], loops[1:])
 
 
 def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], process: Process, tip: Floats, goal: Floats) -> list[Bead]:
