@@ -52,7 +52,7 @@ def test_an_island_in_a_hole_is_an_island_of_its_own() -> None:
 def test_small_walls_of_an_island_are_printed_together_and_its_long_ones_too() -> None:
     """Squares of 2 and of 20 mm in turn in a row: only the small ones, 8 mm round, are printed at small_wall_speed_mm_s."""
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], dtype=float)
-    beads = [Bead(Kind.OUTER_WALL, (2.0 if k % 2 else 20.0) * square + (3.0 * k, 0.0), 0.45, 0) for k in range(8)]
+    beads = [Bead(Kind.OUTER_WALL, (2.0 if k % 2 else 20.0) * square + (1.0 * k, 0.0), 0.45, 0) for k in range(8)]
     placed = order_beads(beads, Polygons.square((99, 99), True), STANDARD, np.zeros(2))
     assert STANDARD.small_wall_speed_mm_s < STANDARD.outer_wall_speed_mm_s
     assert np.count_nonzero(np.diff(placed.small)) == 1

@@ -12,7 +12,7 @@ from mdp.mesh import Floats
 from slicer.strokes.path_order import order_paths
 
 NO_GOAL, ORIGIN = np.zeros((0, 3)), np.zeros(3)
-CHANGE_MM = 15.0  # of travel that a change of speed is worth
+CHANGE_MM = 3.0  # of travel that a change of speed is worth
 
 
 def paths(seed: int, count: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -90,7 +90,7 @@ def in_turn(step_mm: float) -> tuple[list[int], list[bool]]:
 
 
 def test_close_paths_of_one_speed_follow_each_other() -> None:
-    _, slow = in_turn(2.0)  # to go back along the row once is 14 mm, its seven changes of speed are worth 105
+    _, slow = in_turn(1.0)  # to go back along the row once is 7 mm, its seven changes of speed are worth 21
     assert slow == [True] * 4 + [False] * 4
 
 
