@@ -78,6 +78,11 @@ class Bead:
         """Length of the bead."""
         return length_mm(self.points)
 
+    def is_small(self, small_wall_mm: float) -> bool:
+        """Whether the bead comes back to where it begins, but for the gap at its seam, and is no longer than small_wall_mm."""
+        ends = self.points[-1] - self.points[0]
+        return bool(np.hypot(ends[0], ends[1]) <= self.width_mm) and self.length_mm <= small_wall_mm
+
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:
     """Distance of neighbouring beads whose rounded sides leave no plastic over: cross-section / height.

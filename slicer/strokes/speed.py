@@ -13,12 +13,28 @@ from mdp.mesh import Floats
 from profiles.material import Material
 from profiles.process import Process
 from profiles.profile import Profile
+from slicer.bead import Bead
 from slicer.geometry.polyline import length_mm
 from slicer.paths import KINDS, Kind, bead_area_mm2
 from slicer.strokes.strokes import RINGS, Strokes
 
 KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
 BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
+SPEED_KEYS = {
+    Kind.OUTER_WALL: "outer_wall_speed_mm_s",
+    Kind.INNER_WALL: "inner_wall_speed_mm_s",
+    Kind.OVERHANG: "overhang_75_speed_mm_s",
+    Kind.GAP: "gap_speed_mm_s",
+    Kind.INFILL: "infill_speed_mm_s",
+    Kind.SKIN: "skin_speed_mm_s",
+    Kind.TOP_SKIN: "top_skin_speed_mm_s",
+    Kind.BRIDGE: "bridge_speed_mm_s",
+    Kind.IRONING: "ironing_speed_mm_s",
+    Kind.SKIRT: "first_layer_speed_mm_s",
+    Kind.PURGE: "first_layer_speed_mm_s",
+    Kind.SUPPORT: "support_speed_mm_s",
+    Kind.SUPPORT_INTERFACE: "support_interface_speed_mm_s",
+}
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
@@ -88,6 +104,14 @@ def _of_strokes(strokes: Strokes, process: Process) -> Floats:
     small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
     lowered = np.minimum(usual, np.where(strokes.overhang > 0, hanging, small))
     return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
+
+
+def bead_speed_mm_s(bead: Bead, process: Process) -> float:
+    """Speed of a bead that neither overhangs nor is cooled by waiting: as in _of_strokes, before there are strokes."""
+    if bead.over_infill:
+        return process.infill_bridge_speed_mm_s
+    usual: float = getattr(process, SPEED_KEYS[bead.kind])
+    return min(usual, process.small_wall_speed_mm_s) if bead.kind in RINGS and bead.is_small(process.small_wall_mm) else usual
 
 
 def kinds_apart(processes: Sequence[Process]) -> list[Kind]:
@@ -161,22 +185,7 @@ def own_fans(strokes: Strokes, material: Material, factor: float, layer_fan: flo
 
 def stroke_speeds(process: Process) -> Floats:
     """(number of kinds,) mm/s of each kind of bead."""
-    by_kind = {
-        Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
-        Kind.INNER_WALL: process.inner_wall_speed_mm_s,
-        Kind.OVERHANG: process.overhang_75_speed_mm_s,
-        Kind.GAP: process.gap_speed_mm_s,
-        Kind.INFILL: process.infill_speed_mm_s,
-        Kind.SKIN: process.skin_speed_mm_s,
-        Kind.TOP_SKIN: process.top_skin_speed_mm_s,
-        Kind.BRIDGE: process.bridge_speed_mm_s,
-        Kind.IRONING: process.ironing_speed_mm_s,
-        Kind.SKIRT: process.first_layer_speed_mm_s,
-        Kind.PURGE: process.first_layer_speed_mm_s,
-        Kind.SUPPORT: process.support_speed_mm_s,
-        Kind.SUPPORT_INTERFACE: process.support_interface_speed_mm_s,
-    }
-    return np.array([by_kind[kind] for kind in KINDS])
+    return np.array([getattr(process, SPEED_KEYS[kind]) for kind in KINDS])
 
 
 def first_layer_speeds(process: Process) -> Floats:
