@@ -4,9 +4,9 @@ import io
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from html import escape  # xml.sax would load ssl and email with it
 from pathlib import Path
 from typing import Any, BinaryIO
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -68,8 +68,8 @@ def threemf(decomposition: Decomposition) -> bytes:
 
 def model_xml(bodies: Sequence[tuple[Mesh, str]], metadata: Mapping[str, str] | None = None, coloured: bool = False) -> str:
     """The model part of a 3MF package with named meshes in place. coloured: each has a colour of its own."""
-    names = [escape(name, {'"': "&quot;"}) for _, name in bodies]
-    said = "".join(f'<metadata name="{key}">{escape(text)}</metadata>' for key, text in (metadata or {}).items())
+    names = [escape(name, quote=False).replace('"', "&quot;") for _, name in bodies]
+    said = "".join(f'<metadata name="{key}">{escape(text, quote=False)}</metadata>' for key, text in (metadata or {}).items())
     bases = "".join(f'<base name="{name}" displaycolor="{COLOURS[k % len(COLOURS)]}FF"/>' for k, name in enumerate(names))
     materials = f'<basematerials id="1">{bases}</basematerials>' if coloured else ""
     objects = "".join(_object(mesh, names[k], k, coloured) for k, (mesh, _) in enumerate(bodies))
@@ -82,7 +82,7 @@ def write_package(file: BinaryIO, model: str, others: Sequence[tuple[str, bytes]
     suffixes = sorted({suffix for name, _ in others if (suffix := Path(name).suffix.removeprefix(".").lower())})
     kinds = {"png": "image/png"}
     types = "".join(
-        f'<Default Extension="{escape(suffix)}" ContentType="{kinds.get(suffix, "application/octet-stream")}"/>'
+        f'<Default Extension="{escape(suffix, quote=False)}" ContentType="{kinds.get(suffix, "application/octet-stream")}"/>'
         for suffix in suffixes
         if suffix not in ("rels", "model")
     )

@@ -20,11 +20,8 @@ FILL, LAST = 1, 99  # beads of these ranks fill what the walls enclose, in any o
 ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: what two half circles leave of their square, as in PrusaSlicer's Flow
 INTERFACE_WIDTH = 4.0 / 3.0  # of the line width, one and a half nozzles: a thin bead so wide stays under the flat of the tip
 EVEN_MM = 0.03  # widths that differ by less are one
-
-
+FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 NARROWEST = 0.6  # diameters of the nozzle
-
-
 NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 
@@ -81,6 +78,11 @@ class Bead:
         """Length of the bead."""
         return length_mm(self.points)
 
+    def is_small(self, small_wall_mm: float) -> bool:
+        """Whether the bead comes back to where it begins, but for the gap at its seam, and is no longer than small_wall_mm."""
+        ends = self.points[-1] - self.points[0]
+        return bool(np.hypot(ends[0], ends[1]) <= self.width_mm) and self.length_mm <= small_wall_mm
+
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:
     """Distance of neighbouring beads whose rounded sides leave no plastic over: cross-section / height.
@@ -89,6 +91,19 @@ def spacing_mm(width_mm: float, height_mm: float) -> float:
     0.407
     """
     return width_mm - height_mm * ROUND_SIDES
+
+
+def infill_cell_mm(process: Process) -> float:
+    """About how far apart lines of the sparse infill lie, mm: what solid lines laid over it have to span; 0 without infill."""
+    width = process.infill_line_width_mm or process.line_width_mm
+    spacing, density = spacing_mm(width, process.layer_height_mm), process.infill_density
+    return FAMILIES.get(process.infill_pattern, 1) * spacing / density if density > 0.0 else 0.0
+
+
+def support_cell_mm(process: Process) -> float:
+    """The distance between sparse lines of support, mm, which dense lines on top of them have to span."""
+    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
+    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density
 
 
 def least_width_mm(nozzle_mm: float, height_mm: float) -> float:

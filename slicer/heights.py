@@ -70,11 +70,12 @@ def layer_heights(
     from the top or from the one below. Raises SliceError as equal_heights().
     """
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
-    from_mm, first_mm, heights = 0.0, _first_mm(process, on_platform), NO_LAYERS
+    first_mm = process.first_layer_height_mm if on_platform else interface_height_mm(process)
+    from_mm, heights = 0.0, NO_LAYERS
     roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top_mm and roof_mm >= process.least_layer_height_mm:
-        heights = equal_heights(roof_mm, process, True, nozzle_mm)
-        from_mm, first_mm = pedestal_mm, process.first_layer_height_mm
+        heights = equal_heights(roof_mm, process, nozzle_mm, first_mm)
+        from_mm = pedestal_mm
     for plane_mm in limb_planes_mm:
         if min(plane_mm - from_mm, top_mm - plane_mm) >= process.least_layer_height_mm:
             heights += _heights_from(mesh, plane_mm, process, nozzle_mm, from_mm, first_mm)
@@ -111,24 +112,31 @@ def shell_layers(process: Process) -> tuple[int, int]:
     return top, bottom
 
 
-def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm: float) -> Heights:
-    """Equal layers of a part that reaches from its base plane up to top_mm.
+def equal_heights(top_mm: float, process: Process, nozzle_mm: float, first_mm: float, from_mm: float = 0.0) -> Heights:
+    """Equal layers above the first one, which has a height of its own, up to top_mm above the base plane.
 
-    A part on plastic begins with a layer that is lower by the interface overlap: its bead is as high as the room between its tip
-    and the base plane. Each section is taken in the middle of its layer. The last layer meets the top: it is lower, or, where
-    that would make it lower than least_layer_height_mm or a quarter layer, the last few share what remains. A part lower than
-    the least layer is one of that height.
-    Raises SliceError for a part that is too high to be meant.
+    Each section is taken in the middle of its layer. The last layer meets the top: it is lower, or, where that would make it
+    lower than least_layer_height_mm or a quarter layer, the last few share what remains. A part lower than the least layer is
+    one of that height. Raises SliceError for a part that is too high to be meant.
 
-    >>> equal_heights(0.9, Process(name="example", first_layer_height_mm=0.3), True, 0.4).tip_mm.round(6).tolist()
+    >>> equal_heights(0.9, Process(name="example"), 0.4, 0.3).tip_mm.round(6).tolist()
     [0.3, 0.5, 0.7, 0.9]
     """
     _check(top_mm, process)
-    return _equal_from(top_mm, process, nozzle_mm, 0.0, _first_mm(process, on_platform))
-
-
-def _first_mm(process: Process, on_platform: bool) -> float:
-    return process.first_layer_height_mm if on_platform else interface_height_mm(process)
+    layer, total, most = process.layer_height_mm, top_mm - from_mm, min(process.highest_layer_mm, nozzle_mm)
+    count = max(floor((total - first_mm) / layer + 1e-9), 0)
+    rest = total - first_mm - count * layer
+    least = min(max(process.least_layer_height_mm, LEAST_SHARE * layer), layer)
+    thick = [layer] * count
+    if rest <= 0.0 and not count:
+        first_mm = max(total, min(process.least_layer_height_mm, first_mm))
+    elif rest >= least - 1e-9:
+        thick.append(rest)
+    elif count:
+        thick = _spread(thick, rest, least, most)
+    else:
+        first_mm, *thick = _spread([first_mm], rest, least, most)
+    return _stack_layers([first_mm, *thick], from_mm, top_mm)
 
 
 def interface_height_mm(process: Process) -> float:
@@ -148,29 +156,11 @@ def _heights_from(mesh: Mesh, top: float, process: Process, nozzle_mm: float, fr
     adaptive = process.adaptive_cusp_mm > 0.0 and top - from_mm > first_mm + least
     thick = adaptive_heights(mesh, process, from_mm + first_mm, top) if adaptive else []
     if not thick:
-        return _equal_from(top, process, nozzle_mm, from_mm, first_mm)
+        return equal_heights(top, process, nozzle_mm, first_mm, from_mm)
     rest = top - from_mm - first_mm - sum(thick)
     if rest > 1e-6:
         thick = _spread(thick, rest, least, process.most_layer_height_mm)
     return _stack_layers([first_mm, *thick], from_mm, top)
-
-
-def _equal_from(top_mm: float, process: Process, nozzle_mm: float, from_mm: float, first_mm: float) -> Heights:
-    """Equal layers above the first one. A remainder up to about a layer becomes one layer."""
-    layer, total, most = process.layer_height_mm, top_mm - from_mm, min(process.highest_layer_mm, nozzle_mm)
-    count = max(floor((total - first_mm) / layer + 1e-9), 0)
-    rest = total - first_mm - count * layer
-    least = min(max(process.least_layer_height_mm, LEAST_SHARE * layer), layer)
-    thick = [layer] * count
-    if rest <= 0.0 and not count:
-        first_mm = max(total, min(process.least_layer_height_mm, first_mm))
-    elif rest >= least - 1e-9:
-        thick.append(rest)
-    elif count:
-        thick = _spread(thick, rest, least, most)
-    else:
-        first_mm, *thick = _spread([first_mm], rest, least, most)
-    return _stack_layers([first_mm, *thick], from_mm, top_mm)
 
 
 def _stack_layers(thick_mm: list[float], from_mm: float, top_mm: float) -> Heights:
@@ -180,9 +170,9 @@ def _stack_layers(thick_mm: list[float], from_mm: float, top_mm: float) -> Heigh
 
 
 def _check(top_mm: float, process: Process) -> None:
-    layer = process.least_layer_height_mm if process.adaptive_cusp_mm > 0.0 else process.layer_height_mm
+    name = "least_layer_height_mm" if process.adaptive_cusp_mm > 0.0 else "layer_height_mm"
+    layer = getattr(process, name)
     if top_mm > MOST_LAYERS * layer:
-        name = "least_layer_height_mm" if process.adaptive_cusp_mm > 0.0 else "layer_height_mm"
         raise SliceError(
             f"a part {top_mm:.6g} mm high needs {top_mm / layer:.0f} layers of process.{name} "
             f"{layer:g} mm: at most {MOST_LAYERS} are allowed"

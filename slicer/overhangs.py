@@ -17,15 +17,7 @@ from mdp.support_need.spans import ROUNDING_MM, TOLERATED, line_across
 from profiles.process import Process
 from slicer.geometry.clip import rotation_2d
 from slicer.geometry.edge_index import EdgeIndex, index_edges, within
-from slicer.geometry.polygons import (
-    Polygons,
-    edges,
-    islands,
-    offset,
-    opening,
-    strips,
-    union,
-)
+from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, strips, union
 from slicer.heights import SAME_MM
 from slicer.sectioning import RIM_MM, Sections, faces_by_layer
 

@@ -35,8 +35,6 @@ class Kind(StrEnum):
 
 
 SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
-
-
 KINDS = tuple(Kind)
 NUMBER = {kind: number for number, kind in enumerate(KINDS)}
 Width = TypeVar("Width", float, Floats)

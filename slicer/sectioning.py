@@ -22,11 +22,7 @@ from profiles.machine import Table
 from profiles.part_settings import SPEEDS_OF_A_PLACE
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import (
-    first_layer_process,
-    least_width_mm,
-    with_line_width,
-)
+from slicer.bead import first_layer_process, least_width_mm, with_line_width
 from slicer.geometry.polygons import (
     CLOSING_MM,
     TOUCHING_MM,
@@ -64,8 +60,6 @@ from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
 BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base plane
-
-
 HAIR_MM = 0.04  # nobody can tell whether a piece only so much thicker than the thinnest gets a line all along
 RIM_MM = 0.04  # the shadows of faces in neighbouring layers overlap by this so that they unite
 
@@ -155,11 +149,7 @@ def section_parts(parts: Sequence[Part], profile: Profile) -> list[Sections]:
 
 
 def section_part(
-    part: Part,
-    profile: Profile,
-    earlier: Sequence[Part] = (),
-    later: Sequence[Part] = (),
-    pins: Pins | None = None,
+    part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = (), pins: Pins | None = None
 ) -> Sections:
     """The sections of a part that is printed after `earlier` and before `later` parts.
 
@@ -295,12 +285,7 @@ def reach_mm(process: Process) -> float:
 
 
 def compensate(
-    outlines: Sequence[Polygons],
-    part: Part,
-    later: Sequence[Part],
-    beside: Sequence[Polygons],
-    cuts_mm: Floats,
-    process: Process,
+    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], beside: Sequence[Polygons], cuts_mm: Floats, process: Process
 ) -> list[Polygons]:
     """The outlines of a part's layers with outsides and holes compensated, but for its cut faces.
 

@@ -31,7 +31,7 @@ from slicer.geometry.polyline import length_mm
 from slicer.heights import shell_layers
 from slicer.interface.interface import pin_width_mm, skin_beside
 from slicer.overhangs import Overhang, find_overhangs
-from slicer.paths import ON_PLATE_MM, SKINS, Kind, Layer, SlicedPart, bead_area_mm2
+from slicer.paths import KINDS, ON_PLATE_MM, SKINS, Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.raft import raft_layers
 from slicer.sectioning import Sections, section_part, section_parts
 from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, lay_beads
@@ -264,14 +264,14 @@ def order_layer(
     return *timed(strokes, profile, height_mm, fixed, flow, of_places), flow
 
 
-def _first_layer(sections: Sections) -> tuple[float, dict[Kind, float]]:
+def _first_layer(sections: Sections) -> tuple[float, Floats]:
     """The flow of a part's first layer and its speeds by kind, on the plate, on a raft or on plastic."""
     process = sections.process
     if sections.on_raft:
-        return 1.0, dict.fromkeys(Kind, process.first_layer_speed_over_raft_mm_s)
+        return 1.0, np.full(len(KINDS), process.first_layer_speed_over_raft_mm_s)
     if sections.on_platform:
         return process.first_layer_flow, first_layer_speeds(process)
-    return process.interface_flow, dict.fromkeys(Kind, process.interface_speed_mm_s)
+    return process.interface_flow, np.full(len(KINDS), process.interface_speed_mm_s)
 
 
 def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:

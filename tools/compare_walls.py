@@ -25,7 +25,6 @@ from bench_travel import PRUSA, SAME, own_gcode
 from check_layers import section_of
 
 from machine.kinematics.table import part_shift
-from machine.planning.timing import move_times
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats, Mesh
@@ -35,6 +34,7 @@ from mdp.read import read_mesh
 from mdp.save import stl
 from mdp.topology.cross_section import cross_sections
 from profiles.profile import Profile, load
+from slicer.estimate.timing import move_times
 
 BARE = (
     *SAME,

@@ -41,8 +41,6 @@ from mdp.decomposition import FrontRow
 from mdp.mesh import Mesh
 from mdp.model_file import DEMO
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile
-from mdp.plans.reading import read_plan
-from mdp.plans.writing import plan_text
 from mdp.save import MODEL_PART, model_xml, write_package
 from mdp.zone import MeshVolume
 from profiles.errors import PlanError, first_line, reason
@@ -156,6 +154,8 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
     model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
+        from mdp.plans.writing import plan_text  # tomlkit, for projects alone
+
         write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
     given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
     record = checked_record(
@@ -315,6 +315,8 @@ def _check_inside(folder: Path, project: Project) -> None:
         if Path(str(mesh)).name != mesh:
             raise PlanError(f"{PLAN}: mesh is {mesh!r}: a file of the project is expected")
     try:
+        from mdp.plans.reading import read_plan  # 30 ms, for projects alone
+
         plan = read_plan(project.plan)
     except PlanError as error:
         raise PlanError(str(error).replace(f"{folder}{os.sep}", "")) from None

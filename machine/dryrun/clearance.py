@@ -63,15 +63,15 @@ def _close(
 ) -> Iterator[tuple[Body, Solid, Indices]]:
     """The bodies and the solids that two directions do not part in one pose, and during which moves of those that are tried."""
     tried = np.array([rotation(machine, pose) @ UP, UP])
-    meetings = [(body, solid, solid[1](tried)) for solid in solids(machine, pose) for body in bodies(machine)]
+    meetings = [(body, solid, body.least(tried) - solid[1](tried)) for solid in solids(machine, pose) for body in bodies(machine)]
     close: list[list[NDArray[np.int64]]] = [[] for _ in meetings]
     for some in pieces(len(is_tried)):
         rows = run.start + some.start + np.flatnonzero(is_tried[some])
         least = swept(program.start[rows, :3], program.end[rows, :3], tried)
         nearest = least.min(axis=1, initial=np.inf)[:, None]
-        for (body, _, reach), own in zip(meetings, close, strict=True):
-            if gaps_of(body, nearest, tried, reach)[0] < body.need_mm:  # else one direction alone parts all of them
-                own.append(rows[gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM])
+        for (body, _, margin), own in zip(meetings, close, strict=True):
+            if gaps_of(nearest, margin)[0] < body.need_mm:  # else one direction alone parts all of them
+                own.append(rows[gaps_of(least, margin) < body.need_mm - ROUNDING_MM])
     for (body, solid, _), own in zip(meetings, close, strict=True):
         if any(map(len, own)):
             yield body, solid, np.concatenate(own)
@@ -210,13 +210,12 @@ def _room(machine: Machine, printed: Printed, pose: Pose, tip: Floats, most: flo
     normal = rotation(machine, pose) @ UP
     met: dict[tuple[str, str], float] = {}
     left, head, around = most, bodies(machine), directions(normal)
+    tried = np.vstack([UP, around])
+    lowest = [tried @ tip + body.least(tried) for body in head]
     for name, reach_of in solids(machine, pose, printed):
-        reaches = [(tried, reach_of(tried)) for tried in (UP[None], around)]
-        for body in head:
-            need, gap = body.need_mm - ROUNDING_MM, -np.inf
-            for tried, reach in reaches:
-                if gap - need < most:
-                    gap = max(gap, float(sweep_gaps(body, tip[None], tip[None], tried, reach)[0]))
+        reach = reach_of(tried)
+        for body, least in zip(head, lowest, strict=True):
+            need, gap = body.need_mm - ROUNDING_MM, float((least - reach).max())
             if gap < need:
                 gap = max(gap, refined_gap(body, tip, tip, normal, reach_of))
             if gap < need:

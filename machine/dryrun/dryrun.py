@@ -17,7 +17,7 @@ from machine.dryrun.strokes import Beads, beads_of
 from machine.gcode.lines import Lines
 from machine.planning.limits import axis_limits
 from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind, ParsedProgram, pieces
+from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.kernels.threads import ahead
 from mdp.mesh import Floats
 from profiles.errors import GcodeError
@@ -157,9 +157,12 @@ def _box(deposited: Beads, counted: NDArray[np.bool_]) -> list[list[float]]:
     if not counted.any():
         return []
     least, most = np.full(3, np.inf), np.full(3, -np.inf)
-    for some in pieces(len(counted)):
-        points = deposited.segments(some)[counted[some]].reshape(-1, 3)
-        least, most = np.minimum(least, points.min(axis=0, initial=np.inf)), np.maximum(most, points.max(axis=0, initial=-np.inf))
+    for some, box in deposited.boxes():
+        if counted[some].any() and not counted[some].all():
+            points = deposited.segments(some)[counted[some]].reshape(-1, 3)
+            box = np.stack([points.min(axis=0), points.max(axis=0)])
+        if counted[some].any():
+            least, most = np.minimum(least, box[0]), np.maximum(most, box[1])
     return [least.tolist(), most.tolist()]
 
 
@@ -172,7 +175,7 @@ def summary(run: DryRun) -> dict[str, Any]:
         "time_s": run.time_s,
         "filament_mm": float(np.max(program.filament_mm, initial=0.0)),
         "extruded_mm3": float(run.segment_mm3.sum()),
-        "travel_mm": float(program.way_mm[travels].sum()),
+        "travel_mm": float(program.ways_mm()[travels].sum()),
         "layers": program.layers,
         "parts": len(program.parts),
         "reorientations": int((program.kind == MoveKind.ROTATE).sum()),

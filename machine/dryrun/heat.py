@@ -1,7 +1,7 @@
 """Heat: findings about temperatures, fans and flow, and about numbers nobody has measured."""
 
 from collections.abc import Iterable, Iterator
-from math import pi
+from math import inf, pi
 
 import numpy as np
 
@@ -86,16 +86,22 @@ def _left_on(program: ParsedProgram) -> Iterator[Finding]:
 def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     """In every part the first bead at another temperature than the material's, or far from the rest of the file's."""
     material, machine = profile.material, profile.machine
-    wanted = temperatures(program, "M104", "M109")
-    beads = (program.kind == MoveKind.EXTRUDE) & (wanted >= MELTING_C)
-    if not beads.any():
-        return []
-    usual = float(np.median(wanted[beads]))
-    least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
+    hot_c = [event.value for event in program.events if event.code in ("M104", "M109") and event.value >= MELTING_C]
     if own:
         own_c = (material.first_layer_nozzle_c, material.nozzle_c)
         hotter = max(profile.of_part(part).process.interface_temperature_add_c for part in (0, *program.parts))
         least, most = min(own_c) - 0.5, min(max(own_c) + hotter, machine.nozzle_limit_c) + 0.5
+    else:  # whichever of them is usual
+        least, most = max(hot_c, default=0.0) - FAR_C, min(min(hot_c, default=inf) + FAR_C, machine.nozzle_limit_c)
+    if all(least <= target_c <= most for target_c in hot_c):
+        return []
+    wanted = temperatures(program, "M104", "M109")
+    beads = (program.kind == MoveKind.EXTRUDE) & (wanted >= MELTING_C)
+    if not beads.any():
+        return []
+    if not own:
+        usual = float(np.median(wanted[beads]))
+        least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
     message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
     cool, hot = (np.flatnonzero(beads & wrong) for wrong in (wanted < least, wanted > most))
     return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted[rows], message, code="temperature")]
@@ -103,9 +109,14 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
 
 def _bed_off(program: ParsedProgram) -> list[Finding]:
     """The bed switched off while beads are still to come: what is printed lets go of the plate."""
+    beads = np.flatnonzero(
+        (program.kind == MoveKind.EXTRUDE) & (program.remarks.part + program.remarks.layer > 0)[program.remark]
+    )
+    switched_off = (event.code in ("M140", "M190") and event.value <= 0.0 and event.row <= beads[-1] for event in program.events)
+    if not len(beads) or not any(switched_off):
+        return []
     bed = temperatures(program, "M140", "M190")
-    beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
-    if not len(beads) or bed[beads[0]] <= 0.0:
+    if bed[beads[0]] <= 0.0:
         return []
     off = beads[bed[beads] <= 0.0]
     message = f"the bed is switched off while {len(off)} moves of the print are still to come"
@@ -126,7 +137,7 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Findin
     first = np.full(len(seconds), len(beads))
     for some in pieces(len(beads)):
         mine = some.start + np.flatnonzero(beads[some])
-        layer, length = program.layer_keys(mine), np.linalg.norm(program.end[mine, :3] - program.start[mine, :3], axis=1)
+        layer, length = program.layer_keys(mine), program.ways_mm(mine)
         np.add.at(seconds, layer, length / np.maximum(program.feed[mine], 1e-9) * 60.0)
         np.add.at(blown, layer, length * blows[mine])
         np.minimum.at(first, layer, mine)
@@ -166,10 +177,9 @@ def _without_fan(part: int, profile: Profile) -> int:
 def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
     """Plastic per second at the asked speed, against what the hot end melts."""
     material = profile.material
-    area, flow = pi * material.diameter_mm**2 / 4.0, np.zeros(len(program.line))
+    area, flow = pi * material.diameter_mm**2 / 4.0, np.empty(len(program.line))
     for some in pieces(len(flow)):
-        length = np.linalg.norm(program.end[some, :3] - program.start[some, :3], axis=1) + ROUNDING_MM
-        flow[some] = program.e_mm[some] * area / length * program.feed[some] / 60.0
+        flow[some] = program.e_mm[some] * area / (program.ways_mm(some) + ROUNDING_MM) * program.feed[some] / 60.0
     most = material.volumetric_limit_mm3_s
     message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
     much = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (flow > most * SLACK))

@@ -20,10 +20,13 @@ CELL_MM, MOST_CELLS = 0.15, 6_000_000
 PIECE_MM = 0.25
 
 Point = tuple[float, float, float]
+# Height of the plastic, what it was below this layer, and one more than the row that laid it, 0 where there is none: together,
+# for a bead that crosses rows of cells meets another page of memory in each.
+CELL = np.dtype([("top", np.float32), ("below", np.float32), ("owner", np.int32)])
 
 
 class Field(NamedTuple):
-    """(n,) cells, row by row, n = shape[0] shape[1]: height of the plastic, what it was below this layer, which row laid it.
+    """cells: (n,) CELL, row by row, n = shape[0] shape[1].
 
     coarse: (b,) greatest height of each block; order: blocks, the highest first, as they were once; highest: (2,) of all, and of
     what was laid since then.
@@ -32,9 +35,7 @@ class Field(NamedTuple):
     origin: Floats
     cell: float
     shape: NDArray[np.int64]
-    top: NDArray[np.float32]
-    below: NDArray[np.float32]
-    owner: NDArray[np.int32]
+    cells: NDArray[np.void]
     coarse: Floats
     order: NDArray[np.int64]
     highest: Floats
@@ -46,10 +47,8 @@ def empty_field(low: Floats, high: Floats) -> Field:
     cell = max(CELL_MM, float(np.sqrt(size.prod() / MOST_CELLS)))
     shape = np.ceil(size / cell).astype(np.int64) + 1
     count, blocks = int(shape.prod()), (shape + BLOCK - 1) // BLOCK
-    # below and owner say nothing of cells without plastic: what is not written takes no memory.
-    heights = (np.full(count, NOTHING, np.float32), np.empty(count, np.float32), np.zeros(count, np.int32))
     coarse, order = np.full(int(blocks.prod()), NOTHING), np.arange(int(blocks.prod()))
-    return Field(np.asarray(low, np.float64), cell, shape, *heights, coarse, order, np.full(2, NOTHING))
+    return Field(np.asarray(low, np.float64), cell, shape, np.zeros(count, CELL), coarse, order, np.full(2, NOTHING))
 
 
 def highest_first(field: Field) -> Field:
@@ -89,9 +88,10 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
             low = high = min(max(int(np.floor(v / cell)), 0), field.shape[across_axis] - 1)
         for q in range(low, high + 1):
             k = p * p_cells + q * q_cells
-            if z > field.top[k] + 1e-4:
-                field.below[k], field.top[k] = field.top[k], z
-                field.owner[k] = row
+            column = field.cells[k]
+            top = column.top if column.owner else NOTHING
+            if z > top + 1e-4:
+                column.below, column.top, column.owner = top, z, row + 1
                 c = (p >> SHIFT) * p_blocks + (q >> SHIFT) * q_blocks
                 if z > field.coarse[c]:
                     field.coarse[c] = z
@@ -155,8 +155,9 @@ def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> 
             continue
         for p in range(i * BLOCK, min((i + 1) * BLOCK, field.shape[0])):
             for q in range(j * BLOCK, min((j + 1) * BLOCK, field.shape[1])):
-                rise = field.top[p * field.shape[1] + q] - a[2]
-                if rise > slack and rise > deepest:
+                column = field.cells[p * field.shape[1] + q]
+                rise = column.top - a[2]
+                if column.owner and rise > slack and rise > deepest:
                     x, y = field.origin[0] + (p + 0.5) * cell, field.origin[1] + (q + 0.5) * cell
                     deepest = max(deepest, _depth_at((x, y, 0.0, rise), slack, a, b, head))
     return deepest

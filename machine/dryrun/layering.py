@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
-from machine.dryrun.strokes import Beads, lengths_of
+from machine.dryrun.strokes import Beads
 from machine.reader.parsed import Indices32, ParsedProgram, Remarks, pieces
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
@@ -63,7 +63,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             continue
         remark, gap = program.remark[high], gap[gap > 0.0]
         in_air = ((contacts.air_mm[high] + contacts.beside_mm[high]) > 0.0) & ~loose[high]
-        layer, lengths_mm = program.remarks.layer, deposited.lengths(np.searchsorted(deposited.rows, mine))
+        layer, lengths_mm = program.remarks.layer, deposited.length_mm[np.searchsorted(deposited.rows, mine)]
         laid_mm = np.bincount(layer[program.remark[mine]], weights=lengths_mm)
         hangs = (gap < SEEN_SHARE * program.remarks.height_mm[remark]) | in_air
         told = np.flatnonzero((laid_mm > CRUMB_MM)[layer[remark]] & hangs)
@@ -121,15 +121,16 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
     What spans the cells of sparse infill is a bridge, however much of a layer that is (machine.dryrun.replay).
     """
     counted = ~program.rows_of_types(*LOOSE)[deposited.rows] & ~_begins(program, deposited.rows)[program.remark[deposited.rows]]
-    loose, air, whole = np.zeros((3, program.layer_key_count))
-    for some in pieces(len(counted)):
-        segments, height_mm, rows = deposited.segments(some), deposited.sizes[deposited.size[some], 1], deposited.rows[some]
-        counted[some] &= segments[:, :, 2].min(axis=1) - height_mm >= ON_PLATE_MM
-        rows = rows[counted[some]]
+    (loose, air, whole), tallest_mm = np.zeros((3, program.layer_key_count)), deposited.sizes[:, 1].max(initial=0.0)
+    for some, box in deposited.boxes():
+        if box[0, 2] - tallest_mm < ON_PLATE_MM:
+            lowest_mm = deposited.segments(some)[:, :, 2].min(axis=1)
+            counted[some] &= lowest_mm - deposited.sizes[deposited.size[some], 1] >= ON_PLATE_MM
+        rows = deposited.rows[some][counted[some]]
         group, air_mm = program.layer_keys(rows), contacts.air_mm[rows]
         np.add.at(loose, group, air_mm + contacts.beside_mm[rows])
         np.add.at(air, group, air_mm)
-        np.add.at(whole, group, lengths_of(segments[counted[some]]))
+        np.add.at(whole, group, deposited.length_mm[some][counted[some]])
     bad = np.flatnonzero((loose > FLOATING_SHARE * whole) & (whole > LEAST_MM) & (air > 0.0))
     if not len(bad):
         return

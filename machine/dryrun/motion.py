@@ -9,12 +9,12 @@ from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_
 from machine.firmware import dialect_of
 from machine.gcode.commands import EVERY
 from machine.planning.limits import ROUNDING, axis_limits
-from machine.planning.timing import TINY, axis_speeds, lengths, move_times
 from machine.reader.parsed import AT_ONCE, MoveKind, ParsedProgram, pieces
 from mdp.kernels.arrays import flags
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.machine import Machine
+from slicer.estimate.timing import TINY, axis_speeds, lengths, move_times
 
 STANDSTILLS = frozenset(name for name, command in EVERY.items() if command.waits or command.homes)
 SLACK = 1.001

@@ -67,15 +67,15 @@ def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
 def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     """Parts of which beads are laid at another pose than their ;POSE: comment tells."""
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
-    rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
+    beads = (program.kind == MoveKind.EXTRUDE) & (program.remarks.part > 0)[program.remark]
     for place in Lines.of(lines).beginning_with(";POSE:"):
         number, comment_pose = place + 1, POSE.match(lines[place])
         if comment_pose is None or (comment_pose[1], comment_pose[3]) != letters:
             continue
-        after = int(np.searchsorted(program.line[rows], number))
-        if after == len(rows):
+        row, wanted = int(np.searchsorted(program.line, number)), np.array([float(comment_pose[2]), float(comment_pose[4])])
+        if not beads[row:].any():
             continue
-        row, wanted = int(rows[after]), np.array([float(comment_pose[2]), float(comment_pose[4])])
+        row += int(beads[row:].argmax())
         at = program.end[row, 3:]
         if np.abs(at - wanted).max() > LEVEL_DEG:
             message = (
@@ -87,17 +87,19 @@ def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> It
 
 def _part_totals(program: ParsedProgram) -> Iterator[Finding]:
     """Parts whose beads do not come to what the file tells of them, and parts that are missing."""
-    beads = (program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value)
-    yield from _missing(program, beads)
+    part, layer = program.remarks[:2]
+    beads = (program.kind == MoveKind.EXTRUDE) & (part > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
+    laid = np.zeros(len(part), np.bool_)
+    laid[program.remark[beads]] = True
+    yield from _missing(program, set(part[laid].tolist()))
     for totals in program.part_totals:
-        rows = np.flatnonzero(beads & (program.part == totals.part))
+        rows = np.flatnonzero(beads & (part == totals.part)[program.remark])
         if len(rows):
-            yield from _of_part(program, rows, totals)
+            yield from _of_part(program, rows, len(np.unique(layer[laid & (part == totals.part)])), totals)
 
 
-def _missing(program: ParsedProgram, beads: NDArray[np.bool_]) -> list[Finding]:
+def _missing(program: ParsedProgram, printed: set[int]) -> list[Finding]:
     """The parts of which nothing is printed, of those that `;PART:1 of 3` tells."""
-    printed = set(np.unique(program.part[beads]).tolist())
     absent = [index for index in range(1, program.announced + 1) if index not in printed]
     if not absent:
         return []
@@ -107,9 +109,8 @@ def _missing(program: ParsedProgram, beads: NDArray[np.bool_]) -> list[Finding]:
     return [Finding("error", "missing", line, absent[0], 0, message)]
 
 
-def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals) -> Iterator[Finding]:
+def _of_part(program: ParsedProgram, rows: NDArray[np.int64], layers: int, totals: PartTotals) -> Iterator[Finding]:
     """What differs in a part: its layers, its filament, where it lies."""
-    layers = len(np.unique(program.layer[rows]))
     if layers != totals.layers:
         message = f"beads are laid in {layers} layers of part {totals.part}, the file tells of {totals.layers}"
         yield at_row(program, int(rows[-1]), "error", "contents", message)

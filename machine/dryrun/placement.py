@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
-from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, Beads, lengths_of
-from machine.planning.fit import over_edge_mm
+from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, Beads, highest_of
+from machine.planning.limits import over_edge_mm
 from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.profile import Profile
@@ -30,8 +30,7 @@ ROUNDING_MM = 0.02
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> Iterator[Finding]:
     """Errors and warnings of code air, filled, contact and low-travel, one a part; not-tested where the table turns too often."""
     length = np.zeros(len(program.line))
-    for some in pieces(len(deposited.rows)):
-        length[deposited.rows[some]] = lengths_of(deposited.segments(some))
+    length[deposited.rows] = deposited.length_mm
     deep = "the head runs {value} mm deep into earlier plastic (moves: {count})"
     into = np.flatnonzero(contacts.depth_mm > 0.0)
     yield from per_part(program, into, contacts.depth_mm[into], deep, code="contact")
@@ -120,9 +119,12 @@ def off_plate(program: ParsedProgram, deposited: Beads, profile: Profile) -> Ite
     remark_mm = program.remarks.height_mm
     heights = np.where(remark_mm > 0, remark_mm, profile.process.first_layer_height_mm)
     purge, beyond, over_mm, edge = program.rows_of_types(PURGE), [np.zeros(0, np.int64)], [np.zeros(0)], ""
-    for some in pieces(len(deposited.rows)):
+    most_mm = heights.max(initial=0.0) + ROUNDING_MM
+    for some, box in deposited.boxes():
+        if box[0, 2] > most_mm:
+            continue
         segments, rows = deposited.segments(some), deposited.rows[some]
-        low = np.flatnonzero((segments[:, :, 2].max(axis=1) <= heights[program.remark[rows]] + ROUNDING_MM) & ~purge[rows])
+        low = np.flatnonzero((highest_of(segments) <= heights[program.remark[rows]] + ROUNDING_MM) & ~purge[rows])
         ends, edge = over_edge_mm(segments[low, :, :2], profile.machine.table)
         over = ends.max(axis=1, initial=-np.inf)
         beyond.append(rows[low[over > ROUNDING_MM]])
@@ -137,16 +139,24 @@ def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
     if not purge.any():
         return []
     low, low_mm = np.zeros(len(purge), np.bool_), ON_PLATE * np.maximum(deposited.sizes[:, 1], ROUNDING_MM)
-    for some in pieces(len(purge)):
-        low[some] = deposited.segments(some)[:, :, 2].max(axis=1) <= low_mm[deposited.size[some]]
+    most_mm = low_mm.max()
+    for some, box in deposited.boxes():
+        if box[0, 2] <= most_mm:
+            low[some] = highest_of(deposited.segments(some)) <= low_mm[deposited.size[some]]
     purged, laid = np.flatnonzero(low & purge), np.flatnonzero(low & ~purge)
     if not len(purged) or not len(laid):
         return []
     half_mm = 0.5 * deposited.width_mm
-    import shapely  # 30 ms, for programs that purge on the plate
-
-    lines, beads = (shapely.linestrings(deposited.segments(which)[:, :, :2]) for which in (purged, laid))
     reach_mm = float(half_mm[purged].max() + half_mm[laid].max()) - ROUNDING_MM
+    lines, beads = (deposited.segments(which)[:, :, :2] for which in (purged, laid))
+    near = (
+        (beads.max(axis=1) > lines.min(axis=(0, 1)) - reach_mm) & (beads.min(axis=1) < lines.max(axis=(0, 1)) + reach_mm)
+    ).all(axis=1)
+    if not near.any():
+        return []
+    import shapely  # 30 ms, for programs that lay beads beside their purge
+
+    laid, lines, beads = laid[near], shapely.linestrings(lines), shapely.linestrings(beads[near])
     line, bead = shapely.STRtree(beads).query(lines, "dwithin", reach_mm)
     between_mm = shapely.distance(lines[line], beads[bead]) - half_mm[purged[line]] - half_mm[laid[bead]]
     overlapping = np.flatnonzero(between_mm < -ROUNDING_MM)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, highest_first, lay_bead
-from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of
+from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of, turned_box
 from machine.kinematics.table import machine_points
-from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces, pose_runs
+from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pose_runs
 from mdp.head import Head, head_of
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, no_nrt
@@ -112,10 +112,16 @@ def _field(
     (before, after), (pose, least_mm) = laid, place
     turn = np.column_stack([rotation(machine, pose), shift(machine, pose)])
     extent = np.array([[np.inf] * 2, [-np.inf] * 2])
-    for some in pieces(after):
+    for some, box in deposited.boxes(after):
+        least, most = turned_box(box, turn)[:, :2]
+        if (least >= extent[0]).all() and (most <= extent[1]).all():
+            continue
         _widen(extent, deposited.segments(some) if segments is None else segments[some], turn)
     field = empty_field(extent[0] - 3.0, extent[1] + 3.0)
-    for some in pieces(before):
+    thick_mm = np.array([0.5, 1.0]) @ deposited.sizes.max(axis=0)
+    for some, box in deposited.boxes(before):
+        if turned_box(box, turn)[1, 2] + thick_mm < least_mm:
+            continue
         run_of = np.searchsorted(directions[1], np.arange(some.start, some.stop), side="right") - 1
         own = deposited.segments(some) if segments is None else segments[some]
         mine = (own, deposited.rows[some], deposited.sizes, deposited.size[some])
@@ -160,7 +166,8 @@ def _lay_turned(
     """
     ends, middle = table(2, 3), floats(3, 0.0)
     for i in range(len(rows)):
-        up, width, height, highest = ups[i], sizes[size[i], 0], sizes[size[i], 1], -np.inf
+        up = (ups[i, 0], ups[i, 1], ups[i, 2])
+        width, height, highest = sizes[size[i], 0], sizes[size[i], 1], -np.inf
         for side in range(2):
             x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
             highest = max(highest, x * turn[2, 0] + y * turn[2, 1] + z * turn[2, 2] + turn[2, 3])
@@ -199,12 +206,13 @@ def _under(
     if i < 0 or j < 0 or i >= field.shape[0] or j >= field.shape[1]:
         return 0
     k = i * field.shape[1] + j
-    top, owner = field.top[k], field.owner[k]
-    if top <= NOTHING:
+    column = field.cells[k]
+    top, owner = column.top, column.owner - 1
+    if owner < 0:
         return 0
     same_path = owner >= about.first and strokes.path[owner] == strokes.path[row]
     if same_path and at - strokes.way[owner] < 2.0 * OWN * half and top > z - 0.5 * height:
-        top = field.below[k]
+        top = column.below
         if top < z - 4.0 * height:
             return 0
         owner = row
@@ -280,6 +288,14 @@ def _settle(stretch: tuple[int, int, float], begin: int, pending: Floats, contac
 @kernel
 def _replay_run(moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats) -> None:
     """Try each row of a run against the field, then lay it; pending: (n, 2) zeros, one for each."""
+    _replay_rows(moves, strokes, about, contacts, pending, table(2, 3))
+
+
+@no_nrt
+def _replay_rows(
+    moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats, lowered: Floats
+) -> None:
+    """The same; lowered: (2, 3) room for a move's ends."""
     begin, bead = about.first, about.first_bead
     first, open_mm, most, held = begin, 0.0, 0.0, FREE_END
     for row in range(begin, begin + len(pending)):
@@ -292,8 +308,9 @@ def _replay_run(moves: Moves, strokes: Strokes, about: Surroundings, contacts: C
         if depth > 0.0:
             contacts.depth_mm[row] = depth
         if moves.crossing[row]:
-            down = np.array([0.0, 0.0, CROSSING_MM])
-            contacts.close_mm[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, about.head)
+            for axis in range(3):
+                lowered[0, axis], lowered[1, axis] = a[axis] - CROSSING_MM * (axis == 2), b[axis] - CROSSING_MM * (axis == 2)
+            contacts.close_mm[row] = depth_of(lowered[0], lowered[1], 0.0, about.field, about.head)
         if not extruded:
             continue
         size = (0.5 * moves.sizes[moves.size[bead], 0], moves.sizes[moves.size[bead], 1])

@@ -26,8 +26,8 @@ def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
 
 def _parts(program: ParsedProgram) -> list[Finding]:
     """The first part that comes after a part with a greater number."""
-    extruding = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
-    falling = np.flatnonzero(np.diff(program.part[extruding]) < 0)
+    extruding = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.remarks.part > 0)[program.remark])
+    falling = np.flatnonzero(np.diff(program.remarks.part[program.remark[extruding]]) < 0)
     if not len(falling):
         return []
     row, before = int(extruding[falling[0] + 1]), int(program.part[extruding[falling[0]]])
@@ -57,7 +57,7 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterato
     Nothing is said of a program that never pulls back; what the start block does is its own affair.
     """
     e, material = program.e_mm, profile.material
-    counted = program.part + program.layer > 0
+    counted = (program.remarks.part + program.remarks.layer > 0)[program.remark]
     purge = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & ~counted)
     if program.parts and len(purge):  # what the purge of a program of ours pulls back its first part pushes
         counted[purge[-1] + 1 :] = True
@@ -88,7 +88,7 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterato
 
 def _far_pulled(program: ParsedProgram) -> Iterator[Finding]:
     """In every part the first place between two beads where more filament is pulled back than a hot end holds."""
-    is_bead = (program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0)
+    is_bead = (program.kind == MoveKind.EXTRUDE) & (program.remarks.part + program.remarks.layer > 0)[program.remark]
     beads = np.flatnonzero(is_bead)
     if len(beads) < 2:
         return
@@ -105,9 +105,12 @@ def _oozing(program: ParsedProgram) -> list[Finding]:
     """The first turn of the table, in a program that pulls filament back, before which it was not."""
     if not (program.e_mm < -1e-9).any():
         return []
+    turns = np.flatnonzero(program.kind == MoveKind.ROTATE)
+    turns = turns[program.remarks.part[program.remark[turns]] > 0]
+    if not len(turns):
+        return []
     beads = program.kind == MoveKind.EXTRUDE
     pulled, laid = np.cumsum(np.where(beads, 0.0, -program.e_mm)), np.flatnonzero(beads)
-    turns = np.flatnonzero((program.kind == MoveKind.ROTATE) & (program.part > 0))
     after = np.searchsorted(laid, turns)
     turns, after = turns[after > 0], after[after > 0]
     loose = turns[pulled[turns] - pulled[laid[after - 1]] < SLACK_MM]

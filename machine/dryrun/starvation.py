@@ -18,12 +18,12 @@ from machine.dryrun.motion import standstills
 from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
 from machine.gcode.line_text import is_plain_move, read_line
-from machine.planning.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 from machine.reader.parsed import Indices32, ParsedProgram
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 from profiles.machine import Machine
+from slicer.estimate.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 
 USUAL_FRAME_BYTES = FRAME_BYTES - 1  # of the checksums of ASCII, 0 to 127, most have two digits; the line's number comes on top
 GREETING = 3  # lines sent before the program

@@ -1,6 +1,8 @@
 """Strokes: a program's rows as the replay takes them: beads with their places and sizes, what each move may touch and span."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import pi
 from typing import NamedTuple
 
@@ -13,10 +15,10 @@ from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from profiles.machine import Machine
 from profiles.profile import Profile
-from slicer.fill.infill import infill_cell_mm
+from slicer.bead import infill_cell_mm, support_cell_mm
 from slicer.paths import Kind
-from slicer.support.sturdy import support_cell_mm
 
+ROUNDING_MM = 1e-6
 SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
 LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose
 ON_PLATE = 1.5  # heights of a bead: its top is no higher where it lies on the plate
@@ -61,14 +63,22 @@ class Beads:
     @property
     def length_mm(self) -> Floats:
         """(m,) lengths."""
-        return self.lengths(np.arange(len(self.rows)))
+        return self._measures[0]
 
-    def lengths(self, which: Indices) -> Floats:
-        """(k,) lengths of some beads, mm."""
-        length_mm = np.empty(len(which))
-        for some in pieces(len(which)):
-            length_mm[some] = lengths_of(self.segments(which[some]))
-        return length_mm
+    def boxes(self, count: int | None = None) -> Iterator[tuple[slice, Floats]]:
+        """The first beads, all if no number is given, in pieces, and what contains each: (2, 3) least and greatest X Y Z."""
+        last = len(self.rows) if count is None else count
+        return ((slice(some.start, min(some.stop, last)), box) for some, box in self._measures[1] if some.start < last)
+
+    @cached_property
+    def _measures(self) -> tuple[Floats, list[tuple[slice, Floats]]]:
+        length_mm, boxes = np.empty(len(self.rows)), list[tuple[slice, Floats]]()
+        for some in pieces(len(length_mm)):
+            segments = self.segments(some)
+            length_mm[some] = lengths_of(segments)
+            ends = segments.reshape(-1, 3).T
+            boxes.append((some, np.transpose([(axis.min(), axis.max()) for axis in ends])))
+        return length_mm, boxes
 
 
 class Strokes(NamedTuple):
@@ -114,7 +124,7 @@ def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) 
     for some in pieces(len(unsized)):
         mine, ends = unsized[some], beads.segments(unsized[some])
         width_mm, height_mm = sizes[size[mine]].T
-        usual = np.where(np.maximum(ends[:, 0, 2], ends[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
+        usual = np.where(highest_of(ends) <= first_mm + 1e-3, first_mm, layer_mm)
         height = np.where(height_mm > 0, height_mm, usual)
         area = program.e_mm[rows[mine]] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(lengths_of(ends), 1e-9)
         by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
@@ -132,14 +142,32 @@ def parts_on_plate(program: ParsedProgram, deposited: Beads) -> list[int]:
     begins = (part > 1) & (layer == lowest[part])
     first = np.flatnonzero(begins[program.remark[deposited.rows]])
     of_part = part[program.remark[deposited.rows[first]]]
-    high = deposited.segments(first)[:, :, 2].max(axis=1, initial=0.0) > ON_PLATE * deposited.sizes[deposited.size[first], 1]
+    high = highest_of(deposited.segments(first)) > ON_PLATE * deposited.sizes[deposited.size[first], 1]
     return sorted(set(of_part.tolist()) - set(of_part[high].tolist()))
 
 
+def turned_box(box: Floats, turn: Floats) -> Floats:
+    """(2, 3) least and greatest X Y Z of what a box contains, turned by (3, 3), or turned and moved by (3, 4)."""
+    middle = turn[:, :3] @ box.mean(axis=0) + turn[:, 3:].sum(axis=1)
+    reach = np.abs(turn[:, :3]) @ np.ptp(box, axis=0) / 2.0 + ROUNDING_MM
+    return np.stack([middle - reach, middle + reach])
+
+
+def highest_of(segments: Floats) -> Floats:
+    """(k,) greatest heights of (k, 2, 3) segments."""
+    highest_mm: Floats = np.maximum(segments[:, 0, 2], segments[:, 1, 2])
+    return highest_mm
+
+
+@kernel
 def lengths_of(segments: Floats) -> Floats:
     """(k,) lengths of (k, 2, 3) segments."""
-    lengths: Floats = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
-    return lengths
+    lengths_mm = np.empty(len(segments))
+    for k in range(len(segments)):
+        x, y = segments[k, 1, 0] - segments[k, 0, 0], segments[k, 1, 1] - segments[k, 0, 1]
+        z = segments[k, 1, 2] - segments[k, 0, 2]
+        lengths_mm[k] = np.sqrt(x * x + y * y + z * z)
+    return lengths_mm
 
 
 def _layers_mm(beads: Beads, has_heights: bool, profile: Profile) -> tuple[float, float]:

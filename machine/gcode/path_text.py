@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from machine.planning.moves import RICHER
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
+from slicer.strokes.travels import distance
 
 Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int64]
@@ -121,7 +122,7 @@ def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tu
     for k in range(first + 1, end):
         whole += filament_mm[k]
         shared += _step_mm(points_mm, filament_mm, k, 1.0)
-        exact_mm = _exact_mm(points_mm, k)
+        exact_mm = distance(points_mm, k - 1, k)
         densest = max(densest, abs(filament_mm[k]) / exact_mm) if exact_mm > 1e-9 else densest
     if shared == 0.0:
         return 0.0, 0.0
@@ -136,16 +137,7 @@ def _step_mm(points_mm: Floats, filament_mm: Floats, k: int, more: float) -> flo
     written = 0.0
     for axis in range(3):
         written += ((np.rint(points_mm[k, axis] * 1000.0) - np.rint(points_mm[k - 1, axis] * 1000.0)) / 1000.0) ** 2
-    return float(filament_mm[k] * np.sqrt(written) / max(_exact_mm(points_mm, k), 1e-12) * more)
-
-
-@no_nrt
-def _exact_mm(points_mm: Floats, k: int) -> float:
-    """Length of the step to point k before it is rounded."""
-    squared = 0.0
-    for axis in range(3):
-        squared += (points_mm[k, axis] - points_mm[k - 1, axis]) ** 2
-    return float(np.sqrt(squared))
+    return float(filament_mm[k] * np.sqrt(written) / max(distance(points_mm, k - 1, k), 1e-12) * more)
 
 
 @no_nrt

@@ -17,11 +17,11 @@ from machine.gcode.settings import totals_comment
 from machine.gcode.words import PAUSE_REMARK
 from machine.planning.limits import stroke_filament_mm_s, wipe_filament_mm_s
 from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, straight_moves
-from machine.planning.timing import move_times
 from mdp.mesh import Floats, Indices
 from mdp.pose import level
 from profiles.machine import Machine
 from profiles.profile import Profile
+from slicer.estimate.timing import move_times
 from slicer.paths import KINDS, NUMBER, Kind
 from slicer.strokes.speed import travel_mm_s2
 
@@ -92,7 +92,8 @@ def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_m
             yield from _ended((*_begin_part(mark, len(parts), pen), *_contents(program, row)))
         else:
             yield from _ended((*_begin_layer(mark, profile, pen), *_progress(float(elapsed[row]), total, pen)))
-            yield from _before_layer(mark, top_mm[mark.part], pen)
+            heights = {"layer_z": float(mark.z_mm), "max_layer_z": float(top_mm[mark.part])}
+            yield from _ended(_block(BEFORE_LAYER, pen, layer_num=pen.layers - 1, **heights))
     yield from _moves(program, done, len(program), last_strokes, profile, pen)
     yield from _ended((*_end(pen), *_progress(total, total, pen), *_dialect_line(pen.dialect.last, pen)))
     yield from _ended(settings.foot(profile, filament_mm, total))
@@ -210,11 +211,6 @@ def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:
     return 0.0 if coming is None else _nozzle_c(coming, profile)
 
 
-def _before_layer(move: BeginLayer, top_mm: float, pen: Pen) -> Iterator[str]:
-    """The block before a layer; top_mm: height of the last layer of its part."""
-    return _ended(_block(BEFORE_LAYER, pen, layer_num=pen.layers - 1, layer_z=float(move.z_mm), max_layer_z=float(top_mm)))
-
-
 def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:
     """How hot a layer is printed."""
     return min(profile.material.nozzle_c + layer.nozzle_add_c, profile.machine.nozzle_limit_c)
@@ -297,7 +293,7 @@ def _before_stroke(
     yield from _set_fan(pen.layer_fan if isnan(fan) else fan, pen)
     if not isinf(acceleration_mm_s2) and round(acceleration_mm_s2) != pen.acceleration and pen.dialect.acceleration:
         pen.acceleration = round(acceleration_mm_s2)
-        yield pen.dialect.acceleration.format(pen.acceleration, round(travel_mm_s2(profile) or pen.acceleration))
+        yield pen.dialect.acceleration.format(pen.acceleration, round(travel_mm_s2(profile)))
     if kind != pen.kind:
         pen.kind = kind
         yield f";TYPE:{KINDS[kind].value}"

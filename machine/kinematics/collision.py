@@ -104,7 +104,7 @@ def swing_mm(machine: Machine, printed: Printed) -> float:
 
 def sweep_gaps(body: Body, start: Floats, end: Floats, tried: Floats, reach: Floats) -> Floats:
     """(n,) lower bounds of the distance of a body from an obstacle while the tip goes from (n, 3) start to (n, 3) end."""
-    return gaps_of(body, swept(start, end, tried), tried, reach)
+    return gaps_of(swept(start, end, tried), body.least(tried) - reach)
 
 
 def swept(start: Floats, end: Floats, tried: Floats) -> Floats:
@@ -112,9 +112,9 @@ def swept(start: Floats, end: Floats, tried: Floats) -> Floats:
     return np.minimum(tried @ start.T, tried @ end.T)
 
 
-def gaps_of(body: Body, least: Floats, tried: Floats, reach: Floats) -> Floats:
-    """(n,) greatest gap of a body over the tried directions: `least` from swept(), `reach` that of the obstacle."""
-    best: Floats = (least + (body.least(tried) - reach)[:, None]).max(axis=0)
+def gaps_of(least: Floats, margin: Floats) -> Floats:
+    """(n,) greatest gap over k directions: `least` from swept(), `margin`: (k,) of the body over the reach of the obstacle."""
+    best: Floats = (least + margin[:, None]).max(axis=0)
     return best
 
 

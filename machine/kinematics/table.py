@@ -53,7 +53,7 @@ def _chain(machine: Machine) -> Floats:
 def _path(axes: Floats, chain: Floats) -> Floats:
     out, angles = table(len(axes), 3), table(2, 3)
     for k in range(len(axes)):
-        out[k, 0], out[k, 1], out[k, 2] = _place(axes[k], chain, angles, k == 0)
+        out[k, 0], out[k, 1], out[k, 2] = _place(axes, k, chain, angles, k == 0)
     return out
 
 
@@ -67,8 +67,8 @@ def _segments(start: Floats, end: Floats, rows: Indices, chain: Floats) -> Float
             for axis in range(3):
                 out[k, 0, axis] = out[k - 1, 1, axis]
         else:
-            out[k, 0, 0], out[k, 0, 1], out[k, 0, 2] = _place(start[row], chain, angles, k == 0)
-        out[k, 1, 0], out[k, 1, 1], out[k, 1, 2] = _place(end[row], chain, angles, False)
+            out[k, 0, 0], out[k, 0, 1], out[k, 0, 2] = _place(start, row, chain, angles, k == 0)
+        out[k, 1, 0], out[k, 1, 1], out[k, 1, 2] = _place(end, row, chain, angles, False)
     return out
 
 
@@ -82,8 +82,9 @@ def goes_on(start: Floats, end: Floats, row: int) -> bool:
 
 
 @no_nrt
-def _place(axes: Floats, chain: Floats, angles: Floats, is_first: bool) -> Point:
-    """The workpiece point of (5,) axes; angles: (2, 3) place, deg, cosine and sine of tilt and turn as they were last."""
+def _place(rows: Floats, row: int, chain: Floats, angles: Floats, is_first: bool) -> Point:
+    """The workpiece point of one of (n, 5) rows; angles: (2, 3) place, deg, cosine and sine of both axes as they were last."""
+    axes = rows[row]  # here, where nobody counts who holds it
     for axis in range(2):
         if is_first or axes[3 + axis] != angles[axis, 0]:
             angle = np.radians(chain[5 + axis, 0] * (axes[3 + axis] - chain[5 + axis, 1]))
@@ -98,6 +99,8 @@ def _about(middle: Floats, axis: Floats, angle: Floats, point: Point) -> Point:
     """A point turned about an axis through a middle, seen from there; angle: (3,) with its cosine and sine at the end."""
     cosine, sine = angle[1], angle[2]
     x, y, z = point[0] - middle[0], point[1] - middle[1], point[2] - middle[2]
+    if sine == 0.0 and cosine == 1.0:
+        return x, y, z
     along = x * axis[0] + y * axis[1] + z * axis[2]
     return (
         x * cosine + (axis[1] * z - axis[2] * y) * sine + axis[0] * along * (1.0 - cosine),

@@ -4,12 +4,13 @@ as near as possible to the place that the plate has for them.
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from math import ceil, hypot
+from math import ceil, dist, hypot
 from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning.fit import Place, over_edge_mm
+from machine.planning.fit import Place
+from machine.planning.limits import over_edge_mm
 from profiles.machine import Machine
 from profiles.settings.plate import MIDDLE
 
@@ -109,18 +110,14 @@ def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine,
     for anchor in dict.fromkeys((about_mm, MIDDLE)):
         for shift in product((0.0, 0.5), (0.0, 0.5)):
             inside = _lattice(size_mm, gap_mm, shift, machine, anchor)
-            lattice = sorted(inside, key=lambda middle: (round(_away(middle, about_mm), 6), middle[1], middle[0]))[:count]
+            lattice = sorted(inside, key=lambda middle: (round(dist(middle, about_mm), 6), middle[1], middle[0]))[:count]
             if (len(lattice), -_farthest_mm(lattice, about_mm)) > (len(best), -_farthest_mm(best, about_mm)):
                 best = lattice
     return best
 
 
-def _away(middle: Place, about_mm: Place) -> float:
-    return hypot(middle[0] - about_mm[0], middle[1] - about_mm[1])
-
-
 def _farthest_mm(places: list[Place], about_mm: Place) -> float:
-    return max((_away(place, about_mm) for place in places), default=0.0)
+    return max((dist(place, about_mm) for place in places), default=0.0)
 
 
 def _lattice(size_mm: Place, gap_mm: float, shift: Place, machine: Machine, anchor_mm: Place) -> list[Place]:

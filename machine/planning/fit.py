@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from machine.kinematics.table import machine_points
-from machine.planning.limits import ROUNDING, axis_limits
+from machine.planning.limits import ROUNDING, axis_limits, over_edge_mm
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.plane import Plane
 from profiles.errors import MoveError
-from profiles.machine import Table
 from profiles.profile import Profile
 from profiles.settings.plate import MIDDLE
 from slicer.paths import SlicedPart
 from slicer.raft import lift_mm
 
 Place = tuple[float, float]
+STILL = np.eye(3)  # turns nothing
 
 
 def check_parts(parts: Sequence[Part], profile: Profile) -> None:
@@ -80,16 +80,6 @@ def _advice(profile: Profile) -> str:
     return f"process.place_mm moves it from {x:g}, {y:g} mm back towards the middle"
 
 
-def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
-    """(...) how far places (..., 2) lie over the plate's edge, below 0 on it; the edge in words."""
-    if table.size_mm is None:
-        over: Floats = np.hypot(points_mm[..., 0], points_mm[..., 1]) - table.radius_mm
-        return over, f"{table.radius_mm:g} mm from its middle"
-    x, y = table.size_mm
-    over = (np.abs(points_mm) - 0.5 * np.array([x, y])).max(axis=-1)
-    return over, f"it measures {x:g} x {y:g} mm"
-
-
 def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.0) -> Decomposition:
     """A decomposition moved by x, y over the plate and lifted onto a raft, its planes and marks too."""
     if place_mm == MIDDLE and up_mm == 0.0:
@@ -97,7 +87,7 @@ def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.
     shift = np.array([*place_mm, up_mm])
     rows = tuple(replace(row, planes=tuple(_plane_moved(plane, shift) for plane in row.planes)) for row in decomposition.front)
     parts = tuple(_part_moved(part, shift) for part in decomposition.parts)
-    return replace(decomposition, mesh=mesh_moved(decomposition.mesh, shift), parts=parts, front=rows)
+    return replace(decomposition, mesh=decomposition.mesh.transform(STILL, shift), parts=parts, front=rows)
 
 
 def lifted(
@@ -112,21 +102,15 @@ def lifted(
     return standing_at(decomposition, MIDDLE, float(up[2])), moved
 
 
-def mesh_moved(mesh: Mesh, shift_mm: Floats) -> Mesh:
-    """A mesh moved by x, y, z."""
-    return Mesh(mesh.vertices + shift_mm, mesh.faces, mesh.colours)
-
-
 def mesh_at_place(mesh: Mesh, profile: Profile) -> Mesh:
     """A mesh at its place on the plate, and on its raft, as it is printed."""
-    return mesh_moved(mesh, _shift(profile))
+    return mesh.transform(STILL, _shift(profile))
 
 
 def _part_moved(part: Part, shift: Floats) -> Part:
     lifted_mm = part.lifted_mm + float(shift[2]) if part.on_platform else 0.0
-    moved = replace(part, mesh=mesh_moved(part.mesh, shift), base=_plane_moved(part.base, shift), lifted_mm=lifted_mm)
-    still = np.eye(3)
-    return moved.with_marks(lambda mark: mark.transform(still, shift), lambda modifier: modifier.transform(still, shift))
+    moved = replace(part, mesh=part.mesh.transform(STILL, shift), base=_plane_moved(part.base, shift), lifted_mm=lifted_mm)
+    return moved.with_marks(lambda mark: mark.transform(STILL, shift), lambda modifier: modifier.transform(STILL, shift))
 
 
 def _plane_moved(plane: Plane, shift: Floats) -> Plane:

@@ -6,19 +6,21 @@ infill or support it makes that a little thicker, where nobody sees or feels it.
 """
 
 from itertools import pairwise
-from math import inf, pi
+from math import pi
 
 import numpy as np
 
-from machine.planning.limits import Speeds, path_speeds, stroke_filament_mm_s
+from machine.planning.limits import path_speeds, stroke_filament_mm_s
 from machine.planning.moves import POINTS, RETRACT, SPEED, Moves, add_point, add_row
 from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
 from mdp.kernels.arrays import floats, longs, table
-from mdp.kernels.kernel import kernel, no_nrt
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from profiles.profile import Profile
-from slicer.paths import KINDS, Kind, Layer, bead_area_mm2
+from slicer.estimate.timing import Speeds
+from slicer.geometry.polyline import length_between
+from slicer.paths import Kind, Layer, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
 from slicer.strokes.travels import STANDING_MM
 
@@ -64,33 +66,20 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
     area_mm2 = bead_area_mm2(layer.width_mm, layer.height_mm) * layer.flow
     with np.errstate(divide="ignore"):
         fastest = stroke_filament_mm_s(profile) * filament_mm2 / np.maximum(area_mm2, 0.0)
-    accelerations = stroke_accelerations(profile, on_plate)
-    by_kind = np.array([inf if accelerations is None else accelerations[kind] for kind in KINDS])
     speeds = path_speeds(points, layer.starts, np.minimum(layer.speed_mm_s, fastest), tip.speeds.axes_mm_s)
+    accelerations = stroke_accelerations(profile, on_plate)[layer.kind]
     ways = _ways(points, layer.points, layer.starts, area_mm2, filament_mm2)
-    rows = np.column_stack([layer.kind, counts, speeds, layer.width_mm, layer.own_fan, by_kind[layer.kind]])
+    rows = np.column_stack([layer.kind, counts, speeds, layer.width_mm, layer.own_fan, accelerations])
     if material.coast_mm > 0.0:
         return _coasted(Moves(ways, rows), layer.points, np.append(layer.retract[1:], False), material.coast_mm)
     return Moves(ways, rows)
 
 
-@kernel
 def _ways(points_mm: Floats, flat_mm: Floats, starts: Indices, area_mm2: Floats, filament_mm2: float) -> Floats:
     """(n, 4) points of strokes with the filament of beads of (k,) areas; flat_mm (n, 2): the points before they were moved."""
-    ways: Floats = table(len(points_mm), 4)
-    for k in range(len(area_mm2)):
-        for i in range(starts[k], starts[k + 1]):
-            for axis in range(3):
-                ways[i, axis] = points_mm[i, axis]
-            if i > starts[k]:
-                ways[i, 3] = _step_mm(flat_mm, i) * area_mm2[k] / filament_mm2
-    return ways
-
-
-@no_nrt
-def _step_mm(flat_mm: Floats, i: int) -> float:
-    """Length of the step to a point."""
-    return float(np.hypot(flat_mm[i, 0] - flat_mm[i - 1, 0], flat_mm[i, 1] - flat_mm[i - 1, 1]))
+    steps_mm = np.hypot(*np.diff(flat_mm, axis=0, prepend=flat_mm[:1]).T)
+    steps_mm[starts[:-1]] = 0.0
+    return np.column_stack([points_mm, steps_mm * np.repeat(area_mm2, np.diff(starts)) / filament_mm2])
 
 
 @kernel
@@ -100,13 +89,11 @@ def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> 
     first = 0
     for k in range(len(coasts)):
         end = first + int(strokes.rows[k, POINTS])
-        total, run, pushes = 0.0, 0.0, True
-        for i in range(first + 1, end):
-            total += _step_mm(flat_mm, i)
+        total, run, pushes = length_between(flat_mm, first, end), 0.0, True
         until = total - coast_mm if coasts[k] and coast_mm < MOST_COASTED * total else np.inf
         for i in range(first, end):
             here, pushed = strokes.ways[i], strokes.ways[i, 3]
-            step = _step_mm(flat_mm, i) if i > first else 0.0
+            step = length_between(flat_mm, i - 1, i + 1) if i > first else 0.0
             run += step
             if i > first and pushes and run >= until:
                 before, share = strokes.ways[i - 1], 1.0 - (run - until) / step if step > 0.0 else 1.0

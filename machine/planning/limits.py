@@ -1,33 +1,20 @@
 """Limits: what every axis allows; a program outside is refused before any text is written, a speed is lowered to fit."""
 
-from math import inf, pi
-from typing import NamedTuple
+from math import pi
 
 import numpy as np
 
 from machine.planning.moves import REORIENT, RICHER, BeginLayer, BeginPart, MachineProgram, Reorient
-from machine.planning.timing import along, axis_speeds
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from profiles.errors import MoveError
 from profiles.frozen import Limits
-from profiles.machine import Machine
+from profiles.machine import Machine, Table
 from profiles.profile import Profile
-from slicer.strokes.speed import travel_mm_s2
+from slicer.estimate.timing import along
 
 ROUNDING = 5e-4
-
-
-class Speeds(NamedTuple):
-    """What moves without extruding may have at most: mm/s straight up and down, across, and of the filament alone; mm/s2, inf
-    where the axes decide; (3,) mm/s of X, Y and Z."""
-
-    lift_mm_s: float
-    travel_mm_s: float
-    filament_mm_s: float
-    acceleration_mm_s2: float
-    axes_mm_s: Floats
 
 
 def axis_limits(machine: Machine) -> dict[str, Limits]:
@@ -72,18 +59,6 @@ def location(program: MachineProgram, index: int) -> str:
     return f"part {part.index}, layer {layer.index}"
 
 
-def speeds_of(profile: Profile) -> Speeds:
-    """What the process asks for, as far as the axes and the extruder allow it."""
-    process, machine, material = profile.process, profile.machine, profile.material
-    return Speeds(
-        lift_mm_s=min(process.lift_speed_mm_s, machine.z.speed_mm_s),
-        travel_mm_s=min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s),
-        filament_mm_s=min(material.retract_speed_mm_s, machine.extruder_speed_mm_s),
-        acceleration_mm_s2=travel_mm_s2(profile) or inf,
-        axes_mm_s=axis_speeds(machine)[:3],
-    )
-
-
 def wipe_filament_mm_s(machine: Machine) -> float:
     """The greatest speed of the filament that a path may plan with: the text may round its ends to a little more."""
     return machine.extruder_speed_mm_s / RICHER
@@ -116,6 +91,16 @@ def path_speed(points_mm: Floats, first: int, end: int, speed_mm_s: float, axes_
             step = points_mm[k, axis] - points_mm[k - 1, axis]
             speed_mm_s = min(speed_mm_s, along(axes_mm_s[axis], step, np.sqrt(squared)))
     return speed_mm_s
+
+
+def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
+    """(...) how far places (..., 2) lie over the plate's edge, below 0 on it; the edge in words."""
+    if table.size_mm is None:
+        over: Floats = np.hypot(points_mm[..., 0], points_mm[..., 1]) - table.radius_mm
+        return over, f"{table.radius_mm:g} mm from its middle"
+    x, y = table.size_mm
+    over = (np.abs(points_mm) - 0.5 * np.array([x, y])).max(axis=-1)
+    return over, f"it measures {x:g} x {y:g} mm"
 
 
 def turn_speed(tilt_deg: float, turn_deg: float, machine: Machine) -> float:

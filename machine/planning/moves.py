@@ -62,8 +62,6 @@ class Pause:
 
 Mark = BeginPart | BeginLayer | Pause | Reorient
 TRAVEL, WIPE, RETRACT, REORIENT, MARK = range(len(KINDS), len(KINDS) + 5)  # behind the numbers of strokes, those of KINDS
-
-
 POINTS, SPEED = 1, 2  # columns of Moves.rows
 
 

@@ -15,9 +15,7 @@ from math import ceil, hypot, inf, radians
 import numpy as np
 
 from machine.kinematics.collision import Printed, solids, swing_mm
-from machine.planning.limits import Speeds
 from machine.planning.park_position import is_way_clear
-from machine.planning.timing import move_times
 from mdp.directions.spread import spread
 from mdp.head import bodies, directions
 from mdp.kernels.kernel import kernel
@@ -25,6 +23,7 @@ from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.errors import MoveError
 from profiles.machine import Machine
+from slicer.estimate.timing import Speeds, move_times
 
 STEP_DEG = 0.5
 MOST_STEPS = 1500

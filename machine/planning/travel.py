@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning.limits import Speeds, path_speed, path_speeds, speeds_of, wipe_filament_mm_s
+from machine.planning.limits import path_speed, path_speeds, wipe_filament_mm_s
 from machine.planning.moves import MARK, REORIENT, RETRACT, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
 from mdp.clearance import Standing, highest_in_cells
 from mdp.decomposition import Part
@@ -22,6 +22,7 @@ from mdp.pose import Pose
 from profiles.errors import MoveError
 from profiles.machine import Machine
 from profiles.profile import Profile
+from slicer.estimate.timing import Speeds, speeds_of
 from slicer.geometry.polyline import length_between
 from slicer.interface.interface import frame_change
 from slicer.paths import SlicedPart

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from machine.firmware import dialect_of
 from machine.gcode.settings import PartTotals
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
 from profiles.machine import Machine
 
-AT_ONCE = 16_384  # rows
+AT_ONCE = 8_192  # rows
 Indices32 = NDArray[np.int32]
 OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
 
@@ -137,18 +138,11 @@ class ParsedProgram:
     @cached_property
     def bounds(self) -> Floats:
         """(2, 5) least and greatest place of each axis at the ends of moves; infinite where there is none."""
-        least, most = np.full(5, np.inf), np.full(5, -np.inf)
-        for some in pieces(len(self.line)):
-            least, most = np.minimum(least, self.end[some].min(axis=0)), np.maximum(most, self.end[some].max(axis=0))
-        return np.stack([least, most])
+        return np.transpose([(axis.min(initial=np.inf), axis.max(initial=-np.inf)) for axis in self.end.T])
 
-    @property
-    def way_mm(self) -> Floats:
-        """(n,) how far X Y Z go in each move."""
-        way_mm = np.empty(len(self.line))
-        for some in pieces(len(way_mm)):
-            way_mm[some] = np.linalg.norm(self.end[some, :3] - self.start[some, :3], axis=1)
-        return way_mm
+    def ways_mm(self, rows: Indices | slice = slice(None)) -> Floats:
+        """(m,) how far X Y Z go in some moves."""
+        return _ways(self.start[rows], self.end[rows])
 
     def changes(self, rows: Indices | slice = slice(None)) -> Floats:
         """(m, 6) of X Y Z tilt turn E, in some rows."""
@@ -180,6 +174,15 @@ class ParsedProgram:
         """(n,) which rows belong to these ;TYPE: names."""
         marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.remarks.type]
         return marked[self.remark]
+
+
+@kernel
+def _ways(start: Floats, end: Floats) -> Floats:
+    ways_mm = np.empty(len(start))
+    for k in range(len(start)):
+        x, y, z = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1], end[k, 2] - start[k, 2]
+        ways_mm[k] = np.sqrt(x * x + y * y + z * z)
+    return ways_mm
 
 
 def pieces(count: int) -> Iterator[slice]:

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.kinematics.coordinates import axis_positions
-from machine.planning.timing import axis_speeds, lengths
 from machine.reader.parsed import MoveKind, ParsedProgram, Remarks
 from machine.reader.state import Reader
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
+from slicer.estimate.timing import axis_speeds, lengths
 
 STILL = 1e-9
 SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded places, lets the head leave its place by less

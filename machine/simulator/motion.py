@@ -8,10 +8,10 @@ from machine.firmware.simulation import SimulatedSettings
 from machine.gcode.arcs import arc_centre, chords, sweep_rad
 from machine.gcode.modes import Modes, axes_of
 from machine.kinematics.coordinates import origin_mm
-from machine.planning.timing import axis_accelerations, axis_speeds
 from machine.simulator.planner import Axes, ExecutedMoves, Planner, block_of
 from mdp.pose import Pose, rotation, shift
 from profiles.machine import Machine
+from slicer.estimate.timing import axis_accelerations, axis_speeds
 
 FIRST_FEED = 25.0  # mm/s until a program gives an F: Marlin's 1500 mm/min
 TINY_MM = 1e-9

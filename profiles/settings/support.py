@@ -109,7 +109,11 @@ class Support(Frozen):
         "two thirds of a line: near enough to hold the edges",
     )
     support_foot_mm: float = Field(
-        2.0, ge=0, le=20, description="support is wider by this in its first layer on the platform, so that it sticks, mm"
+        2.0,
+        ge=0,
+        le=20,
+        description="support is wider by up to this in its first layer on the platform, so that it sticks: no wider than twice "
+        "its own height, mm",
     )
     support_foot_density: float = Field(
         0.85,

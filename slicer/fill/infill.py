@@ -18,7 +18,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.settings.infill import Infill
-from slicer.bead import Bead, spacing_mm, with_line_width
+from slicer.bead import Bead, infill_cell_mm, spacing_mm, with_line_width
 from slicer.fill.lightning import clip_chains, lightning_lines
 from slicer.fill.lines import (
     Box,
@@ -43,7 +43,6 @@ MIDDLE = 0.4  # line widths: a wall that lies so far beside the one below has it
 BEYOND = 0.5  # line widths that a line under walls goes on beyond where they lean out
 SHORTEST = 2.0  # line widths: a wall spans less without a line under it
 RANK = 3  # behind skins (slicer.fill.skin)
-FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}  # of straight families
 SAMPLES = 6  # layers from which the plastic of anchors is judged
 MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border
@@ -118,13 +117,6 @@ def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: 
         parts.append(own)
         left = left if own.is_empty() else left - offset(own, apart_mm)
     return parts[::-1]
-
-
-def infill_cell_mm(process: Process) -> float:
-    """About how far apart lines of the sparse infill lie, mm: what solid lines laid over it have to span; 0 without infill."""
-    width = process.infill_line_width_mm or process.line_width_mm
-    spacing, density = spacing_mm(width, process.layer_height_mm), process.infill_density
-    return FAMILIES.get(process.infill_pattern, 1) * spacing / density if density > 0.0 else 0.0
 
 
 def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: float) -> float:

@@ -24,6 +24,7 @@ from slicer.heights import Heights
 
 NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
+HIDDEN = 0.6  # line widths that they keep from a top: wedges stay open between the line ends of both, under the walls around it
 HOLDS = 0.75  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
@@ -82,7 +83,7 @@ def infill_bridges(region: Region, sparse_below: Polygons, width_mm: float) -> P
 
     Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
     """
-    solid = region.solid + (region.top - region.bare)
+    solid = region.solid + (region.top - offset(region.bare, HIDDEN * width_mm))
     if solid.is_empty() or sparse_below.is_empty():
         return Polygons()
     spanned = solid ^ sparse_below

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.kernels.arrays import floats, longs
-from mdp.kernels.kernel import helper, kernel
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
@@ -95,7 +95,7 @@ def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
     index, size, room = index_edges(area), -1, 2 * len(points) + 64
     while size < 0:
         out, marks = np.empty((room, 2)), np.empty(room, np.bool_)
-        size = _cut(points, index, out, marks)
+        size = cut_into(points, index, out, marks)
         room *= 4
     return out[:size], marks[: size - 1]
 
@@ -116,11 +116,6 @@ def runs_within(points: Floats, area: Polygons) -> list[Floats]:
 
 
 @kernel
-def _cut(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
-    return cut_into(points, area, out, marks)
-
-
-@helper
 def cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
     """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
 

@@ -50,14 +50,12 @@ def index_edges(polygons: Polygons) -> EdgeIndex:
     """The edges of all contours, about one edge a cell."""
     loops = contours(polygons)
     begins = np.cumsum([0, *(len(loop) for loop in loops)]).astype(np.int64)
-    index: EdgeIndex = _index(loop_edges(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
-    return index
+    return _index(loop_edges(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
 
 
 def index_segments(segments: Floats) -> EdgeIndex:
     """Segments (n, 4) that bound nothing, for the search of the nearest."""
-    index: EdgeIndex = _index(segments, np.zeros(len(segments), np.int64), np.array([0, len(segments)]))
-    return index
+    return _index(segments, np.zeros(len(segments), np.int64), np.array([0, len(segments)]))
 
 
 @kernel

@@ -159,17 +159,12 @@ def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
 
 def strips(lines: Sequence[Floats], reach_mm: float | Floats) -> Polygons:
     """Everything nearer than the reach to lines (n, 2), with square ends; an array holds the reach of every segment."""
-    quads = _quads(np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines]), reach_mm)
-    return of_contours(list(quads))
-
-
-def _quads(starts: Floats, ends: Floats, reach_mm: float | Floats) -> Floats:
-    """(n, 4, 2) a counter-clockwise rectangle round every segment."""
+    starts, ends = np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines])
     steps = ends - starts
     along = steps * (reach_mm / np.maximum(np.hypot(*steps.T), 1e-9))[:, None]
     left = np.stack([-along[:, 1], along[:, 0]], axis=1)
     a, b = starts - along, ends + along
-    return np.stack([a - left, b - left, b + left, a + left], axis=1)
+    return of_contours(list(np.stack([a - left, b - left, b + left, a + left], axis=1)))
 
 
 def of_contours(loops: Sequence[Floats]) -> Polygons:
@@ -197,13 +192,9 @@ def edges(polygons: Polygons) -> Floats:
     return loop_edges(contours(polygons))
 
 
+@kernel
 def area_mm2(loop: Floats) -> float:
     """Signed area of a loop by the shoelace formula, positive when counter-clockwise."""
-    return float(_shoelace(loop))
-
-
-@kernel
-def _shoelace(loop: Floats) -> float:
     x0, y0 = loop[0, 0], loop[0, 1]
     doubled = 0.0
     for i in range(1, len(loop) - 1):

@@ -99,13 +99,9 @@ def near_height(segments: Floats, z_mm: float, reach_mm: float) -> Floats:
     return near
 
 
+@kernel
 def length_mm(points: Floats) -> float:
     """Length of a polyline (n, 2 or more) seen from above."""
-    return float(_length(points))
-
-
-@kernel
-def _length(points: Floats) -> float:
     return length_between(points, 0, len(points))
 
 

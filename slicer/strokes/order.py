@@ -11,19 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from mdp.kernels.arrays import longs
-from mdp.kernels.kernel import kernel
-from mdp.kernels.sorting import counting_sort
-from mdp.mesh import Floats, Indices, Ints
+from mdp.mesh import Floats, Ints
 from profiles.process import Process
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, WALLS, Bead
 from slicer.geometry.polygons import Polygons, area_mm2, contours
 from slicer.paths import Kind
 from slicer.strokes.path_order import AS_IT_IS, CLOSED, OPEN, order_lines, order_paths
+from slicer.strokes.speed import bead_speed_mm_s
 from slicer.strokes.strokes import Strokes, strokes_of
-from slicer.strokes.travels import NOWHERE, travels
+from slicer.strokes.travels import travels
 
 SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
+NO_GOAL = np.zeros((0, 3))
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 SUPPORTS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
 FIRST = -1  # the number of what comes before all islands: skirt and brim
@@ -46,7 +45,7 @@ def order_beads(
     placed, retracts, detours = list[Bead](), np.zeros(0, np.bool_), dict[int, Floats]()
     if beads:
         first = beads[0].points[0] if tip is None else tip
-        placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
+        placed = _sequence(beads, islands_of(beads, section, support), process, first, tip is None)
         to = np.array([bead.points[0] for bead in placed])
         since = np.array([first, *(bead.points[-1] for bead in placed[:-1])])
         retracts, detours = travels(since, to, section, support, process, skin)
@@ -85,19 +84,24 @@ def _pieces_around(starts: Floats, area: Polygons) -> Ints:
     return pieces
 
 
-def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first: bool) -> list[Bead]:
+def _sequence(beads: Sequence[Bead], islands: Ints, process: Process, first: Floats, support_first: bool) -> list[Bead]:
     """The beads in order, with their points as they are printed."""
     groups: defaultdict[int, list[Bead]] = defaultdict(list)
     for bead, island in zip(beads, islands.tolist(), strict=True):
         groups[island].append(bead)
     order = _island_order(groups, first, support_first)
-    tip, placed = first, list[Bead]()
+    tip, placed = np.append(first, np.nan), list[Bead]()
     for island, after in zip(order, [*order[1:], order[-1]], strict=True):
         phases = _phases(groups[island])
-        goal = NOWHERE if after == island and len(phases) == 1 else _middle(groups[after])[None]
-        placed += _in_phases(phases, tip, goal)
-        tip = placed[-1].points[-1]
+        goal = NO_GOAL if after == island and len(phases) == 1 else np.append(_middle(groups[after]), np.nan)[None]
+        placed += _in_phases(phases, process, tip, goal)
+        tip = _end(placed[-1], -1, process)
     return placed
+
+
+def _end(bead: Bead, end: int, process: Process) -> Floats:
+    """(3,) where a bead begins, end = 0, or ends, end = -1, and its speed."""
+    return np.append(bead.points[end], bead_speed_mm_s(bead, process))
 
 
 def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: bool) -> list[int]:
@@ -108,11 +112,12 @@ def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: b
     islands: list[int] = []
     for stage in sorted(stages):
         places = np.array([_middle(groups[island]) for island in stages[stage]])
-        goal = NOWHERE
+        goal = NO_GOAL
         if stage == 1 and 2 in stages:
             parts = np.array([_middle(groups[island]) for island in stages[2]])
-            goal = parts[np.argmin(((parts - places.mean(axis=0)) ** 2).sum(axis=1))][None]
-        order, _ = order_paths(places, places, np.ones(len(places), np.bool_), first, goal)
+            goal = np.append(parts[np.argmin(((parts - places.mean(axis=0)) ** 2).sum(axis=1))], 0.0)[None]
+        stops = np.c_[places, np.zeros(len(places))]
+        order, _ = order_paths(stops, stops, np.ones(len(places), np.bool_), np.append(first, 0.0), goal)
         islands += [stages[stage][k] for k in order]
         first = _middle(groups[islands[-1]])
     return islands
@@ -127,7 +132,10 @@ def _middle(beads: Sequence[Bead]) -> Floats:
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
-    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together."""
+    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together.
+
+    Inner lines behind no outer wall's seam come with what fills the walls: most are as fast, and lie beside it.
+    """
     leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
     walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
     phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
@@ -139,8 +147,8 @@ def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
             phases[phase][-1].append(bead)
         else:
             phases[phase].append([bead])
-    if walls:
-        phases[0] = _families(walls, leaders)
+    for chain in _families(walls, leaders) if walls else ():
+        phases[FILL if chain[0].line and chain[0].kind is Kind.INNER_WALL and len(chain) == 1 else 0].append(chain)
     return [phases[rank] for rank in sorted(phases)]
 
 
@@ -151,49 +159,21 @@ def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]
     inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
     members: list[list[Bead]] = [[] for _ in leaders]
     starts = np.array([bead.points[0] for bead in inner]).reshape(-1, 2)
-    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, starts)]
-    for bead, k in zip(inner, near, strict=True):
+    near = np.zeros(len(inner), np.int64)
+    if len(leaders) > 1 and inner:
+        import shapely  # as in _pieces_around
+
+        near = which[shapely.STRtree(shapely.points(points)).nearest(shapely.points(starts))]
+    for bead, k in zip(inner, near.tolist(), strict=True):
         members[k].append(bead)
     return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]
-
-
-@kernel
-def _nearest(points: Floats, places: Floats) -> Indices:
-    """The point nearest to each place; points sorted into square cells, searched ring by ring."""
-    low_x, high_x, low_y, high_y = points[0, 0], points[0, 0], points[0, 1], points[0, 1]
-    for k in range(len(points)):
-        low_x, high_x = min(low_x, points[k, 0]), max(high_x, points[k, 0])
-        low_y, high_y = min(low_y, points[k, 1]), max(high_y, points[k, 1])
-    cells = max(int(np.sqrt(len(points) / 2.0)), 1)
-    size = (max(high_x - low_x, high_y - low_y) + 1e-6) / cells
-    cell = longs(len(points), 0)
-    for k in range(len(points)):
-        cell[k] = int((points[k, 0] - low_x) / size) * cells + int((points[k, 1] - low_y) / size)
-    first, order = counting_sort(cell, cells * cells)
-    out: Indices = longs(len(places), 0)
-    for p in range(len(places)):
-        px, py = places[p, 0], places[p, 1]
-        column, row = min(max(int((px - low_x) / size), 0), cells - 1), min(max(int((py - low_y) / size), 0), cells - 1)
-        best, least, ring = 0, np.inf, 0
-        while ring <= cells and (ring - 1) * size < least:
-            for c in range(max(column - ring, 0), min(column + ring, cells - 1) + 1):
-                for r in range(max(row - ring, 0), min(row + ring, cells - 1) + 1):
-                    if max(abs(c - column), abs(r - row)) != ring:
-                        continue
-                    for k in range(first[c * cells + r], first[c * cells + r + 1]):
-                        distance = np.hypot(points[order[k], 0] - px, points[order[k], 1] - py)
-                        if distance < least:
-                            best, least = order[k], distance
-            ring += 1
-        out[p] = best
-    return out
 
 
 def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
     """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
 
     The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
-    print them first would mean to go there and back.
+    print them first would mean to go there and back. Lines among them, which begin beside nothing, stay by themselves.
     """
     chain, others = [leader], list[Bead]()
     for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
@@ -202,28 +182,31 @@ def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
         chain.append(equal[0])
         others += equal[1:]
     yield sorted(chain, key=lambda bead: bead.rank)
-    if others:
-        yield from _chains(others[0], others[1:])
+    yield from ([bead] for bead in others if bead.line)
+    loops = [bead for bead in others if not bead.line]
+    if loops:
+        yield from _chains(loops[0], loops[1:])
 
 
-def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], tip: Floats, goal: Floats) -> list[Bead]:
+def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], process: Process, tip: Floats, goal: Floats) -> list[Bead]:
     """The phases of an island one after the other, each once more when it is known where the next one begins."""
-    goals = [NOWHERE] * (len(phases) - 1) + [goal]
+    goals = [NO_GOAL] * (len(phases) - 1) + [goal]
     for _ in range(min(len(phases), ROUNDS)):
         runs, at = list[list[Bead]](), tip
         for phase, end in zip(phases, goals, strict=True):
-            runs.append(_short_order(phase, at, end))
-            at = runs[-1][-1].points[-1]
-        goals = [*(np.ascontiguousarray(run[0].points[:1]) for run in runs[1:]), goal]
+            runs.append(_short_order(phase, process, at, end))
+            at = _end(runs[-1][-1], -1, process)
+        goals = [*(_end(run[0], 0, process)[None] for run in runs[1:]), goal]
     return [bead for run in runs for bead in run]
 
 
-def _short_order(items: Sequence[Sequence[Bead]], tip: Floats, goal: Floats) -> list[Bead]:
+def _short_order(items: Sequence[Sequence[Bead]], process: Process, tip: Floats, goal: Floats) -> list[Bead]:
     """Chains of beads in a short order from the tip on, with their points as they are printed."""
     lines = [item[0].points if len(item) == 1 else np.array([item[0].points[0], item[-1].points[-1]]) for item in items]
     fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
+    speeds = np.array([[bead_speed_mm_s(item[end], process) for end in (0, -1)] for item in items])
     placed: list[Bead] = []
-    for k, pieces in order_lines(lines, fixed, [_freedom(item) for item in items], tip, goal):
+    for k, pieces in order_lines(lines, speeds, fixed, [_freedom(item) for item in items], tip, goal):
         placed += items[k] if len(items[k]) > 1 else [replace(items[k][0], points=piece) for piece in pieces]
     return placed
 

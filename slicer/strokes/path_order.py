@@ -1,5 +1,8 @@
 """Path order: a short order of paths that each have a start and an end: greedy nearest neighbour, then exchanges.
 
+A change of speed on the way from one path to the next counts as much as CHANGE_MM of travel, so that paths of one speed follow
+each other where that is no long way round.
+
 Exchanges are the classic ones of the travelling salesman's problem: 2-opt (a stretch of the order reversed) and Or-opt (up to
 three neighbours moved elsewhere, reversed or not), with true lengths also where a path must not be reversed.
 
@@ -15,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, longs, table
-from mdp.kernels.kernel import helper, kernel, no_nrt
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 
+CHANGE_MM = 3.0  # with 15 mm prints of many small islands take 1 % longer: most travels also retract
 TRIES = 2  # the order depends on where lines begin, and that on the order
 WORTH_MM = 5.0  # travel that taking a line in two has to save: a bead that ends and begins once more shows
 CLOSED, OPEN, AS_IT_IS = 2, 1, 0  # what may be done with a line: begun anywhere, begun anywhere in two pieces, nothing
@@ -33,26 +37,24 @@ Order = tuple[Indices, NDArray[np.bool_]]
 
 
 def order_lines(
-    lines: Sequence[Floats], fixed: NDArray[np.bool_], freedom: Sequence[int], tip: Floats, goal: Floats
+    lines: Sequence[Floats], speeds: Floats, fixed: NDArray[np.bool_], freedom: Sequence[int], tip: Floats, goal: Floats
 ) -> list[tuple[int, list[Floats]]]:
     """Lines (n, 2) in a short order from the tip on, as order_paths, begun where their freedom allows it: the number of each and
     the pieces (n, 2) of it as they are printed.
 
-    fixed: (n,) must not be reversed; tip: (2,) where all begins; goal: (1, 2) where it ends up, or (0, 2).
+    speeds: (n, 2) with which each begins and ends; fixed: (n,) must not be reversed; tip: (3,) where and with which speed all
+    begins; goal: (1, 3) where and with which it ends up, or (0, 3).
     """
-    begun, held, cut = list(lines), fixed.copy(), [0] * len(lines)
-    if any(freedom):
-        for k, free in enumerate(freedom):
-            if free == CLOSED:
-                begun[k] = _begin_at(lines[k], _corner(lines[k], tip, tip, True))
+    held, cut, pairs = fixed.copy(), [0] * len(lines), zip(lines, freedom, strict=True)
+    begun = [_begin_at(line, _corner(line, tip[:2], tip[:2], True)) if free == CLOSED else line for line, free in pairs]
     for _ in range(TRIES if any(freedom) else 1):
         entries, exits = np.array([line[0] for line in begun]), np.array([line[-1] for line in begun])
-        order, flips = order_paths(entries, exits, held, tip, goal)
-        since = tip
+        order, flips = order_paths(np.c_[entries, speeds[:, 0]], np.c_[exits, speeds[:, 1]], held, tip, goal)
+        since = tip[:2]
         for step, k in enumerate(order.tolist()):
             if freedom[k]:
                 after = order[step + 1] if step + 1 < len(order) else -1
-                to = begun[after][-1 if flips[step + 1] else 0] if after >= 0 else goal[0] if len(goal) else since
+                to = begun[after][-1 if flips[step + 1] else 0] if after >= 0 else goal[0, :2] if len(goal) else since
                 at = _corner(lines[k], since, to, freedom[k] == CLOSED)
                 begun[k] = _begin_at(lines[k], at)
                 if freedom[k] == OPEN:
@@ -99,21 +101,28 @@ def _nearer_from_its_end(line: Floats, since: Floats, to: Floats) -> bool:
 
 @kernel
 def order_paths(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], tip: Floats, goal: Floats) -> Order:
-    """Order and reversals of n paths; starts, ends: (n, 2) mm; fixed: (n,) must not be reversed.
+    """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) must not be reversed.
 
-    tip: (2,) where all begins; goal: (1, 2) where the order should end up, or (0, 2).
+    tip: (3,) where and with which speed all begins; goal: (1, 3) where and with which the order should end up, or (0, 3).
     """
     n = len(starts)
-    x, y = tip[0], tip[1]
-    order, flips = _greedy(starts, ends, fixed, x, y)
-    sequence = _Sequence(order, flips, flags(n), table(n + len(goal), 4), x, y)
+    given = table(2 * n + 1, 3)
+    sequence = _Sequence(longs(n, 0), flags(n), flags(n), table(2 * n + 1 + len(goal), 3))
+    order, flips, at = sequence.order, sequence.flips, sequence.at
+    for axis in range(3):
+        given[0, axis] = tip[axis]
+        for k in range(n):
+            given[2 * k + 1, axis], given[2 * k + 2, axis] = starts[k, axis], ends[k, axis]
+    _greedy(given, fixed, order, flips)
+    for axis in range(3):
+        at[0, axis] = tip[axis]
+        for k in range(n):
+            into = 2 * order[k] + 1 + int(flips[k])
+            at[2 * k + 1, axis], at[2 * k + 2, axis] = given[into, axis], given[4 * order[k] + 3 - into, axis]
+        for k in range(len(goal)):
+            at[2 * n + 1, axis] = goal[k, axis]
     for k in range(n):
-        i, into, out = order[k], 2 * int(flips[k]), 2 - 2 * int(flips[k])
-        sequence.fixed[k] = fixed[i]
-        for axis in range(2):
-            sequence.ends[k, into + axis], sequence.ends[k, out + axis] = starts[i, axis], ends[i, axis]
-    for k in range(len(goal)):
-        sequence.ends[n + k, 0], sequence.ends[n + k, 1] = goal[k, 0], goal[k, 1]
+        sequence.fixed[k] = fixed[order[k]]
     reach = max(REACH * MANY // n, 20) if n > MANY else REACH
     for _ in range(FEW_PASSES if n > MANY else PASSES):
         gained = _reverse_stretches(sequence, reach)
@@ -123,64 +132,69 @@ def order_paths(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], tip: Flo
     return order, flips
 
 
-@helper
-def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float) -> Order:
-    """The order that goes to the nearest path each time."""
-    order, flips = longs(len(starts), 0), flags(len(starts))
+@no_nrt
+def _greedy(given: Floats, fixed: NDArray[np.bool_], order: Indices, flips: NDArray[np.bool_]) -> None:
+    """Fills in the order that goes to the nearest path each time; given: as in _Sequence, in the order of the numbers."""
     for k in range(len(order)):
         order[k] = k
+    since = 0
     for step in range(len(order)):
         best, flip, least = step, False, np.inf
         for k in range(step, len(order)):
             i = order[k]
-            distance = (starts[i, 0] - x) ** 2 + (starts[i, 1] - y) ** 2
-            if distance < least or (distance == least and i < order[best]):
-                best, flip, least = k, False, distance
+            way = _way(given, since, 2 * i + 1)
+            if way < least or (way == least and i < order[best]):
+                best, flip, least = k, False, way
             if not fixed[i]:
-                distance = (ends[i, 0] - x) ** 2 + (ends[i, 1] - y) ** 2
-                if distance < least:
-                    best, flip, least = k, True, distance
+                way = _way(given, since, 2 * i + 2)
+                if way < least:
+                    best, flip, least = k, True, way
         i = order[best]
         order[step], order[best] = i, order[step]
         flips[step] = flip
-        x, y = (starts[i, 0], starts[i, 1]) if flip else (ends[i, 0], ends[i, 1])
-    return order, flips
+        since = 2 * i + (1 if flip else 2)
+
+
+@no_nrt
+def _way(at: Floats, a: int, b: int) -> float:
+    """Travel from one place to another, and CHANGE_MM where their speeds differ; no travel where b is no place."""
+    if b >= len(at):
+        return 0.0
+    travel = np.hypot(at[b, 0] - at[a, 0], at[b, 1] - at[a, 1])
+    return float(travel + CHANGE_MM) if at[b, 2] != at[a, 2] else float(travel)
 
 
 class _Sequence(NamedTuple):
-    """Paths in their present order from the place x, y on.
+    """Paths in their present order.
 
-    order: (n,) number of each path; flips: (n,) reversed; fixed: (n,) must not be; ends: (n + goals, 4) in x, in y, out x,
-    out y of each path as it runs now, then of the goal.
+    order: (n,) number of each path; flips: (n,) reversed; fixed: (n,) must not be; at: (2 n + 1 + goals, 3) places with their
+    speeds: where all begins, then where each path is entered and left as it runs now, then the goal.
     """
 
     order: Indices
     flips: NDArray[np.bool_]
     fixed: NDArray[np.bool_]
-    ends: Floats
-    x: float
-    y: float
+    at: Floats
 
 
-@helper
+@no_nrt
 def _reverse_stretches(sequence: _Sequence, reach: int) -> float:
     """2-opt: reverses stretches where that saves travel; returns how much."""
-    n, ends = len(sequence.order), sequence.ends
+    n, at, fixed = len(sequence.order), sequence.at, sequence.fixed
     gained = 0.0
     for i in range(n):
-        px, py = _exit(sequence, i - 1)
-        before = _gap(sequence, i - 1, i)
+        before = _way(at, 2 * i, 2 * i + 1)
+        last = 2 * i + (2 if fixed[i] else 1)  # where the reversed stretch is left
         forth = back = 0.0
-        inner_x, inner_y = 0.0, 0.0
+        inner = last
         for j in range(i, min(i + reach, n)):
-            in_x, in_y, out_x, out_y = _reversed_ends(sequence, j)
+            into, out = (2 * j + 1, 2 * j + 2) if fixed[j] else (2 * j + 2, 2 * j + 1)  # of path j in the reversed stretch
             if j > i:
-                forth += _gap(sequence, j - 1, j)
-                back += np.hypot(inner_x - out_x, inner_y - out_y)
-            inner_x, inner_y = in_x, in_y
-            _, _, last_x, last_y = _reversed_ends(sequence, i)
-            after = 0.0 if j + 1 == len(ends) else np.hypot(ends[j + 1, 0] - last_x, ends[j + 1, 1] - last_y)
-            change = before + forth + _gap(sequence, j, j + 1) - np.hypot(in_x - px, in_y - py) - back - after
+                forth += _way(at, 2 * j, 2 * j + 1)
+                back += _way(at, out, inner)
+            inner = into
+            after = _way(at, 2 * j + 2, 2 * j + 3)
+            change = before + forth + after - _way(at, 2 * i, into) - back - _way(at, last, 2 * j + 3)
             if change > GAIN_MM:
                 _reverse(sequence, i, j)
                 gained += change
@@ -188,28 +202,24 @@ def _reverse_stretches(sequence: _Sequence, reach: int) -> float:
     return gained
 
 
-@helper
+@no_nrt
 def _move_neighbours(sequence: _Sequence, reach: int) -> float:
     """Or-opt: moves up to MOST_MOVED neighbours elsewhere where that saves travel; returns how much."""
-    n, ends = len(sequence.order), sequence.ends
+    n, at = len(sequence.order), sequence.at
     gained = 0.0
     for i in range(n):
         for many in range(1, min(MOST_MOVED, n - i) + 1):
             last = i + many - 1
-            saved = _gap(sequence, i - 1, i) + _gap(sequence, last, last + 1)
-            if last + 1 < len(ends):
-                fx, fy = _exit(sequence, i - 1)
-                saved -= np.hypot(ends[last + 1, 0] - fx, ends[last + 1, 1] - fy)
+            into, out, after = 2 * i + 1, 2 * last + 2, 2 * last + 3
+            saved = _way(at, 2 * i, into) + _way(at, out, after) - _way(at, 2 * i, after)
             if saved <= GAIN_MM:
                 continue
             best, to = GAIN_MM, -2
             for k in range(max(i - reach, -1), min(last + reach, n)):  # put between k and k + 1
                 if i - 1 <= k <= last:
                     continue
-                kx, ky = _exit(sequence, k)
-                added = np.hypot(ends[i, 0] - kx, ends[i, 1] - ky) - _gap(sequence, k, k + 1)
-                if k + 1 < len(ends):
-                    added += np.hypot(ends[k + 1, 0] - ends[last, 2], ends[k + 1, 1] - ends[last, 3])
+                left = 2 * k + 2
+                added = _way(at, left, into) + _way(at, out, left + 1) - _way(at, left, left + 1)
                 if saved - added > best:
                     best, to = saved - added, k
             if to == -2:
@@ -220,39 +230,16 @@ def _move_neighbours(sequence: _Sequence, reach: int) -> float:
     return gained
 
 
-@helper
-def _exit(sequence: _Sequence, i: int) -> tuple[float, float]:
-    """Where path i is left; i = -1: where all begins."""
-    return (sequence.x, sequence.y) if i < 0 else (sequence.ends[i, 2], sequence.ends[i, 3])
-
-
-@helper
-def _gap(sequence: _Sequence, i: int, j: int) -> float:
-    """Travel from path i to path j as they run now; i = -1: from where all begins; j = n: no travel."""
-    if j == len(sequence.ends):
-        return 0.0
-    x, y = _exit(sequence, i)
-    return float(np.hypot(sequence.ends[j, 0] - x, sequence.ends[j, 1] - y))
-
-
-@helper
-def _reversed_ends(sequence: _Sequence, k: int) -> tuple[float, float, float, float]:
-    """Where path k is entered and left when the stretch around it runs the other way."""
-    ends = sequence.ends
-    if sequence.fixed[k]:
-        return ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
-    return ends[k, 2], ends[k, 3], ends[k, 0], ends[k, 1]
-
-
-@helper
+@no_nrt
 def _reverse(sequence: _Sequence, i: int, j: int) -> None:
     """The stretch i..j the other way round."""
     _mirror(sequence, i, j)
+    at = sequence.at
     for k in range(i, j + 1):
         if not sequence.fixed[k]:
             sequence.flips[k] = not sequence.flips[k]
-            for axis in range(2):
-                sequence.ends[k, axis], sequence.ends[k, 2 + axis] = sequence.ends[k, 2 + axis], sequence.ends[k, axis]
+            for axis in range(3):
+                at[2 * k + 1, axis], at[2 * k + 2, axis] = at[2 * k + 2, axis], at[2 * k + 1, axis]
 
 
 @no_nrt
@@ -268,11 +255,12 @@ def _rotate(sequence: _Sequence, i: int, last: int, to: int) -> None:
 @no_nrt
 def _mirror(sequence: _Sequence, i: int, j: int) -> None:
     """The paths i..j in reverse order, each as it runs."""
-    order, flips, fixed, ends, _, _ = sequence
+    order, flips, fixed, at = sequence
     while i < j:
         order[i], order[j] = order[j], order[i]
         flips[i], flips[j] = flips[j], flips[i]
         fixed[i], fixed[j] = fixed[j], fixed[i]
-        for k in range(4):
-            ends[i, k], ends[j, k] = ends[j, k], ends[i, k]
+        for axis in range(3):
+            for end in range(1, 3):
+                at[2 * i + end, axis], at[2 * j + end, axis] = at[2 * j + end, axis], at[2 * i + end, axis]
         i, j = i + 1, j - 1

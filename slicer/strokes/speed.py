@@ -4,7 +4,7 @@ A layer that would be done too soon is slowed down so that it has time to set; t
 for itself on bridges and overhangs.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,12 +13,28 @@ from mdp.mesh import Floats
 from profiles.material import Material
 from profiles.process import Process
 from profiles.profile import Profile
+from slicer.bead import Bead
 from slicer.geometry.polyline import length_mm
 from slicer.paths import KINDS, Kind, bead_area_mm2
 from slicer.strokes.strokes import RINGS, Strokes
 
 KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
 BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
+SPEED_KEYS = {
+    Kind.OUTER_WALL: "outer_wall_speed_mm_s",
+    Kind.INNER_WALL: "inner_wall_speed_mm_s",
+    Kind.OVERHANG: "overhang_75_speed_mm_s",
+    Kind.GAP: "gap_speed_mm_s",
+    Kind.INFILL: "infill_speed_mm_s",
+    Kind.SKIN: "skin_speed_mm_s",
+    Kind.TOP_SKIN: "top_skin_speed_mm_s",
+    Kind.BRIDGE: "bridge_speed_mm_s",
+    Kind.IRONING: "ironing_speed_mm_s",
+    Kind.SKIRT: "first_layer_speed_mm_s",
+    Kind.PURGE: "first_layer_speed_mm_s",
+    Kind.SUPPORT: "support_speed_mm_s",
+    Kind.SUPPORT_INTERFACE: "support_interface_speed_mm_s",
+}
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
@@ -30,18 +46,18 @@ def speeds_mm_s(
     strokes: Strokes,
     profile: Profile,
     height_mm: float,
-    fixed_mm_s: Mapping[Kind, float] | None,
+    kind_mm_s: Floats | None,
     flow: float,
     of_places: Sequence[Process] = (),
 ) -> Floats:
-    """(k,) speeds of a layer's strokes; fixed_mm_s replaces the process's speeds by kind, flow multiplies every stroke's flow.
-    of_places: the processes of the places in which other settings hold; none where fixed_mm_s holds.
+    """(k,) speeds of a layer's strokes; kind_mm_s, by number of the kind, replaces the process's speeds, flow multiplies every
+    stroke's flow. of_places: the processes of the places in which other settings hold; none where kind_mm_s holds.
 
     Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
     below least_speed_mm_s.
     """
     process = profile.process
-    asked = _of_strokes(strokes, process) if fixed_mm_s is None else _by_kind(fixed_mm_s)[strokes.kind]
+    asked = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
     for number, own in enumerate(of_places, start=1):
         asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
     speeds = steady(np.minimum(asked, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
@@ -81,17 +97,21 @@ def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
     return steadied
 
 
-def _by_kind(speeds: Mapping[Kind, float]) -> Floats:
-    return np.array([speeds[kind] for kind in KINDS])
-
-
 def _of_strokes(strokes: Strokes, process: Process) -> Floats:
     """The speed of its kind, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
-    usual = _by_kind(stroke_speeds(process))[strokes.kind]
+    usual = stroke_speeds(process)[strokes.kind]
     hanging = np.array([np.inf, *(getattr(process, key) for key in BY_SHARE), process.bridge_speed_mm_s])[strokes.overhang]
     small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
     lowered = np.minimum(usual, np.where(strokes.overhang > 0, hanging, small))
     return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
+
+
+def bead_speed_mm_s(bead: Bead, process: Process) -> float:
+    """Speed of a bead that neither overhangs nor is cooled by waiting: as in _of_strokes, before there are strokes."""
+    if bead.over_infill:
+        return process.infill_bridge_speed_mm_s
+    usual: float = getattr(process, SPEED_KEYS[bead.kind])
+    return min(usual, process.small_wall_speed_mm_s) if bead.kind in RINGS and bead.is_small(process.small_wall_mm) else usual
 
 
 def kinds_apart(processes: Sequence[Process]) -> list[Kind]:
@@ -100,8 +120,8 @@ def kinds_apart(processes: Sequence[Process]) -> list[Kind]:
     def differ(*keys: str) -> bool:
         return len({tuple(getattr(process, key) for key in keys) for process in processes}) > 1
 
-    speeds = [stroke_speeds(process) for process in processes]
-    kinds = [kind for kind in KINDS if len({own[kind] for own in speeds}) > 1]
+    speeds = np.array([stroke_speeds(process) for process in processes])
+    kinds = [KINDS[k] for k in np.flatnonzero(np.ptp(speeds, axis=0))]
     kinds += [*RINGS, Kind.GAP, Kind.OVERHANG] if differ("small_wall_speed_mm_s", "bridge_speed_mm_s", *BY_SHARE) else []
     return [*kinds, Kind.BRIDGE] if differ("infill_bridge_speed_mm_s") else kinds
 
@@ -163,42 +183,29 @@ def own_fans(strokes: Strokes, material: Material, factor: float, layer_fan: flo
     return np.where(strokes.is_of(*HANGING), own, leaning)
 
 
-def stroke_speeds(process: Process) -> dict[Kind, float]:
-    """mm/s by kind of bead."""
-    return {
-        Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
-        Kind.INNER_WALL: process.inner_wall_speed_mm_s,
-        Kind.OVERHANG: process.overhang_75_speed_mm_s,
-        Kind.GAP: process.gap_speed_mm_s,
-        Kind.INFILL: process.infill_speed_mm_s,
-        Kind.SKIN: process.skin_speed_mm_s,
-        Kind.TOP_SKIN: process.top_skin_speed_mm_s,
-        Kind.BRIDGE: process.bridge_speed_mm_s,
-        Kind.IRONING: process.ironing_speed_mm_s,
-        Kind.SKIRT: process.first_layer_speed_mm_s,
-        Kind.PURGE: process.first_layer_speed_mm_s,
-        Kind.SUPPORT: process.support_speed_mm_s,
-        Kind.SUPPORT_INTERFACE: process.support_interface_speed_mm_s,
-    }
+def stroke_speeds(process: Process) -> Floats:
+    """(number of kinds,) mm/s of each kind of bead."""
+    return np.array([getattr(process, SPEED_KEYS[kind]) for kind in KINDS])
 
 
-def first_layer_speeds(process: Process) -> dict[Kind, float]:
-    """mm/s by kind of the first layer on the plate."""
-    inside = process.first_layer_infill_speed_mm_s or process.first_layer_speed_mm_s
-    return dict.fromkeys(Kind, process.first_layer_speed_mm_s) | dict.fromkeys(INSIDE, inside)
+def first_layer_speeds(process: Process) -> Floats:
+    """(number of kinds,) mm/s of the first layer on the plate."""
+    usual = process.first_layer_speed_mm_s
+    inside = process.first_layer_infill_speed_mm_s or usual
+    return np.array([inside if kind in INSIDE else usual for kind in KINDS])
 
 
-def stroke_accelerations(profile: Profile, first_layer: bool) -> dict[Kind, float] | None:
-    """mm/s2 by kind; None where the process sets no acceleration at all, so that the firmware's own rule."""
+def stroke_accelerations(profile: Profile, first_layer: bool) -> Floats:
+    """(number of kinds,) mm/s2; inf where the process sets no acceleration at all, so that the firmware's own rule."""
     process = profile.process
     if not sets_acceleration(process):
-        return None
+        return np.full(len(KINDS), np.inf)
     usual = process.acceleration_mm_s2 or axes_mm_s2(profile)
     if first_layer:
-        return dict.fromkeys(Kind, process.first_layer_acceleration_mm_s2 or usual)
+        return np.full(len(KINDS), process.first_layer_acceleration_mm_s2 or usual)
     infill = process.infill_acceleration_mm_s2 or usual
     hanging = process.bridge_acceleration_mm_s2 or usual
-    return dict.fromkeys(Kind, usual) | {
+    others = {
         Kind.OUTER_WALL: process.outer_wall_acceleration_mm_s2 or usual,
         Kind.INFILL: infill,
         Kind.SUPPORT: infill,
@@ -206,11 +213,12 @@ def stroke_accelerations(profile: Profile, first_layer: bool) -> dict[Kind, floa
         Kind.BRIDGE: hanging,
         Kind.OVERHANG: hanging,
     }
+    return np.array([others.get(kind, usual) for kind in KINDS])
 
 
-def travel_mm_s2(profile: Profile) -> float | None:
-    """mm/s2 of travels; None as for strokes."""
-    return (profile.process.travel_acceleration_mm_s2 or axes_mm_s2(profile)) if sets_acceleration(profile.process) else None
+def travel_mm_s2(profile: Profile) -> float:
+    """mm/s2 of travels; inf as for strokes."""
+    return (profile.process.travel_acceleration_mm_s2 or axes_mm_s2(profile)) if sets_acceleration(profile.process) else np.inf
 
 
 def sets_acceleration(process: Process) -> bool:

@@ -108,9 +108,6 @@ def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Fl
         if bead.course is not None:
             way = points[starts[k] : starts[k + 1]]
             way[:, 2] = _widths_at(way, bead.course)
-    ends = points[starts[1:] - 1, :2] - points[starts[:-1], :2]
-    closed = np.hypot(ends[:, 0], ends[:, 1]) <= width_mm  # a seam gap leaves a wall a little open
-    small = is_of(kind, RINGS) & closed & (lengths_mm(points, starts) <= small_wall_mm)
     passed = [approaches.get(k, points[:0, :2]) for k in range(len(beads))]
     return Strokes(
         points=points,
@@ -120,7 +117,7 @@ def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Fl
         flow=np.array([bead.flow for bead in beads]),
         overhang=np.zeros(len(beads), np.int8),
         over_infill=np.array([bead.over_infill for bead in beads], dtype=np.bool_),
-        small=small,
+        small=np.array([bead.kind in RINGS and bead.is_small(small_wall_mm) for bead in beads], dtype=np.bool_),
         varies=np.array([bead.course is not None for bead in beads], dtype=np.bool_),
         retract=retract,
         place=np.zeros(len(beads), np.int16),

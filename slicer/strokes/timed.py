@@ -1,6 +1,6 @@
 """Timed: the strokes of a layer in order get their speeds and the layer its fan, and become the table that is printed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,13 +24,13 @@ def timed(
     strokes: Strokes,
     profile: Profile,
     height_mm: float,
-    fixed_mm_s: Mapping[Kind, float] | None,
+    kind_mm_s: Floats | None,
     flow: float,
     of_places: Sequence[Process] = (),
 ) -> tuple[Strokes, Floats]:
     """The strokes, in pieces of one width and simplified, with their (k,) speeds; parameters as in speeds_mm_s."""
     strokes = in_pieces(strokes, height_mm)
-    speeds = speeds_mm_s(strokes, profile, height_mm, fixed_mm_s, flow, of_places)
+    speeds = speeds_mm_s(strokes, profile, height_mm, kind_mm_s, flow, of_places)
     corners = mark_corners(strokes.points, strokes.starts, profile.process.resolution_mm)
     strokes = replace(strokes, points=strokes.points[corners], starts=np.append(0, np.cumsum(corners))[strokes.starts])
     eased = _without_short_steps(strokes)

@@ -44,10 +44,7 @@ def travels(
     """
     retracts: Mask = np.hypot(*(to - since).T) >= process.retract_travel_mm
     detours: dict[int, Floats] = {}
-    widths_mm = (
-        min(process.line_width_mm, outer_wall_width_mm(process)),
-        process.support_line_width_mm or process.line_width_mm,
-    )
+    widths_mm = (min(process.line_width_mm, outer_wall_width_mm(process)), process.support_line_width_mm or process.line_width_mm)
     if retracts.any():
         areas = zip((section, support), widths_mm, strict=True)
         inside = [Combing(area, width) for area, width in areas if not area.is_empty()]
@@ -130,10 +127,7 @@ def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, 
         n = _pull_taut(safe, path, n)
         if n == 0:
             return 0
-    total = 0.0
-    for i in range(1, n):
-        total += np.hypot(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
-    return n if total <= longest else 0
+    return n if length_between(path, 0, n) <= longest else 0
 
 
 @helper

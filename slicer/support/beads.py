@@ -18,7 +18,7 @@ from mdp.kernels.arrays import flags, longs, table
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from profiles.process import Process
-from slicer.bead import OUTSIDE, Bead, spacing_mm, with_line_width
+from slicer.bead import OUTSIDE, Bead, spacing_mm, support_cell_mm, with_line_width
 from slicer.fill.lines import clip_pattern, parallel_lines
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.clip import rotation_2d, runs_within
@@ -39,7 +39,6 @@ from slicer.geometry.polyline import Segment, length_mm
 from slicer.paths import Kind
 from slicer.sectioning import Sections
 from slicer.support.reachable import SMOOTH_MM
-from slicer.support.sturdy import support_cell_mm
 from slicer.support.support import Supports
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag

@@ -21,7 +21,7 @@ from slicer.overhangs import LEAST_MM2
 from slicer.sectioning import Sections, marked_areas, no_seam_segments
 from slicer.support.reachable import ReachableAreas, blocked_areas, near_table, reachable_areas, support_reach_mm
 from slicer.support.sturdy import hollow_places
-from slicer.support.support import Supports, find_missed, grow, stand, widen_foot
+from slicer.support.support import Supports, find_missed, grow, seen_from_above, stand, widen_foot
 
 AROUND_MM = 3.0  # support handed down may go so much farther aside than its lean takes it
 SHALLOW_MM = 1.2  # so far below a plane the middles of support that can come up to it lie
@@ -209,7 +209,8 @@ def _hand_down(room: HandedDown, missed: Sequence[Polygons], later: Sequence[Han
             for layer, area in patch.begins(plane, len(areas.reachable)).items():
                 begins.setdefault(layer, []).append(area)
     wanted = [Polygons()] * len(missed) if sections.on_platform else missed
-    bodies, contacts = grow(wanted, {layer: union(places) for layer, places in begins.items()}, areas)
+    begin = {layer: union(places) for layer, places in begins.items()}
+    bodies, contacts = grow(wanted, begin, areas, union([seen_from_above(wanted), *begin.values()]))
     for plane, upper in zip(planes, later, strict=True):
         bodies = keep_off(bodies, upper.patches, plane, sections.process.support_distance_mm)
     patches = () if sections.on_platform else _patches(room, bodies, wanted)
@@ -254,7 +255,7 @@ def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supp
     both = unite_layers(printed, _padded(own.areas, count))
     if sections.on_platform:
         if not sections.on_raft:
-            foot = widen_foot(printed[0], whole, (room.window ^ sections.plate) - room.shut)
+            foot = widen_foot(printed, whole, (room.window ^ sections.plate) - room.shut)
             both[0] = union([both[0], foot])
     else:
         low = _hanging_low(areas, missed)

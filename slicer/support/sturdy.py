@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from math import pi, radians, sqrt, tan
 
 from profiles.process import Process
-from slicer.bead import spacing_mm
+from slicer.bead import spacing_mm, support_cell_mm
 from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, union
 from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
 
 SLENDER = 12.0  # largest height above a piece, in diameters of the piece; taller support sways under the nozzle
-HALVINGS = 4  # of the way from what a piece lacks all round to its diameter: how far it grows on the sides that are free
+TRIES = 5  # at most, of a distance over which a piece grows into the room beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,39 +69,40 @@ def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int
     if lacking_mm <= 0.0 and not grown:
         return Piece(thin, thin, top_mm, bounds)
     room = dilate(areas.reachable[m] ^ bounding_box(thin, least_mm + areas.radius_mm), areas.radius_mm)
-    lean_mm, near = float(areas.lean_mm[m + 1]), room ^ bounding_box(thin, least_mm)
-    # The original area of the pieces above keeps the support below that it already has; only their added area needs more.
-    hung = [offset(piece.area, -lean_mm) - (piece.thin - dilate(thin, lean_mm)) for piece in grown]
-    area = _touching(thin, union(hung) ^ near) if hung else thin
+    area = thin
+    if grown:
+        lean_mm, near = float(areas.lean_mm[m + 1]), room ^ bounding_box(thin, least_mm)
+        beneath = dilate(thin, lean_mm)
+        # The original area of the pieces above keeps the support below that it already has; only their added area needs more.
+        hung = union([offset(piece.area, -lean_mm) - (piece.thin - beneath) for piece in grown])
+        area = _with_touching(thin, hung ^ near, thin)
     if lacking_mm > 0.0:
         area = _filled(area, thin, room, lacking_mm, least_mm)
     return Piece(thin, area.simplify(COARSE_MM), top_mm, bounds)
 
 
-def _touching(thin: Polygons, about: Polygons) -> Polygons:
-    """A thin piece united with those islands of an area that overlap it."""
-    return union([thin, *(piece for piece in islands(about) if not (piece ^ thin).is_empty())])
+def _with_touching(area: Polygons, about: Polygons, thin: Polygons) -> Polygons:
+    """An area with a thin piece in it united with those islands of another that overlap the piece."""
+    pieces = [about] if about.num_contour() == 1 else islands(about)
+    return union([area, *(piece for piece in pieces if not (piece ^ thin).is_empty())])
 
 
 def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
     """An area united with the room around a thin piece until it is as large as a circle of diameter least_mm.
 
-    lacking_mm: the radius that the piece lacks, the first distance to try. Growth ends at least_mm from the piece.
+    lacking_mm: the radius that the piece lacks, the first distance to try. Growth ends least_mm from the piece.
     """
-    least_mm2, near_mm, far_mm = 0.25 * pi * least_mm**2, lacking_mm, least_mm
-    if area.area() >= least_mm2:
-        return area
-    filled = area + _touching(thin, dilate(thin, near_mm) ^ room)
-    if filled.area() >= least_mm2:
-        return filled
-    filled = area + _touching(thin, dilate(thin, far_mm) ^ room)
-    for _ in range(HALVINGS if filled.area() > least_mm2 else 0):
-        middle_mm = 0.5 * (near_mm + far_mm)
-        less = area + _touching(thin, dilate(thin, middle_mm) ^ room)
-        if less.area() >= least_mm2:
-            far_mm, filled = middle_mm, less
-        else:
-            near_mm = middle_mm
+    least_mm2, distance_mm, step_mm, before_mm2 = 0.25 * pi * least_mm**2, lacking_mm, lacking_mm, thin.area()
+    filled, mm2 = area, area.area()
+    for _ in range(TRIES if mm2 < least_mm2 else 0):
+        filled = _with_touching(area, dilate(thin, distance_mm) ^ room, thin)
+        mm2 = filled.area()
+        if mm2 >= least_mm2 or distance_mm >= least_mm:
+            break
+        # What is missing asks for as many more steps, if each adds as much as the last one did.
+        more_mm = 1.02 * step_mm * (least_mm2 - mm2) / max(mm2 - before_mm2, 0.1 * mm2)
+        step_mm, before_mm2 = min(more_mm, least_mm - distance_mm), mm2
+        distance_mm += step_mm
     return filled
 
 
@@ -136,18 +137,19 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
     for m in range(len(printed) - 1, -1, -1):
         filling: list[Polygons] = []
         empty: list[Polygons] = []
+        under_lines = filled + dense_above
         for piece in islands(printed[m]):
-            x0, y0, x1, y1 = piece.bounds()
-            is_small = max(x1 - x0, y1 - y0) <= 2.0 * walls_mm + cell_mm
-            is_narrow = is_small or offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
-            lying = dense_above if is_narrow else filled + dense_above
-            has_lines = not is_small and not (piece ^ lying).is_empty()
+            lying = piece ^ under_lines
+            has_lines = not lying.is_empty() and _has_lines(piece, lying, dense_above, walls_mm, cell_mm)
             (filling if has_lines else empty).append(piece)
         hollow[m], filled, dense_above = union(empty), union(filling), dense[m]
     return hollow
 
 
-def support_cell_mm(process: Process) -> float:
-    """The distance between sparse lines of support, mm, which dense lines on top of them have to span."""
-    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
-    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density
+def _has_lines(piece: Polygons, lying: Polygons, dense_above: Polygons, walls_mm: float, cell_mm: float) -> bool:
+    """Whether lines are printed inside a piece; lying: its area under lines of the layer above."""
+    x0, y0, x1, y1 = piece.bounds()
+    if max(x1 - x0, y1 - y0) <= 2.0 * walls_mm + cell_mm:
+        return False
+    is_narrow = offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
+    return not is_narrow or not (lying ^ dense_above).is_empty()

@@ -8,7 +8,19 @@ import numpy as np
 
 from mdp.clearance import least_tip_height_mm
 from mdp.mesh import Floats
-from slicer.geometry.polygons import Polygons, bounding_box, closing, contours, islands, larger, offset, opening, union
+from slicer.geometry.polygons import (
+    Polygons,
+    bounding_box,
+    close_loop,
+    closing,
+    contours,
+    islands,
+    larger,
+    offset,
+    opening,
+    union,
+)
+from slicer.geometry.polyline import length_mm
 from slicer.heights import SAME_MM
 from slicer.overhangs import LEAST_MM2, Overhang
 from slicer.paths import Unsupported
@@ -41,8 +53,10 @@ SLACK_MM = 0.01  # what rounding may add to the lean
 LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
+HIGH = 4.0  # widths of the foot: what stands higher on it counts no more
+UNDER = (0.2, 0.5)  # of a disc's radius: how far it may stand aside of what it holds, no farther than needed
 MOST = 0.5  # share of a place that one reason has to hold for
-
+NOWHERE = Polygons()
 
 HEAP = 12  # layers united at a time: a sweep over all of them at once meets many more crossings
 
@@ -89,8 +103,11 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
     areas = reachable_areas(sections, blocked)
     printed, dense = stand(*grow(wanted, {}, areas), areas)
     missed = find_missed(wanted, printed, areas)
+    if any(not area.is_empty() for area in missed):
+        printed, dense = stand(*grow(wanted, {}, areas, seen_from_above(missed)), areas)
+        missed = find_missed(wanted, printed, areas)
     if sections.on_platform and not sections.on_raft:
-        printed[0] = widen_foot(printed[0], areas, sections.plate - blocked[0])
+        printed[0] = widen_foot(printed, areas, sections.plate - blocked[0])
     hollow, rest = hollow_places(printed, dense, process), nothing[len(printed) :]
     return Supports(sections, [*printed, *rest], [*dense, *rest], [*hollow, *rest], wanted, missed, unwanted)
 
@@ -133,11 +150,12 @@ def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
 
 
 def grow(
-    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas
+    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas, hard: Polygons = NOWHERE
 ) -> tuple[list[Polygons], list[Polygons]]:
     """Grow support from the top down. Returns one area per layer of all support, and one of the support that begins there.
 
-    wanted: the hanging places of each layer; begins: places of a layer at which support has to begin.
+    wanted: the hanging places of each layer; begins: places of a layer at which support has to begin; hard: where support may
+    merely touch what it holds.
     """
     count, radius = len(areas.reachable), areas.radius_mm
     is_tree, area, branches = areas.process.support_style == "tree", Polygons(), list[Branch]()
@@ -154,7 +172,7 @@ def grow(
         body = _body(area, radius)
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
-            contact = _contact(union(asked), body, areas.reachable[m], radius)
+            contact = _contact(union(asked), body, areas.reachable[m], radius, hard)
             if is_tree:
                 branches = add_contact(branches, contact, areas.reachable[m])
             elif not contact.is_empty():
@@ -178,8 +196,12 @@ def _body(area: Polygons, radius: float) -> Polygons:
     return area if area.is_empty() else dilate(area, radius).simplify(COARSE_MM)
 
 
-def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float) -> Polygons:
-    """Reached places whose discs cover a hanging place as far as can be, beside the support already present."""
+def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float, hard: Polygons) -> Polygons:
+    """Reached places whose discs cover a hanging place as far as can be, beside the support already present.
+
+    A disc beside the place has to come under it by half its radius: a bead that merely touches it holds little,
+    and is taken only where a place is hard to reach.
+    """
     bare = drop_slivers(hanging - body)
     if bare.area() < LEAST_MM2:
         return Polygons()
@@ -187,7 +209,11 @@ def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: flo
     core = offset(bare, -radius)
     contact = (bare if core.is_empty() else core + (bare - offset(core, radius))) ^ reachable
     beside = drop_slivers(bare - dilate(contact, radius))
-    return contact if beside.is_empty() else contact + (dilate(beside, radius) ^ reachable)
+    for share in UNDER if not beside.is_empty() else ():
+        contact = contact + (dilate(beside, share * radius) ^ reachable)
+        beside = drop_slivers(beside - dilate(contact, radius))
+    touched = beside ^ hard
+    return contact if touched.is_empty() else contact + (dilate(touched, radius) ^ reachable)
 
 
 def stand(
@@ -263,7 +289,7 @@ def _only_slivers(places: Polygons) -> bool:
 def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
     """The share that does not stand of support which no support carries: discs reach beyond placeable places, but nothing stands
     beside one alone."""
-    placeable = areas.placeable[m]
+    placeable = areas.placeable[m] ^ bounding_box(rest, areas.radius_mm)
     beside = rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm)
     alone = [piece for piece in islands(rest) if _only_slivers(piece ^ placeable)]
     return union([beside, *alone])
@@ -284,26 +310,41 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
     return Polygons.compose(standing) if standing else Polygons()
 
 
-def widen_foot(area: Polygons, areas: ReachableAreas, free: Polygons) -> Polygons:
-    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate."""
+def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
+    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
+
+    Each piece of it gets twice as wide as the support on it is high, as far as support_foot_mm on each side allows.
+    """
     outlines, process = areas.sections.outlines, areas.process
+    highest = int(np.searchsorted(areas.heights.tip_mm[: len(printed)], HIGH * process.support_foot_mm))
+    tall: list[tuple[Polygons, float]] = []
+    for layer in reversed(range(min(highest + 1, len(printed)))):
+        tip_mm, over, tall = float(areas.heights.tip_mm[layer]), tall, []
+        for piece in islands(printed[layer]):
+            tall.append((piece, max([tip_mm, *(top_mm for upper, top_mm in over if not (upper ^ piece).is_empty())])))
+    lacking_mm = [top_mm - 0.5 * _width_mm(piece) for piece, top_mm in tall]
+    feet = [dilate(piece, min(lack, process.support_foot_mm)) for (piece, _), lack in zip(tall, lacking_mm, strict=True)]
     beside = offset(outlines[0], process.support_distance_mm)
-    return (dilate(area, process.support_foot_mm) - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
+    return (union(feet) - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
+
+
+def _width_mm(piece: Polygons) -> float:
+    """The diameter of a disc; of a strip twice its width."""
+    return float(4.0 * piece.area() / sum(length_mm(close_loop(loop)) for loop in contours(piece)))
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
     """Where printed support is next to the part: under the overhangs that it holds and over the surface that it stands on."""
     process = areas.process
     roofs, floors = process.support_interface_layers, process.support_bottom_interface_layers
-    reach_mm = (1.0 - BEYOND) * areas.radius_mm
-    dense = []
+    reach_mm, dense = (1.0 - BEYOND) * areas.radius_mm, []
+    feet = [foot if foot.is_empty() else dilate(foot, reach_mm) for foot in areas.placeable]
     for m, area in enumerate(printed):
         if area.is_empty():
             dense.append(area)
             continue
         over = [contact for contact in contacts[m : m + roofs] if not contact.is_empty()]
-        stands = [foot for foot in areas.placeable[max(m - floors + 1, 0) : m + 1] if not foot.is_empty()]
-        near = union([*over, *(dilate(foot, reach_mm) for foot in stands)])
+        near = union([*over, *(foot for foot in feet[max(m - floors + 1, 0) : m + 1] if not foot.is_empty())])
         dense.append(opening(area ^ near, 0.45 * process.line_width_mm))
     return dense
 

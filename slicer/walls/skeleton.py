@@ -319,8 +319,7 @@ def _pieces(across: Ints, skeleton: Skeleton, value: Ints) -> _Pieces:
                 beyond = across[h] // 3
                 if skeleton.central[h]:
                     step = 0.5 * np.hypot(
-                        skeleton.centres[t, 0] - skeleton.centres[beyond, 0],
-                        skeleton.centres[t, 1] - skeleton.centres[beyond, 1],
+                        skeleton.centres[t, 0] - skeleton.centres[beyond, 0], skeleton.centres[t, 1] - skeleton.centres[beyond, 1]
                     )
                     length[many] += step
                     if value[beyond] == value[t] and of[beyond] < 0:

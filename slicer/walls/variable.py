@@ -12,10 +12,9 @@ take what is left, so widths change with the thickness, and where they would get
        |( 0 )( m )( 0 )|          3   loop 0 and a line between its sides
       |( 0 )( 1 )( 1 )( 0 )|      4   loops 0 and 1
 
-The boundary is sampled and triangulated, the circumcentres of the triangles are the skeleton (skeleton). Every node of it gets
-a count that does not flicker to and fro (counts, rule). Loops run round the places that have room for their level (loops), lines
-along the skeleton where the count is odd (lines). Here widths are smoothed where counts change, and lines that lie alone are kept
-inside the place. What is printed are pieces of one width each (pieces).
+The boundary is sampled and triangulated, the circumcentres of the triangles are the skeleton, every node of which gets a count
+that does not flicker to and fro. Loops run round the places that have room for their level, lines along the skeleton where the
+count is odd. Widths are smoothed where counts change, and lines that lie alone are kept inside the place.
 """
 
 from collections import defaultdict

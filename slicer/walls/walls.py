@@ -13,14 +13,7 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import (
-    Bead,
-    least_width_mm,
-    mean_width_mm,
-    outer_wall_width_mm,
-    spacing_mm,
-    varying,
-)
+from slicer.bead import Bead, least_width_mm, mean_width_mm, outer_wall_width_mm, spacing_mm, varying
 from slicer.geometry.polygons import Polygons, contours, islands, larger, offset, offset_round, opening, strips
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind

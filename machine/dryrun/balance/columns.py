@@ -98,9 +98,9 @@ def _columns(middle: float, reach: float, axis: int, lattice: Lattice) -> tuple[
 
 
 @kernel
-def tops(bars: Bars, lattice: Lattice) -> Floats:
+def tops(bars: Bars, lattice: Lattice, least: float) -> Floats:
     """Height at which each column leaves the uppermost of some bars, which may lie at any slant and end round, as beads turn at
-    corners; NOTHING where there is none.
+    corners; NOTHING where there is none. Below `least` it may be any that is lower.
     """
     top = table(lattice.shape[0], lattice.shape[1])
     for i in range(lattice.shape[0]):
@@ -119,6 +119,8 @@ def tops(bars: Bars, lattice: Lattice) -> Floats:
         ceiling = max(a[2], b[2]) + half * sines[2] + height * max(0.0, -up[2]) + ROUNDING_MM
         if abs(d[0] * up[0] + d[1] * up[1] + d[2] * up[2]) > ROUNDING_MM:
             ceiling = -NOTHING  # its sides are no rectangle
+        if ceiling < least:
+            continue
         i0, i1 = _columns(0.5 * (a[0] + b[0] - height * up[0]), reach[0], 0, lattice)
         j0, j1 = _columns(0.5 * (a[1] + b[1] - height * up[1]), reach[1], 1, lattice)
         for i in range(i0, i1 + 1):

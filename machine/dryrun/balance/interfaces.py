@@ -12,8 +12,8 @@ import numpy as np
 
 from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
 from machine.dryrun.findings import Finding, at_row
-from machine.dryrun.strokes import Beads, lengths_of, parts_on_plate
-from machine.reader.parsed import ParsedProgram, pieces
+from machine.dryrun.strokes import Beads, parts_on_plate, turned_box
+from machine.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose, rotation
 from profiles.profile import Profile
@@ -119,7 +119,7 @@ def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> It
         mine = np.flatnonzero((own & (part == index))[remark])
         first = mine[layer[remark[mine]] == layer[remark[mine]].min()]
         turn = rotation(profile.machine, Pose(*program.end[deposited.rows[first[0]], 3:].tolist()))
-        earlier = np.flatnonzero((own & (part < index))[remark[: first[0]]])
+        earlier = (own & (part < index))[remark[: first[0]]]
         yield _interface(program, deposited, (first, earlier), turn, profile)
 
 
@@ -127,29 +127,33 @@ def _printing_directions(program: ParsedProgram, rows: Indices, profile: Profile
     """(k, 3) direction in which the bead of each row was laid, workpiece frame."""
     if not len(rows):
         return np.zeros((0, 3))
-    poses, which = np.unique(program.end[rows, 3:], axis=0, return_inverse=True)
-    return np.array([rotation(profile.machine, Pose(*pose))[2] for pose in poses.tolist()])[which.ravel()]
+    begins = np.concatenate([[0], np.flatnonzero(program.turned_between(rows)) + 1])
+    poses = program.end[rows[begins], 3:].tolist()
+    return np.repeat([rotation(profile.machine, Pose(*pose))[2] for pose in poses], np.diff(begins, append=len(rows)), axis=0)
 
 
 def _interface(
-    program: ParsedProgram, deposited: Beads, which: tuple[Indices, Indices], turn: Floats, profile: Profile
+    program: ParsedProgram, deposited: Beads, which: tuple[Indices, Mask], turn: Floats, profile: Profile
 ) -> Interface:
-    """which: beads of the first layer, and of earlier parts; turn: into the part's frame."""
-    first, earlier = which
+    """which: beads of the first layer, and which of those before it are of earlier parts; turn: into the part's frame."""
+    first, near = which
     layer = _bars(program, deposited, first, turn, profile)
     mm3 = program.e_mm[deposited.rows[first]] * _filament_mm2(profile)
     spare_mm3 = profile.material.prime_extra_mm * _filament_mm2(profile)
     tip_mm = float(np.median(layer.end[:, 2]))
     lattice = lattice_over(np.concatenate([layer.begin, layer.end])[:, :2], CELL_MM)
     wide = layer._replace(half=0.5 * deposited.sizes[deposited.size[first], 0])
-    bead = tops(wide, lattice) > NOTHING
+    bead = tops(wide, lattice, NOTHING) > NOTHING
     section = bead | inside_loops(_outer_loops(wide, program, deposited.rows[first]), lattice)
-    near = np.zeros(len(earlier), np.bool_)
-    for some in pieces(len(earlier)):
-        near[some] = np.abs((deposited.segments(earlier[some]) @ turn[2]) - tip_mm).min(axis=1) < REACH_MM
-    room = tops(_bars(program, deposited, earlier[near], turn, profile), lattice)  # a lattice is large: worked out in its place
-    np.maximum(np.subtract(tip_mm, room, out=room), 0.0, out=room)
-    touching = room < NEAR * max(float(np.median(layer.height)), 0.2)
+    for some, box in deposited.boxes(len(near)):
+        least, most = turned_box(box, turn)[:, 2] - tip_mm
+        near[some] &= bool(least < REACH_MM and most > -REACH_MM)
+        if near[some].any():
+            near[some] &= (np.abs((deposited.segments(some) @ turn[2]) - tip_mm) < REACH_MM).any(axis=1)
+    near_mm = NEAR * max(float(np.median(layer.height)), 0.2)
+    room = tops(_bars(program, deposited, np.flatnonzero(near), turn, profile), lattice, tip_mm - near_mm)
+    np.maximum(np.subtract(tip_mm, room, out=room), 0.0, out=room)  # a lattice is large: worked out in its place
+    touching = room < near_mm
     room[~touching] = 0.0
     room *= lattice.column_mm2
     return Interface(
@@ -170,7 +174,7 @@ def _run_in(deposited: Beads, first: Indices, mm3: Floats, spare_mm3: float) -> 
     missing in the nozzle and fills no room.
     """
     width_mm, height_mm = deposited.sizes[deposited.size[first]].T
-    nominal_mm3 = width_mm * height_mm * lengths_of(deposited.segments(first))
+    nominal_mm3 = width_mm * height_mm * deposited.length_mm[first]
     lean = float(np.quantile(mm3 / np.maximum(nominal_mm3, 1e-9), LEAN))
     beyond = np.maximum(mm3 - RICH * lean * nominal_mm3, 0.0).cumsum()
     return np.diff(np.minimum(beyond, spare_mm3), prepend=0.0)
@@ -184,7 +188,7 @@ def _bars(program: ParsedProgram, deposited: Beads, which: Indices, turn: Floats
     """Some beads as bars in a turned frame, as wide as their plastic makes them at their height."""
     segments, rows = deposited.segments(which), deposited.rows[which]
     begin, end = (segments[:, side] @ turn.T for side in (0, 1))
-    height, length = deposited.sizes[deposited.size[which], 1], np.maximum(lengths_of(segments), 1e-9)
+    height, length = deposited.sizes[deposited.size[which], 1], np.maximum(deposited.length_mm[which], 1e-9)
     mm3 = program.e_mm[rows] * _filament_mm2(profile)
     return Bars(begin, end, _printing_directions(program, rows, profile) @ turn.T, 0.5 * mm3 / length / height, height)
 

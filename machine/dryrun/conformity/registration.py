@@ -49,7 +49,7 @@ def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
     """The shift of every part with enough outer walls against the closed model in the workpiece frame."""
     outer = run.program.rows_of_types(*WALLS)[run.segment_row]
     walls = np.flatnonzero(outer)
-    walls = walls[run.deposited.lengths(walls) > LEAST_MM]
+    walls = walls[run.deposited.length_mm[walls] > LEAST_MM]
     part = run.program.part[run.segment_row]
     chosen = [_evenly(walls[part[walls] == index]) for index in np.unique(part[walls])]
     if not chosen:

@@ -12,12 +12,12 @@ from machine.gcode.blocks import fill_block, resume_placeholders
 from machine.gcode.pen import Pen, turn
 from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
-from machine.planning.limits import speeds_of
 from machine.planning.park_position import obstacle_top_mm, over_print_mm
 from machine.planning.reorient import Turn, route
 from mdp.pose import Pose
 from profiles.errors import JournalError
 from profiles.profile import Profile
+from slicer.estimate.timing import speeds_of
 
 STILL_DEG = 0.01
 

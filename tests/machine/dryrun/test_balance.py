@@ -51,7 +51,7 @@ def test_no_plastic_is_lost_wherever_a_bar_lies(turn_deg: float) -> None:
 @pytest.mark.parametrize("beyond", [1.0, nextafter(1.0, 2.0)])
 def test_a_bar_laid_sideways_is_not_lost_to_a_rounding_of_its_direction(beyond: float) -> None:
     lattice = lattice_over(FIELD, 0.05)
-    top = tops(bar((5.0, 0.0, 0.0), (5.0, 0.0, 4.0), (beyond, 0.0, 0.0), 0.5, 0.2), lattice)
+    top = tops(bar((5.0, 0.0, 0.0), (5.0, 0.0, 4.0), (beyond, 0.0, 0.0), 0.5, 0.2), lattice, NOTHING)
     under = int((4.9 - lattice.origin[0]) / lattice.cell), int((0.0 - lattice.origin[1]) / lattice.cell)
     assert top[under] == pytest.approx(4.0, abs=0.51)  # its end is round: half its width
 
@@ -62,7 +62,7 @@ def test_a_slanted_bar_is_left_through_its_top_or_its_side(slant_deg: float) -> 
     slant = radians(slant_deg)
     along, up = (cos(slant), 0.0, -sin(slant)), (sin(slant), 0.0, cos(slant))
     lattice = lattice_over(FIELD, 0.05)
-    top = tops(bar((5.0, 0.0, 0.0), (5.0 + 4.0 * along[0], 0.0, 4.0 * along[2]), up, 0.5, 0.2), lattice)
+    top = tops(bar((5.0, 0.0, 0.0), (5.0 + 4.0 * along[0], 0.0, 4.0 * along[2]), up, 0.5, 0.2), lattice, NOTHING)
     x = lattice.origin[0] + (np.arange(lattice.shape[0]) + 0.5) * lattice.cell - 5.0
     row = top[:, int((0.02 - lattice.origin[1]) / lattice.cell)]
     over = (x > 0.0) & (x < 4.0 * along[0])
@@ -80,9 +80,9 @@ def test_the_uppermost_bar_counts_whichever_is_laid_first(seed: int) -> None:
     up = np.cross(ends[1] - ends[0], dice.normal(size=(20, 3)))  # some of them point down
     bars = Bars(ends[0], ends[1], up / np.linalg.norm(up, axis=1)[:, None], dice.uniform(0.1, 0.5, 20), np.full(20, 0.2))
     lattice = lattice_over(ends.reshape(-1, 3)[:, :2], 0.1)
-    one_by_one = np.max([tops(Bars(*(values[k : k + 1] for values in bars)), lattice) for k in range(20)], axis=0)
-    assert np.array_equal(tops(bars, lattice), one_by_one)
-    assert np.array_equal(tops(Bars(*(values[::-1].copy() for values in bars)), lattice), one_by_one)
+    one_by_one = np.max([tops(Bars(*(values[k : k + 1] for values in bars)), lattice, NOTHING) for k in range(20)], axis=0)
+    assert np.array_equal(tops(bars, lattice, NOTHING), one_by_one)
+    assert np.array_equal(tops(Bars(*(values[::-1].copy() for values in bars)), lattice, NOTHING), one_by_one)
 
 
 def test_loops_enclose_their_area_less_that_of_holes() -> None:

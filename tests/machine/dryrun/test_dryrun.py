@@ -7,10 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import DryRun, dry_run, summary
-from machine.planning.timing import move_times
+from machine.dryrun.strokes import turned_box
 from machine.reader import parsed
+from mdp.pose import Pose, rotation
 from profiles.errors import GcodeError
 from profiles.profile import load
+from slicer.estimate.timing import move_times
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import FAULTS
 from tests.machine.hand import printed, text, whole
@@ -255,3 +257,16 @@ def test_rows_are_judged_alike_however_many_are_judged_at_once(rows_at_once: int
         assert (run.findings, summary(run)) == (expected.findings, summary(expected))
         assert np.array_equal(run.deposited.width_mm, expected.deposited.width_mm)
         assert all(np.array_equal(own, other) for own, other in zip(run.contacts, expected.contacts, strict=True))
+
+
+def test_a_turned_box_contains_all_beads_of_its_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parsed, "AT_ONCE", 100)
+    profile, _, lines = bent("generic_ac")
+    deposited = dry_run(lines, profile).deposited
+    turn = np.column_stack([rotation(profile.machine, Pose(30.0, 70.0)), [1.0, 2.0, 3.0]])
+    for some, box in deposited.boxes(250):
+        turned = deposited.segments(some).reshape(-1, 3) @ turn[:, :3].T + turn[:, 3]
+        least, most = turned_box(box, turn)
+        assert (turned >= least).all()
+        assert (turned <= most).all()
+    assert [some for some, _ in deposited.boxes(250)] == [slice(0, 100), slice(100, 200), slice(200, 250)]

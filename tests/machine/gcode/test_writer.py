@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from machine.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import BeginLayer, straight_moves
-from machine.planning.timing import lengths
 from machine.quantities import duration
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
 from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.profile import Profile, load
+from slicer.estimate.timing import lengths
 from slicer.paths import Kind
 from tests.machine.hand import printed, text
 from tests.machine.moves import Stroke, moves_of, program_of

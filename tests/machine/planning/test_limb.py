@@ -9,7 +9,6 @@ from machine.kinematics.collision import hull
 from machine.link.pause.return_path import return_moves
 from machine.planning import travel
 from machine.planning.fit import standing_at
-from machine.planning.limits import speeds_of
 from machine.planning.moves import Pause
 from machine.planning.plan import plan
 from machine.planning.reorient import Turn, route
@@ -17,6 +16,7 @@ from machine.planning.stops import Stop
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load
+from slicer.estimate.timing import speeds_of
 from tests.limbs import MODELS, moved_part, printed, sliced
 from tests.machine.moves import Travel, moves_of
 

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
 
-from machine.planning.limits import axis_limits, check, path_speeds, speeds_of, turn_speed
+from machine.planning.limits import axis_limits, check, path_speeds, turn_speed
 from machine.planning.moves import BeginLayer, BeginPart, Reorient
 from machine.planning.plan import plan
 from mdp.pose import Pose
 from profiles.errors import MoveError
 from profiles.profile import load
+from slicer.estimate.timing import speeds_of
 from tests.machine.hand import post_and_arm, squares
 from tests.machine.moves import Travel, program_of
 

@@ -8,13 +8,13 @@ from machine.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.kinematics.collision import hull
 from machine.kinematics.table import workpiece_points
-from machine.planning.limits import speeds_of
 from machine.planning.moves import BeginLayer, BeginPart, Reorient
 from machine.planning.plan import plan
 from machine.planning.reorient import Turn, poses_between, route
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load
+from slicer.estimate.timing import speeds_of
 from slicer.paths import SlicedPart
 from tests.machine.hand import post_and_arm, printed, squares
 from tests.machine.moves import Retract, Stroke, Travel, Wipe, moves_of

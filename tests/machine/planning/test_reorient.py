@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from machine.kinematics.collision import hull, solids
 from machine.kinematics.table import machine_points
-from machine.planning.limits import speeds_of
 from machine.planning.reorient import Sweep, Turn, poses_between, route, stands, sweep, way_s
 from mdp.head import bodies, corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.machine import CradleBox, Machine
 from profiles.profile import load
+from slicer.estimate.timing import speeds_of
 
 SPEEDS = speeds_of(load())._replace(lift_mm_s=10.0, travel_mm_s=150.0)
 PRINT = corners((-20.0, -15.0, 0.0), (20.0, 15.0, 50.0))

@@ -62,6 +62,16 @@ def test_a_bridge_over_infill_has_no_tongue_too_narrow_for_a_line() -> None:
     assert bridge.bounds() == pytest.approx((-5.0, -5.0, 5.0, 5.0), abs=0.1 * WIDTH)
 
 
+def test_the_border_of_a_bridge_over_infill_lies_under_the_walls_around_a_pit() -> None:
+    bare, inside = block(0.0, 0.0, 3.0), block(0.0, 0.0, 10.0)  # the floor of a pit, on solid layers 0.4 mm wider all round
+    region = Region(bare, inside, Polygons(), Polygons(), Polygons())
+    bridge = infill_bridges(region, inside - block(0.0, 0.0, 3.8), WIDTH)
+    half = 1.5 + 0.5 * WIDTH  # so far in reach the wedges between line ends, which stay open
+    assert (bridge ^ block(0.0, 0.0, 2.0 * half)).is_empty()
+    held = block(0.0, 0.0, 3.8) - block(0.0, 0.0, 3.0 + 1.5 * WIDTH)  # still it lies on the solid layers, by a quarter of a line
+    assert (held - bridge).area() == pytest.approx(0.0, abs=0.01)
+
+
 def test_without_infill_a_skin_grows_to_the_walls() -> None:
     left, _, right, _ = anchored(region(block(3.0, 0.0, 2.0)), INSIDE, [], 0.0, WIDTH, 0.0).solid.bounds()
     assert (left, right) == pytest.approx((-15.0, 15.0), abs=0.01)

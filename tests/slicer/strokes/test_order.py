@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from slicer.bead import OUTSIDE, Bead
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import lengths_mm
-from slicer.paths import Kind
+from slicer.paths import KINDS, Kind
 from slicer.slice import slice_part
 from slicer.strokes.order import order_beads
 from slicer.strokes.speed import speeds_mm_s
@@ -47,6 +47,24 @@ def test_an_island_in_a_hole_is_an_island_of_its_own() -> None:
     beads = [line(-1, 0, 1, 0, 0), line(-13, -13, -13, 13, 0), line(-1, 1, 1, 1, 2), line(-12, -13, -12, 13, 2)]
     placed = order_beads(beads, section, STANDARD, np.array([-13.0, -13.0]))
     assert (placed.first_points[:, 0] < -10).tolist() == [True, True, False, False]
+
+
+def test_small_walls_of_an_island_are_printed_together_and_its_long_ones_too() -> None:
+    """Squares of 2 and of 20 mm in turn in a row: only the small ones, 8 mm round, are printed at small_wall_speed_mm_s."""
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], dtype=float)
+    beads = [Bead(Kind.OUTER_WALL, (2.0 if k % 2 else 20.0) * square + (1.0 * k, 0.0), 0.45, 0) for k in range(8)]
+    placed = order_beads(beads, Polygons.square((99, 99), True), STANDARD, np.zeros(2))
+    assert STANDARD.small_wall_speed_mm_s < STANDARD.outer_wall_speed_mm_s
+    assert np.count_nonzero(np.diff(placed.small)) == 1
+
+
+def test_inner_lines_behind_no_seam_come_after_all_walls_between_the_lines_of_the_skin() -> None:
+    ring = np.array([[1, 1], [40, 1], [40, 20], [1, 20], [1, 1]], dtype=float)
+    walls = [Bead(Kind.OUTER_WALL, ring, 0.45, 0), replace(line(2, 2, 3, 2, -1, Kind.INNER_WALL), line=True)]
+    inner = [replace(line(x, 10, x + 5, 10, -1, Kind.INNER_WALL), line=True) for x in (10, 20)]
+    skins = [line(x, 10, x + 3, 10, kind=Kind.SKIN) for x in (6, 16, 26)]
+    placed = order_beads([*walls, *inner, *skins], Polygons.square((41, 21)), STANDARD, np.array([1.0, 1.0]))
+    assert placed.first_points[:, 0].tolist() == [2, 1, 6, 10, 16, 20, 26]
 
 
 @settings(max_examples=40)
@@ -116,7 +134,7 @@ def test_slowing_stops_at_the_least_speed() -> None:
 def test_beads_at_the_floor_leave_the_waiting_to_the_others() -> None:
     beads = [line(0, 0, 12, 0, kind=Kind.GAP), line(12, 0, 112, 0)]
     strokes = strokes_of(beads, np.zeros(2, np.bool_), {}, 0.0)
-    speeds = dict.fromkeys(Kind, 100.0) | {Kind.GAP: 12.0}
+    speeds = np.array([12.0 if kind is Kind.GAP else 100.0 for kind in KINDS])
     limits = ("process.least_layer_time_s=6", "process.least_speed_mm_s=10", "material.volumetric_limit_mm3_s=50")
     slowed = speeds_mm_s(strokes, profile(*limits), 0.2, speeds, 1.0)
     assert slowed[0] == pytest.approx(10.0)

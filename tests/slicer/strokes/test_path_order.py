@@ -11,22 +11,31 @@ from numpy.typing import NDArray
 from mdp.mesh import Floats
 from slicer.strokes.path_order import order_paths
 
-NO_GOAL, ORIGIN = np.zeros((0, 2)), np.zeros(2)
+NO_GOAL, ORIGIN = np.zeros((0, 3)), np.zeros(3)
+CHANGE_MM = 3.0  # of travel that a change of speed is worth
 
 
 def paths(seed: int, count: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Starts, ends and whether they are fixed, of random paths."""
+    """Starts and ends with their speeds, and whether they are fixed, of random paths."""
     random = np.random.default_rng(seed)
     starts = random.uniform(0, 50, (count, 2))
-    return starts, starts + random.uniform(-15, 15, (count, 2)), random.random(count) < 0.4
+    ends = starts + random.uniform(-15, 15, (count, 2))
+    begin, end = random.choice([0.0, 60.0], (2, count))
+    return np.c_[starts, begin], np.c_[ends, end], random.random(count) < 0.4
+
+
+def way(a: Floats, b: Floats) -> Floats:
+    """Travel between places, and what a change of speed is worth."""
+    apart: Floats = np.hypot(b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]) + CHANGE_MM * (a[..., 2] != b[..., 2])
+    return apart
 
 
 def nearest_first(starts: Floats, ends: Floats, fixed: NDArray[np.bool_]) -> tuple[list[int], list[bool]]:
     """The order and reversals that go from the origin to the nearest path each time."""
-    order, flips, at, far = list[int](), list[bool](), np.zeros(2), np.zeros(len(starts))
+    order, flips, at, far = list[int](), list[bool](), ORIGIN, np.zeros(len(starts))
     while len(order) < len(starts):
-        to_start = np.hypot(*(starts - at).T) + far
-        to_end = np.where(fixed, np.inf, np.hypot(*(ends - at).T)) + far
+        to_start = way(at, starts) + far
+        to_end = np.where(fixed, np.inf, way(at, ends)) + far
         flip = bool(to_end.min() < to_start.min())
         k = int((to_end if flip else to_start).argmin())
         order, flips, at = [*order, k], [*flips, flip], starts[k] if flip else ends[k]
@@ -35,17 +44,17 @@ def nearest_first(starts: Floats, ends: Floats, fixed: NDArray[np.bool_]) -> tup
 
 
 def travel(starts: Floats, ends: Floats, order: Iterable[int], flips: Iterable[bool], goal: Floats = NO_GOAL) -> float:
-    """Length of all travels of an order, from the origin."""
+    """Length of all travels of an order from the origin, and what its changes of speed are worth."""
     runs = [(ends[k], starts[k]) if flip else (starts[k], ends[k]) for k, flip in zip(order, flips, strict=True)]
-    stops = [np.zeros(2), *(point for run in runs for point in run), *goal]
-    return sum(float(np.hypot(*(b - a))) for a, b in zip(stops[::2], stops[1::2], strict=False))
+    stops = [ORIGIN, *(point for run in runs for point in run), *goal]
+    return sum(float(way(a, b)) for a, b in zip(stops[::2], stops[1::2], strict=False))
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 5), st.booleans())
 def test_an_order_of_few_paths_is_close_to_the_shortest_there_is(seed: int, count: int, goal: bool) -> None:
     starts, ends, fixed = paths(seed, count)
-    target = np.array([[25.0, 25.0]]) if goal else NO_GOAL
+    target = np.array([[25.0, 25.0, 60.0]]) if goal else NO_GOAL
     order, flips = order_paths(starts, ends, fixed, ORIGIN, target)
     reversals = product(*([False] if still else [False, True] for still in fixed))
     every = ((p, [flipped[k] for k in p]) for flipped in reversals for p in permutations(range(count)))
@@ -66,6 +75,25 @@ def test_an_order_has_each_path_once_reverses_none_fixed_and_is_never_longer_tha
 def test_exchanges_save_a_tenth_of_the_travel_between_many_short_lines() -> None:
     starts, ends, _ = paths(3, 3000)
     ends = starts + 0.05 * (ends - starts)
+    starts[:, 2] = ends[:, 2] = 0.0
     loose = np.zeros(3000, dtype=bool)
     shorter = travel(starts, ends, *order_paths(starts, ends, loose, ORIGIN, NO_GOAL))
     assert shorter < 0.92 * travel(starts, ends, *nearest_first(starts, ends, loose))
+
+
+def in_turn(step_mm: float) -> tuple[list[int], list[bool]]:
+    """The order of eight short paths in a row, every other one at another speed, as numbers in the row."""
+    row, speeds = step_mm * np.arange(8.0), np.tile([25.0, 60.0], 4)
+    starts, ends = np.c_[row, np.zeros(8), speeds], np.c_[row, np.ones(8), speeds]
+    order, _ = order_paths(starts, ends, np.zeros(8, dtype=bool), np.array([0.0, 0.0, 25.0]), NO_GOAL)
+    return order.tolist(), (speeds[order] == 25.0).tolist()
+
+
+def test_close_paths_of_one_speed_follow_each_other() -> None:
+    _, slow = in_turn(1.0)  # to go back along the row once is 7 mm, its seven changes of speed are worth 21
+    assert slow == [True] * 4 + [False] * 4
+
+
+def test_paths_of_one_speed_that_are_far_apart_do_not() -> None:
+    order, _ = in_turn(50.0)  # to go back is 350 mm
+    assert order == list(range(8))

@@ -10,12 +10,12 @@ from slicer.strokes.path_order import AS_IT_IS, CLOSED, OPEN, order_lines
 
 SQUARE = np.array([[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]], dtype=float)
 THERE_AND_BACK = np.array([[50, 0], [25, 0], [0, 0], [0, 2], [25, 2], [50, 2]], dtype=float)
-NOWHERE = np.zeros((0, 2))
+NO_GOAL = np.zeros((0, 3))
 
 
 def in_order(lines: list[Floats], freedom: list[int], tip: tuple[float, float]) -> list[tuple[int, list[Floats]]]:
     fixed = np.array([free == CLOSED for free in freedom])
-    return order_lines(lines, fixed, freedom, np.array(tip), NOWHERE)
+    return order_lines(lines, np.zeros((len(lines), 2)), fixed, freedom, np.array([*tip, 0.0]), NO_GOAL)
 
 
 def test_a_ring_begins_at_the_corner_nearest_to_the_tip() -> None:

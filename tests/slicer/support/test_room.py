@@ -8,14 +8,13 @@ from hypothesis import strategies as st
 
 from mdp.decomposition import Part
 from mdp.plane import Plane
-from slicer.bead import spacing_mm
+from slicer.bead import spacing_mm, support_cell_mm
 from slicer.geometry.polygons import Polygons, union
 from slicer.heights import Heights
 from slicer.paths import Kind
 from slicer.sectioning import section_part
 from slicer.support.beads import support_beads
 from slicer.support.reachable import ReachableAreas, above_base_planes
-from slicer.support.sturdy import support_cell_mm
 from tests.mdp.solids import random_direction
 from tests.shapes import box
 from tests.slicer.hand import as_shapely, profile, ragged, whole

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from mdp.mesh import Mesh
+from slicer.bead import support_cell_mm
 from slicer.geometry.polygons import Polygons, islands
 from slicer.support.beads import support_beads
-from slicer.support.sturdy import SLENDER, hollow_places, least_diameter_mm, support_cell_mm
+from slicer.support.sturdy import SLENDER, hollow_places, least_diameter_mm
 from slicer.support.support import Supports
 from tests.shapes import standing
 from tests.slicer.hand import profile, whole

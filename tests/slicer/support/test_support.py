@@ -19,7 +19,7 @@ from slicer.sectioning import section_part
 from slicer.slice import slice_part
 from tests.shapes import branch, from_manifold, standing, tee
 from tests.slicer.hand import cut, distances_mm, of_kind, profile, section_at, volume_mm3, whole
-from tests.slicer.support.laws import assert_sound, supported
+from tests.slicer.support.laws import as_shapely, assert_sound, supported
 
 DISTANCE, GAP, LINE_MM = 0.3, 0.2, 0.45
 SPACING = 0.45 - 0.2 * (1 - np.pi / 4)
@@ -271,6 +271,26 @@ def test_support_gets_a_foot_on_the_platform() -> None:
     )
     reach = [max(p.points[:, 0].max() for p in layer.paths if p.kind is Kind.SUPPORT) for layer in (wide, narrow)]
     assert reach[0] - reach[1] == pytest.approx(3.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("span", "height"), [(4.0, 1.4), (4.0, 3.0), (4.0, 12.0), (16.0, 3.0)])
+def test_a_foot_makes_support_twice_as_wide_as_high(span: float, height: float) -> None:
+    feet = (
+        supported(whole(table(span, span, height)), "process.bridge_longest_mm=1", "process.support_style=grid", foot)[1].areas[0]
+        for foot in ("process.support_foot_mm=1.5", "process.support_foot_mm=0")
+    )
+    wide, narrow = (as_shapely(foot) for foot in feet)
+    lacking_mm = 2.0 * (height - GAP) - 4.0 * narrow.area / narrow.length
+    assert wide.bounds[3] - narrow.bounds[3] == pytest.approx(np.clip(0.5 * lacking_mm, 0.0, 1.5), abs=0.12)
+
+
+def test_support_beside_a_slope_comes_under_it_by_half_a_line() -> None:
+    sides = ((-1, 0), (1, 0), (-3, 1.2), (3, 1.2), (-3, 4), (3, 4))
+    slope = m3.Manifold.hull_points([(x, y, z) for x in (-20, 20) for y, z in sides])
+    overhangs, supports = supported(whole(standing(slope)), "process.support_foot_mm=0")
+    assert_sound(overhangs, supports)
+    reach = max(float(area.bounds()[3]) for area in supports.areas if not area.is_empty())
+    assert 3.0 < reach < 3.0 + 1.5 * LINE_MM + 0.1
 
 
 @pytest.mark.parametrize("style", ["tree", "grid"])

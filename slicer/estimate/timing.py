@@ -4,6 +4,7 @@ The model of classic Marlin: constant acceleration along the move, at a corner e
 most the junction speed, and the speeds at the corners are the greatest from which the machine can still stop.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +14,21 @@ from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 from profiles.machine import Machine
-from slicer.estimate.duration import trapezoid_s
+from profiles.profile import Profile
+from slicer.strokes.speed import travel_mm_s2
 
 TINY = 1e-9
+
+
+class Speeds(NamedTuple):
+    """What moves without extruding may have at most: mm/s straight up and down, across, and of the filament alone; mm/s2, inf
+    where the axes decide; (3,) mm/s of X, Y and Z."""
+
+    lift_mm_s: float
+    travel_mm_s: float
+    filament_mm_s: float
+    acceleration_mm_s2: float
+    axes_mm_s: Floats
 
 
 class Blocks(NamedTuple):
@@ -29,6 +42,32 @@ class Blocks(NamedTuple):
     acceleration: Floats
     measure: NDArray[np.int8]
     halts: NDArray[np.bool_]
+
+
+def speeds_of(profile: Profile) -> Speeds:
+    """What the process asks for, as far as the axes and the extruder allow it."""
+    process, machine, material = profile.process, profile.machine, profile.material
+    return Speeds(
+        lift_mm_s=min(process.lift_speed_mm_s, machine.z.speed_mm_s),
+        travel_mm_s=min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s),
+        filament_mm_s=min(material.retract_speed_mm_s, machine.extruder_speed_mm_s),
+        acceleration_mm_s2=travel_mm_s2(profile),
+        axes_mm_s=axis_speeds(machine)[:3],
+    )
+
+
+@no_nrt
+def trapezoid_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, v0: float, v1: float) -> float:
+    """Seconds of a straight move from one speed to another: a trapezoid of speeds, or a triangle where it gets no faster."""
+    peak = min(speed_mm_s, sqrt(0.5 * (v0 * v0 + v1 * v1) + acceleration_mm_s2 * length_mm))
+    ramps_mm = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * acceleration_mm_s2)
+    return float((2.0 * peak - v0 - v1) / acceleration_mm_s2 + max(0.0, length_mm - ramps_mm) / max(peak, TINY))
+
+
+@kernel
+def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> float:
+    """Seconds of a straight line from a stand to a stand."""
+    return trapezoid_s(length_mm, speed_mm_s, acceleration_mm_s2, 0.0, 0.0)
 
 
 def axis_speeds(machine: Machine) -> Floats:
@@ -49,24 +88,10 @@ def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
 
     The rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament.
     """
-    return _lengths(np.ascontiguousarray(deltas))
-
-
-@kernel
-def _lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
-    length, measure = floats(len(deltas), 0.0), np.empty(len(deltas), np.int8)
-    for k in range(len(deltas)):
-        travel = np.sqrt(deltas[k, 0] ** 2 + deltas[k, 1] ** 2 + deltas[k, 2] ** 2)
-        turned, pushed = np.hypot(deltas[k, 3], deltas[k, 4]), abs(deltas[k, 5])
-        if travel > TINY:
-            length[k], measure[k] = travel, 0
-        elif turned > TINY:
-            length[k], measure[k] = turned, 1
-        elif pushed > TINY:
-            length[k], measure[k] = pushed, 2
-        else:
-            measure[k] = 3
-    return length, measure
+    x, y, z, tilt, turn, filament = deltas.T
+    ways: list[Floats] = [np.sqrt(x**2 + y**2 + z**2), np.hypot(tilt, turn), np.abs(filament)]
+    moves = [way > TINY for way in ways]
+    return np.select(moves, ways), np.select(moves, [0, 1, 2], 3).astype(np.int8)
 
 
 def move_times(
@@ -95,9 +120,10 @@ def blocks_of(
     if most_mm_s2 is not None:
         acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
     moving = measure < 3
-    halts = np.diff(np.cumsum(stop)[moving], prepend=0) > 0
-    direction = deltas[moving] / length[moving][:, None]
-    return Blocks(direction, length[moving], cruise[moving], acceleration[moving], measure[moving], halts), moving
+    which = slice(None) if moving.all() else moving  # mostly all of them, which need not be copied
+    halts = np.diff(np.cumsum(stop)[which], prepend=0) > 0
+    direction = deltas[which] / length[which, None]
+    return Blocks(direction, length[which], cruise[which], acceleration[which], measure[which], halts), moving
 
 
 @kernel
