@@ -11,7 +11,6 @@ from tools import draw_rooms
 from tools.draw_rooms import LAYERS, PICTURE, draw, floors, import_graph, imports, room_graph, rooms_of
 
 ROOT = Path(__file__).resolve().parents[1]
-MOST_FILES = 15
 # Third party -> the beginnings of the module paths that may import it; nowhere else in the packages.
 CONFINED = {
     "trimesh": ("mdp/formats/scene", "mdp/mesh", "mdp/save"),
@@ -173,11 +172,6 @@ def test_files_at_the_top_of_a_folder_are_values_below_its_rooms_or_stages_above
     rooms = rooms_of(graph)
     assert rooms == {"a.value": "a.value", "a.room.x": "a.room", "a.stage": "a.stage"}
     assert floors(room_graph(graph, rooms)) == {"a.value": 0, "a.room": 1, "a.stage": 2}
-
-
-@pytest.mark.parametrize("room", sorted({path.rpartition("/")[0] for path in modules()}))
-def test_a_room_has_at_most_fifteen_files(room: str) -> None:
-    assert len([file for file in (ROOT / room).glob("*.py") if file.name != "__init__.py"]) <= MOST_FILES
 
 
 def test_a_file_that_is_not_there_is_refused_before_numpy_is_loaded() -> None:

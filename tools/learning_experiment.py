@@ -14,8 +14,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from mdp.learning.sources import FOLDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -111,6 +109,8 @@ def seeds_table(out: Path) -> str:
 
 def draw_curve(out: Path) -> None:
     """Regret of the first candidate against the number of models that train."""
+    from matplotlib.figure import Figure
+
     picture = Figure(figsize=(5.0, 4.0), layout="constrained")
     axes = picture.subplots()
     for name in RANKERS:
