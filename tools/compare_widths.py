@@ -12,7 +12,7 @@ seams cost nothing, faces on the platform count as risky, head and axes do not l
 `search.count_platform_faces=true`, `search.clearance=false`). --faces: larger models are made coarser first; --side: only models
 whose sources are on one side of the split of mdp.learning.sources, test: those that no training saw.
 --least-removed: the tables are of the models of which the widest plain beam removes at least this share of the risky area: on the
-others every beam ends alike.
+others the width of the beam makes no difference.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from mdp.learning.models import coarser, read_model
-from mdp.learning.sources import Side, read_sources, side
+from mdp.learning.sources import FOLDS, Side, read_sources, side
 from mdp.learning.task import PAPER_TERMS
 from mdp.learning.widths import compare, read_searches, table
 from mdp.mesh import Mesh
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--rankers", default=CLASSIC)
     parser.add_argument("--faces", type=int, default=None, help="models with more faces are made coarser")
     parser.add_argument("--side", choices=list(Side), default=None, help="only models on one side of the split by source")
-    parser.add_argument("--fold", type=int, default=0, help="which split by source")
+    parser.add_argument("--fold", type=int, choices=range(FOLDS), default=0, help="which split by source")
     parser.add_argument("--manifest", type=Path, default=None, help="id, source_repo and source_path of the models")
     parser.add_argument("--paper-terms", action="store_true")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")

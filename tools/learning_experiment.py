@@ -1,4 +1,4 @@
-"""Repeat the experiment of docs/learning.md: collect, train, search, and print the tables.
+"""Repeat the experiment of the 2020 paper: collect, train, search, and print the tables.
 
     python tools/learning_experiment.py MODELS --manifest FILE.csv --out FOLDER [--only-tables]
 
@@ -31,7 +31,7 @@ SEARCHES = ("--methods", "published", "--paper-terms", "--faces", "2500")
 
 def main() -> None:
     """Make what is missing, then print the tables and draw the figures."""
-    parser = argparse.ArgumentParser(description="repeat the experiment of docs/learning.md")
+    parser = argparse.ArgumentParser(description="repeat the experiment of the 2020 paper")
     parser.add_argument("models", type=Path)
     parser.add_argument("--manifest", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
@@ -82,9 +82,9 @@ def _tables(options: argparse.Namespace) -> None:
     given = ("--terms", "paper", "--manifest", str(options.manifest), "--pictures", str(options.out))
     _run("-m", "mdp.learning.evaluate", str(options.out / "paper"), *given, *rankers)
     widths = str(options.out / "widths.csv")
-    _run(
-        "-m", "mdp.learning.evaluate", "--figure7", widths, "--least-removed", str(LEAST_REMOVED), "--pictures", str(options.out)
-    )
+    chosen = ("--least-removed", str(LEAST_REMOVED))
+    _run("tools/compare_widths.py", "--out", widths, "--summary", *chosen)
+    _run("-m", "mdp.learning.evaluate", "--figure7", widths, *chosen, "--pictures", str(options.out))
     print(seeds_table(options.out))
     draw_curve(options.out)
 
@@ -108,7 +108,7 @@ def seeds_table(out: Path) -> str:
 
 
 def draw_curve(out: Path) -> None:
-    """Regret of the first candidate against the number of models that train."""
+    """NDCG@1 on the lists of the models that judge, against the share of the models that train."""
     from matplotlib.figure import Figure
 
     picture = Figure(figsize=(5.0, 4.0), layout="constrained")

@@ -16,7 +16,7 @@ import numpy as np
 
 from mdp.learning.baselines import BASELINES
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, run, split_names
-from mdp.learning.labels import RatedList, rate
+from mdp.learning.labels import RatedList, followed, rate
 from mdp.learning.lists import of_side, read_lists
 from mdp.learning.ndcg import Scores, as_searched
 from mdp.learning.sources import Side
@@ -64,7 +64,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _compare(options: argparse.Namespace) -> None:
     """Tables of all rankers, then what the features of each given one do."""
-    from mdp.learning.tables import tables
+    from mdp.learning.tables import regret_table, tables
 
     networks = [Network(file) for file in options.ranker]
     learnt = COLUMN_SETS[options.columns or "paper"]
@@ -79,7 +79,8 @@ def _compare(options: argparse.Namespace) -> None:
         if name not in options.without:
             sys.stderr.write(f"fitting {name}\n")
             rankers[name] = fit(sides[Side.TRAIN], sides[Side.VALIDATION], learnt)
-    for text in tables(rankers, sides[Side.TEST]):
+    known = [rated for rated in rate(followed(of_side(lists, Side.TEST, options.fold)), columns) if rated.teaches]
+    for text in (*tables(rankers, sides[Side.TEST]), regret_table(rankers, known) if known else "Regret: no list"):
         sys.stdout.write(f"{text}\n\n")
     for network in networks:
         _analyse(network, sides[Side.TEST], options)

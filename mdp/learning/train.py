@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
 from mdp.learning.labels import RatedList, followed, rate
 from mdp.learning.lists import of_side, of_some_models, read_lists
-from mdp.learning.ndcg import as_searched, at, regret
+from mdp.learning.ndcg import as_searched, at
 from mdp.learning.sources import Side
 from profiles.errors import LearningError
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 Trained = tuple["Scores", Callable[[Mapping[str, str]], bytes]]  # what a ranker gives a list, and its file with metadata
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
 CUTS = (1, 2, 3, 4, 5)  # of the NDCG, as the paper's table has them
-FIRST = (1, 2)  # candidates whose regret is said
 MOST_NETWORKS = 12  # of an ensemble: its file stays below 200 kB
 LOSSES = {"urank": "paper", "ranknet": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
 OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has its own
@@ -48,10 +47,11 @@ def train(arguments: Sequence[str] | None) -> None:
 
     columns = COLUMN_SETS[options.columns or LOSSES[options.loss]]
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
+    judge = rate(of_side(lists, Side.TEST, options.fold), columns)
     if options.loss == "regret":
         lists = followed(lists)
-    sides = [of_side(lists, side, options.fold) for side in (Side.TRAIN, Side.VALIDATION, Side.TEST)]
-    teach, stop, judge = (rate(some, columns) for some in (of_some_models(sides[0], options.share), *sides[1:]))
+    teach = rate(of_some_models(of_side(lists, Side.TRAIN, options.fold), options.share), columns)
+    stop = rate(of_side(lists, Side.VALIDATION, options.fold), columns)
     trained = _train_regret if options.loss == "regret" else _train_paper
     scores, export = trained(options, columns, (teach, stop))
     about = {
@@ -144,10 +144,10 @@ def counts(lists: Sequence[RatedList]) -> str:
 
 
 def judged(scores: "Scores", lists: Sequence[RatedList]) -> dict[str, float | int]:
-    """How many lists, and the means of NDCG and regret over them with four digits."""
-    measures = {f"NDCG@{cut}": at(cut) for cut in CUTS} | {f"regret of first {first}": regret(first) for first in FIRST}
-    means = {name: sum(measure(scores(rated), rated) for rated in lists) / len(lists) for name, measure in measures.items()}
-    return {"lists": len(lists), **{name: round(mean, 4) for name, mean in means.items()}}
+    """How many lists, and the means of NDCG over them with four digits."""
+    measures = {f"NDCG@{cut}": at(cut) for cut in CUTS}
+    sums = {name: sum(measure(scores(rated), rated) for rated in lists) for name, measure in measures.items() if lists}
+    return {"lists": len(lists), **{name: round(total / len(lists), 4) for name, total in sums.items()}}
 
 
 if __name__ == "__main__":

@@ -81,7 +81,9 @@ def _search(row: dict[str, str]) -> Search:
 
 
 def compare(searches: Sequence[Search], least_removed: float = 0.0) -> list[Comparison]:
-    """A comparison for every method and its settings, in the order they come; none where no model was searched in every way.
+    """A comparison for every method and its settings, in the order they come.
+
+    Left out are those of which no model was searched with every ranker at all its widths.
 
     least_removed: only models of which the widest plain beam removes at least this share of the risky area; the choice depends on
     no learned ranker.
@@ -93,6 +95,8 @@ def compare(searches: Sequence[Search], least_removed: float = 0.0) -> list[Comp
 
 def _comparison(method: tuple[str, str], searches: Sequence[Search], least_removed: float) -> Comparison:
     known = {(search.ranker, search.width, search.mesh): search for search in searches}
+    if len(known) < len(searches):
+        raise LearningError("a model was searched twice with rankers of one name at one width: give the files other names")
     kinds = sorted({(search.ranker, search.width) for search in searches}, key=lambda kind: (kind[0] != CLASSIC, *kind))
     models = [mesh for mesh in sorted({search.mesh for search in searches}) if all((*kind, mesh) in known for kind in kinds)]
     widest = max((width for ranker, width in kinds if ranker == CLASSIC), default=None)
@@ -140,6 +144,11 @@ def best_plain(comparison: Comparison) -> int:
 
 
 def _with_interval(measure: Callable[[Ints], Floats], drawn: Ints, form: str) -> list[str]:
-    """A figure over all models, and its 95 % interval over draws of them."""
-    low, high = np.quantile(measure(drawn), [0.025, 0.975])
-    return [f"{float(measure(np.arange(drawn.shape[1], dtype=np.int32))):{form}}", f"{low:{form}} to {high:{form}}"]
+    """A figure over all models, and its 95 % interval over the draws of them in which it is a number; "-" where it is none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        whole, draws = float(measure(np.arange(drawn.shape[1], dtype=np.int32))), measure(drawn)
+    known = draws[np.isfinite(draws)]
+    if not np.isfinite(whole) or not len(known):
+        return ["-", "-"]
+    low, high = np.quantile(known, [0.025, 0.975])
+    return [f"{whole:{form}}", f"{low:{form}} to {high:{form}}"]

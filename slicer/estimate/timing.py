@@ -21,7 +21,7 @@ TINY = 1e-9
 
 
 class Speeds(NamedTuple):
-    """What moves without extruding may have at most: mm/s straight up and down, across, and of the filament alone; mm/s2, inf
+    """Upper limits for moves that do not extrude: mm/s straight up and down, across, and of the filament alone; mm/s2, inf
     where the axes decide; (3,) mm/s of X, Y and Z."""
 
     lift_mm_s: float

@@ -24,7 +24,7 @@ from slicer.heights import Heights
 
 NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
-HIDDEN = 0.6  # line widths that they keep from a top: wedges stay open between the line ends of both, under the walls around it
+HIDDEN = 0.6  # line widths that they keep from a top, so that gaps between the ends of the lines lie under the walls around it
 HOLDS = 0.75  # line widths that a row may reach beyond what holds it
 ROWS = 0.5  # line widths between rows
 RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding

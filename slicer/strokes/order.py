@@ -6,8 +6,9 @@ infill. Every piece ends near the next one, and where a layer ends the next one 
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,8 @@ SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
 NO_GOAL = np.zeros((0, 3))
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 SUPPORTS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+Speed = Callable[[Bead], float]
+
 FIRST = -1  # the number of what comes before all islands: skirt and brim
 
 
@@ -35,17 +38,19 @@ def order_beads(
     tip: Floats | None,
     support: Polygons | None = None,
     skin: Polygons | None = None,
+    fixed: Floats | None = None,
 ) -> Strokes:
     """The beads of one layer in printing order.
 
     tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
-    beside an edge of an interface, which no travel passes over.
+    beside an edge of an interface, which no travel passes over; fixed: (number of kinds,) speeds of a first layer.
     """
+    speed_mm_s: Speed = partial(bead_speed_mm_s, process=process, fixed=fixed)
     support = Polygons() if support is None else support
     placed, retracts, detours = list[Bead](), np.zeros(0, np.bool_), dict[int, Floats]()
     if beads:
         first = beads[0].points[0] if tip is None else tip
-        placed = _sequence(beads, islands_of(beads, section, support), process, first, tip is None)
+        placed = _sequence(beads, islands_of(beads, section, support), speed_mm_s, first, tip is None)
         to = np.array([bead.points[0] for bead in placed])
         since = np.array([first, *(bead.points[-1] for bead in placed[:-1])])
         retracts, detours = travels(since, to, section, support, process, skin)
@@ -84,7 +89,7 @@ def _pieces_around(starts: Floats, area: Polygons) -> Ints:
     return pieces
 
 
-def _sequence(beads: Sequence[Bead], islands: Ints, process: Process, first: Floats, support_first: bool) -> list[Bead]:
+def _sequence(beads: Sequence[Bead], islands: Ints, speed_mm_s: Speed, first: Floats, support_first: bool) -> list[Bead]:
     """The beads in order, with their points as they are printed."""
     groups: defaultdict[int, list[Bead]] = defaultdict(list)
     for bead, island in zip(beads, islands.tolist(), strict=True):
@@ -94,14 +99,14 @@ def _sequence(beads: Sequence[Bead], islands: Ints, process: Process, first: Flo
     for island, after in zip(order, [*order[1:], order[-1]], strict=True):
         phases = _phases(groups[island])
         goal = NO_GOAL if after == island and len(phases) == 1 else np.append(_middle(groups[after]), np.nan)[None]
-        placed += _in_phases(phases, process, tip, goal)
-        tip = _end(placed[-1], -1, process)
+        placed += _in_phases(phases, speed_mm_s, tip, goal)
+        tip = _end(placed[-1], -1, speed_mm_s)
     return placed
 
 
-def _end(bead: Bead, end: int, process: Process) -> Floats:
+def _end(bead: Bead, end: int, speed_mm_s: Speed) -> Floats:
     """(3,) where a bead begins, end = 0, or ends, end = -1, and its speed."""
-    return np.append(bead.points[end], bead_speed_mm_s(bead, process))
+    return np.append(bead.points[end], speed_mm_s(bead))
 
 
 def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: bool) -> list[int]:
@@ -188,23 +193,23 @@ def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
         yield from _chains(loops[0], loops[1:])
 
 
-def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], process: Process, tip: Floats, goal: Floats) -> list[Bead]:
+def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], speed_mm_s: Speed, tip: Floats, goal: Floats) -> list[Bead]:
     """The phases of an island one after the other, each once more when it is known where the next one begins."""
     goals = [NO_GOAL] * (len(phases) - 1) + [goal]
     for _ in range(min(len(phases), ROUNDS)):
         runs, at = list[list[Bead]](), tip
         for phase, end in zip(phases, goals, strict=True):
-            runs.append(_short_order(phase, process, at, end))
-            at = _end(runs[-1][-1], -1, process)
-        goals = [*(_end(run[0], 0, process)[None] for run in runs[1:]), goal]
+            runs.append(_short_order(phase, speed_mm_s, at, end))
+            at = _end(runs[-1][-1], -1, speed_mm_s)
+        goals = [*(_end(run[0], 0, speed_mm_s)[None] for run in runs[1:]), goal]
     return [bead for run in runs for bead in run]
 
 
-def _short_order(items: Sequence[Sequence[Bead]], process: Process, tip: Floats, goal: Floats) -> list[Bead]:
+def _short_order(items: Sequence[Sequence[Bead]], speed_mm_s: Speed, tip: Floats, goal: Floats) -> list[Bead]:
     """Chains of beads in a short order from the tip on, with their points as they are printed."""
     lines = [item[0].points if len(item) == 1 else np.array([item[0].points[0], item[-1].points[-1]]) for item in items]
     fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
-    speeds = np.array([[bead_speed_mm_s(item[end], process) for end in (0, -1)] for item in items])
+    speeds = np.array([[speed_mm_s(item[end]) for end in (0, -1)] for item in items])
     placed: list[Bead] = []
     for k, pieces in order_lines(lines, speeds, fixed, [_freedom(item) for item in items], tip, goal):
         placed += items[k] if len(items[k]) > 1 else [replace(items[k][0], points=piece) for piece in pieces]

@@ -4,7 +4,7 @@ A change of speed on the way from one path to the next counts as much as CHANGE_
 each other where that is no long way round.
 
 Exchanges are the classic ones of the travelling salesman's problem: 2-opt (a stretch of the order reversed) and Or-opt (up to
-three neighbours moved elsewhere, reversed or not), with true lengths also where a path must not be reversed.
+three neighbours moved elsewhere), with true lengths also where a path must not be reversed.
 
 Some lines may begin at any of their corners: closed ones without a seam, and long open ones, which are taken in two. A long line
 of infill often runs through the whole island and ends beside its beginning, far from where the tip is. It is begun at the corner

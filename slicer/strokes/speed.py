@@ -106,8 +106,13 @@ def _of_strokes(strokes: Strokes, process: Process) -> Floats:
     return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
 
 
-def bead_speed_mm_s(bead: Bead, process: Process) -> float:
-    """Speed of a bead that neither overhangs nor is cooled by waiting: as in _of_strokes, before there are strokes."""
+def bead_speed_mm_s(bead: Bead, process: Process, fixed: Floats | None = None) -> float:
+    """Speed of a bead that neither overhangs nor is cooled by waiting: as in _of_strokes, before there are strokes.
+
+    fixed: (number of kinds,) speeds of a first layer.
+    """
+    if fixed is not None:
+        return float(fixed[KINDS.index(bead.kind)])
     if bead.over_infill:
         return process.infill_bridge_speed_mm_s
     usual: float = getattr(process, SPEED_KEYS[bead.kind])
@@ -196,7 +201,7 @@ def first_layer_speeds(process: Process) -> Floats:
 
 
 def stroke_accelerations(profile: Profile, first_layer: bool) -> Floats:
-    """(number of kinds,) mm/s2; inf where the process sets no acceleration at all, so that the firmware's own rule."""
+    """(number of kinds,) mm/s2; inf where the process sets none, which leaves the firmware's own in force."""
     process = profile.process
     if not sets_acceleration(process):
         return np.full(len(KINDS), np.inf)

@@ -53,8 +53,7 @@ SLACK_MM = 0.01  # what rounding may add to the lean
 LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
-HIGH = 4.0  # widths of the foot: what stands higher on it counts no more
-UNDER = (0.2, 0.5)  # of a disc's radius: how far it may stand aside of what it holds, no farther than needed
+UNDER = (0.2, 0.5)  # of a disc's radius: how far beside an overhang a disc may stand; the smaller value is tried first
 MOST = 0.5  # share of a place that one reason has to hold for
 NOWHERE = Polygons()
 
@@ -316,16 +315,26 @@ def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygon
     Each piece of it gets twice as wide as the support on it is high, as far as support_foot_mm on each side allows.
     """
     outlines, process = areas.sections.outlines, areas.process
-    highest = int(np.searchsorted(areas.heights.tip_mm[: len(printed)], HIGH * process.support_foot_mm))
-    tall: list[tuple[Polygons, float]] = []
-    for layer in reversed(range(min(highest + 1, len(printed)))):
-        tip_mm, over, tall = float(areas.heights.tip_mm[layer]), tall, []
-        for piece in islands(printed[layer]):
-            tall.append((piece, max([tip_mm, *(top_mm for upper, top_mm in over if not (upper ^ piece).is_empty())])))
-    lacking_mm = [top_mm - 0.5 * _width_mm(piece) for piece, top_mm in tall]
-    feet = [dilate(piece, min(lack, process.support_foot_mm)) for (piece, _), lack in zip(tall, lacking_mm, strict=True)]
+    widths_mm = [_width_mm(piece) for piece in islands(printed[0])]
+    enough_mm = process.support_foot_mm + 0.5 * max(widths_mm, default=0.0)  # higher support gets no wider foot
+    layers = range(min(int(np.searchsorted(areas.heights.tip_mm[: len(printed)], enough_mm)) + 1, len(printed)))
+    over, tops_mm = list[Polygons](), np.zeros(0)
+    for layer in reversed(layers):
+        pieces, boxes = islands(printed[layer]), np.array([piece.bounds() for piece in over]).reshape(-1, 4)
+        tip_mm = float(areas.heights.tip_mm[layer])
+        tops_mm = np.array([max([tip_mm, *tops_mm[_touched(piece, over, boxes)]]) for piece in pieces])
+        over = pieces
+    lacking_mm = tops_mm - 0.5 * np.array(widths_mm)
+    feet = [dilate(piece, min(lack, process.support_foot_mm)) for piece, lack in zip(over, lacking_mm.tolist(), strict=True)]
     beside = offset(outlines[0], process.support_distance_mm)
     return (union(feet) - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
+
+
+def _touched(piece: Polygons, others: Sequence[Polygons], boxes: Floats) -> list[int]:
+    """The numbers of the others that a piece overlaps; boxes: (n, 4) theirs."""
+    x0, y0, x1, y1 = piece.bounds()
+    near = (boxes[:, 0] < x1) & (boxes[:, 2] > x0) & (boxes[:, 1] < y1) & (boxes[:, 3] > y0)
+    return [k for k in np.flatnonzero(near).tolist() if not (others[k] ^ piece).is_empty()]
 
 
 def _width_mm(piece: Polygons) -> float:

@@ -49,6 +49,7 @@ def test_a_ranker_is_trained_and_judged_by_two_commands(
     rows = (str(ranker), "random", "M2", "M2 - lambda M6")
     assert all(f"| {name} |" in printed for name in rows)
     assert "| M6 |" in printed
+    assert "Regret, followed candidates: " in printed
     assert (tmp_path / "figure8-ranker.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -60,7 +61,7 @@ def test_an_ensemble_with_little_regret_is_trained_on_some_terms(
     asked = [str(records), "-o", str(tmp_path / "a.onnx"), "--loss", "regret", "--columns", "paper", "--epochs", "2"]
     assert train.main([*asked, "--ensemble", "2", "--terms", "paper"]) == 0
     printed = capsys.readouterr()
-    assert '"regret of first 1": ' in printed.out
+    assert '"NDCG@5": 0.' in printed.out
     assert " records, " in printed.out
     assert printed.err.count("epoch 2: loss") == 2
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.onnx", "records"]

@@ -58,6 +58,14 @@ def test_small_walls_of_an_island_are_printed_together_and_its_long_ones_too() -
     assert np.count_nonzero(np.diff(placed.small)) == 1
 
 
+def test_a_first_layer_of_one_speed_is_printed_in_the_shortest_order() -> None:
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], dtype=float)
+    beads = [Bead(Kind.OUTER_WALL, (2.0 if k % 2 else 20.0) * square + (1.0 * k, 0.0), 0.45, 0) for k in range(8)]
+    section, one_speed = Polygons.square((99, 99), True), np.full(len(KINDS), 20.0)
+    placed = order_beads(beads, section, STANDARD, np.zeros(2), fixed=one_speed)
+    assert np.hypot(*(placed.first_points[1:] - placed.last_points[:-1]).T).sum() == pytest.approx(7.0)
+
+
 def test_inner_lines_behind_no_seam_come_after_all_walls_between_the_lines_of_the_skin() -> None:
     ring = np.array([[1, 1], [40, 1], [40, 20], [1, 20], [1, 1]], dtype=float)
     walls = [Bead(Kind.OUTER_WALL, ring, 0.45, 0), replace(line(2, 2, 3, 2, -1, Kind.INNER_WALL), line=True)]

@@ -273,7 +273,7 @@ def test_support_gets_a_foot_on_the_platform() -> None:
     assert reach[0] - reach[1] == pytest.approx(3.0, abs=0.3)
 
 
-@pytest.mark.parametrize(("span", "height"), [(4.0, 1.4), (4.0, 3.0), (4.0, 12.0), (16.0, 3.0)])
+@pytest.mark.parametrize(("span", "height"), [(4.0, 1.4), (4.0, 3.0), (4.0, 12.0), (16.0, 3.0), (16.0, 14.0)])
 def test_a_foot_makes_support_twice_as_wide_as_high(span: float, height: float) -> None:
     feet = (
         supported(whole(table(span, span, height)), "process.bridge_longest_mm=1", "process.support_style=grid", foot)[1].areas[0]
