@@ -55,7 +55,6 @@ UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
 UNDER = (0.2, 0.5)  # of a disc's radius: how far beside an overhang a disc may stand; the smaller value is tried first
 MOST = 0.5  # share of a place that one reason has to hold for
-NOWHERE = Polygons()
 
 HEAP = 12  # layers united at a time: a sweep over all of them at once meets many more crossings
 
@@ -149,7 +148,7 @@ def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
 
 
 def grow(
-    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas, hard: Polygons = NOWHERE
+    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas, hard: Polygons | None = None
 ) -> tuple[list[Polygons], list[Polygons]]:
     """Grow support from the top down. Returns one area per layer of all support, and one of the support that begins there.
 
@@ -171,7 +170,7 @@ def grow(
         body = _body(area, radius)
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
-            contact = _contact(union(asked), body, areas.reachable[m], radius, hard)
+            contact = _contact(union(asked), body, areas.reachable[m], radius, Polygons() if hard is None else hard)
             if is_tree:
                 branches = add_contact(branches, contact, areas.reachable[m])
             elif not contact.is_empty():

@@ -7,12 +7,12 @@ import pytest
 from machine.app.pipeline.memory import return_large_arrays, return_unused
 
 
-def test_glibc_is_told_to_take_arrays_of_a_megabyte_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_glibc_is_told_to_take_arrays_of_a_megabyte_one_by_one_and_to_keep_two(monkeypatch: pytest.MonkeyPatch) -> None:
     told = []
     library = type("Library", (), {"mallopt": staticmethod(lambda option, value: told.append((option, value)))})
     monkeypatch.setattr(ctypes, "CDLL", lambda name: library)
     return_large_arrays()
-    assert told == [(-3, 1_048_576)]
+    assert told == [(-3, 1_048_576), (-1, 2_097_152)]
 
 
 def test_a_system_without_glibc_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
