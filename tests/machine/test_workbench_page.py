@@ -177,7 +177,7 @@ def test_a_typed_angle_turns_the_model_and_its_size_is_that_of_how_it_stands(bro
     open_model(browser, bench, "typed.stl", stl(tee()))
     browser.click("#tab-model")
     drag_slider(browser, "turn-x-typed", 90, "input")
-    assert "40.0 × 40.0 × 10.0 mm" in browser.value("$('model-told').textContent")  # while it turns
+    browser.wait("$('model-told').textContent.includes('40.0 × 40.0 × 10.0 mm')")  # while it turns
     drag_slider(browser, "turn-x-typed", 90, "change")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay the model down' && $('turn-x-typed').value === '0'")
     browser.wait("$('model-told').textContent.includes('40.0 × 40.0 × 10.0 mm') && $('size-z').value === '10.00'")
