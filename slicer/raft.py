@@ -116,10 +116,10 @@ def _layer(beads: list[Bead], area: Polygons, profile: Profile, height: Heights,
     """The beads of a layer in order, with speeds and heat; height: its own."""
     process, material, number = profile.process, profile.material, len(below)
     tip: Floats | None = below[-1].points[-1] if below and len(below[-1]) else None
-    fixed = None if number else first_layer_speeds(process)
-    strokes = order_beads(beads, Polygons(), process, tip, area, fixed=fixed)
+    kind_mm_s = None if number else first_layer_speeds(process)
+    strokes = order_beads(beads, Polygons(), process, tip, area, kind_mm_s=kind_mm_s)
     height_mm, flow = float(height.height_mm[0]), material.flow * (1.0 if number else process.first_layer_flow)
-    strokes, speeds = timed(strokes, profile, height_mm, fixed, flow)
+    strokes, speeds = timed(strokes, profile, height_mm, kind_mm_s, flow)
     add_c = 0.0 if number else material.first_layer_nozzle_c - material.nozzle_c
     at = {"z_mm": float(height.tip_mm[0]), "height_mm": height_mm}
     return layer_of(strokes, speeds, profile, **at, flow=flow, fan=rising_fan(material, number), add_c=add_c)

@@ -245,8 +245,8 @@ def order_layer(
     profile, process, on_platform, outline = sections.profile, sections.process, sections.on_platform, sections.outlines[index]
     if index == 0 and not on_platform:
         beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
-    first_flow, fixed = (1.0, None) if index else _first_layer(sections)
-    strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin, fixed)
+    first_flow, kind_mm_s = (1.0, None) if index else _first_layer(sections)
+    strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin, kind_mm_s)
     below = sections.below(index)
     if below is not None and own.fuzzy_skin != "none":
         below = offset(below, own.fuzzy_skin_thickness_mm)  # rough walls lie on rough walls
@@ -259,7 +259,7 @@ def order_layer(
         areas = [place.areas[index] for place in places]
         strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
     flow = profile.material.flow * first_flow
-    return *timed(strokes, profile, height_mm, fixed, flow, of_places), flow
+    return *timed(strokes, profile, height_mm, kind_mm_s, flow, of_places), flow
 
 
 def _first_layer(sections: Sections) -> tuple[float, Floats]:

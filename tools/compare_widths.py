@@ -26,6 +26,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from mdp.learning.command import Parser, check_range, run
 from mdp.learning.models import coarser, read_model
 from mdp.learning.sources import FOLDS, Side, read_sources, side
 from mdp.learning.task import PAPER_TERMS
@@ -35,7 +36,7 @@ from mdp.model_file import locate
 from mdp.ranking.ranker import CLASSIC
 from mdp.read import read_mesh
 from mdp.search.search import decompose
-from profiles.errors import MeshError
+from profiles.errors import LearningError, MeshError
 from profiles.profile import load
 
 Key = tuple[str, str, str, int, str]
@@ -67,9 +68,13 @@ class Row:
         return self.mesh, self.settings, self.method, self.width, self.ranker
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Search what is missing in the file, or print its tables."""
-    parser = argparse.ArgumentParser(description="compare beam widths over many models")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Search what is missing in the file, or print its tables; the exit code."""
+    return run(_main, arguments, "the same command goes on from here")
+
+
+def _main(arguments: Sequence[str] | None) -> None:
+    parser = Parser(prog="tools/compare_widths.py", description="compare beam widths over many models")
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--summary", action="store_true")
@@ -87,16 +92,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--limit", type=int, default=None, help="the most faces of a model")
     parser.add_argument("--only", default="", help="only models whose name has this in it")
     options = parser.parse_args(arguments)
+    check_range(options, "least_removed", 0.0, 1.0)
     if not options.summary:
         if options.folder is None or not options.folder.is_dir():
             parser.error(f"FOLDER is {options.folder}: a folder of npz files is needed")
         if options.side is not None and options.manifest is None:
             parser.error("--side needs --manifest, which tells where the models come from")
-        _run(options)
-    print("\n\n".join(summary(options.out, read(options.out), options.least_removed)))
+        _search_models(options)
+    searches, records = read_searches(options.out), read(options.out)
+    failed = [f"- {row.mesh}, {row.method}, width {row.width}: {row.error}" for row in records if row.error]
+    print("\n".join([f"{len(failed)} of {len(records)} searches failed", *failed]))
+    for comparison in compare(searches, options.least_removed):
+        print(f"\n{table(comparison)}")
 
 
-def _run(options: argparse.Namespace) -> None:
+def _search_models(options: argparse.Namespace) -> None:
     settings = [*(PAPER_TERMS if options.paper_terms else ()), *options.set]
     done = {row.key for row in read(options.out)}
     with options.out.open("a", newline="", encoding="utf-8") as file:
@@ -182,20 +192,17 @@ def searched(key: Key, mesh: Mesh) -> Row:
 
 
 def read(path: Path) -> list[Row]:
-    """The lines of a file; none when there is no such file."""
+    """The lines of a file; none when there is no such file. Raises LearningError for a file that is no such table."""
     if not path.exists():
         return []
     kinds: dict[str, Callable[[str], Any]] = get_type_hints(Row)
-    with path.open(newline="", encoding="utf-8") as file:
-        return [Row(**{key: kinds[key](value) for key, value in line.items() if key in kinds}) for line in csv.DictReader(file)]
-
-
-def summary(file: Path, records: Sequence[Row], least_removed: float = 0.0) -> Iterator[str]:
-    """A table in Markdown for each method and its settings, then what failed."""
-    yield from map(table, compare(read_searches(file), least_removed))
-    failed = [f"- {row.mesh}, {row.method}, width {row.width}: {row.error}" for row in records if row.error]
-    yield "\n".join([f"{len(failed)} of {len(records)} searches failed", *failed])
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = list(csv.DictReader(file))
+        return [Row(**{key: kinds[key](value) for key, value in line.items() if key in kinds}) for line in lines]
+    except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
+        raise LearningError(f"table {path}: cannot be read ({error})") from None
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -90,7 +90,7 @@ def _tables(options: argparse.Namespace) -> None:
 
 
 def figures(ranker: Path) -> dict[str, float]:
-    """What the training wrote into a ranker's file: NDCG and regret over the lists of the models that judge."""
+    """What the training wrote into a ranker's file: mean NDCG over the lists of the test models, and their number."""
     import onnx
 
     about = {entry.key: entry.value for entry in onnx.load(ranker).metadata_props}

@@ -23,7 +23,7 @@ def has_settings(file: Path) -> bool:
 def settings_inside(file: Path, name: str, kinds: Iterable[str] = KINDS) -> tuple[Given, str]:
     """The nearest shipped material with the settings inside a slicer file, and a note on how many of them are used.
 
-    name: of the file where its user has it; kinds: the profiles, material and process, that they are to make. Raises
+    name: of the file as its user knows it; kinds: the profiles to make of them, material, process or both. Raises
     ProfileError for a file that keeps none, or damaged ones.
     """
     if not is_slicer_file(file):

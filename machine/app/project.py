@@ -154,7 +154,7 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
     model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
-        from mdp.plans.writing import plan_text  # tomlkit, for projects alone
+        from mdp.plans.writing import plan_text  # loads tomlkit, which only projects need
 
         write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
     given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
@@ -315,7 +315,7 @@ def _check_inside(folder: Path, project: Project) -> None:
         if Path(str(mesh)).name != mesh:
             raise PlanError(f"{PLAN}: mesh is {mesh!r}: a file of the project is expected")
     try:
-        from mdp.plans.reading import read_plan  # 30 ms, for projects alone
+        from mdp.plans.reading import read_plan  # takes 30 ms to load; only projects need it
 
         plan = read_plan(project.plan)
     except PlanError as error:
@@ -429,7 +429,7 @@ def _extract(archive: zipfile.ZipFile, folder: Path) -> bool:
         raise PlanError(f"it unpacks to more than {MOST_FILES} files or {LARGEST_BYTES} bytes")
     for entry in entries:
         if entry.is_dir():
-            continue  # as zip -r writes them
+            continue  # zip -r writes an entry for each folder
         name = entry.filename.removeprefix(INSIDE)
         if not FILE_NAME.fullmatch(name) or (folder / name).exists():
             raise PlanError(f"{entry.filename!r} is no name of a file of a project, or there twice")

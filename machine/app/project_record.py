@@ -64,7 +64,7 @@ class Record(_Table):
     @model_validator(mode="after")
     def _agrees(self) -> "Record":
         matrix = np.array(self.rotation) if [len(row) for row in self.rotation] == [3, 3, 3] else np.zeros((3, 3))
-        matrix = np.clip(matrix, -2.0, 2.0)  # none of a rotation is as large, and products of larger ones overflow
+        matrix = np.clip(matrix, -2.0, 2.0)  # no entry of a rotation is that large, and products of larger numbers overflow
         if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0.0:
             raise ValueError(f"rotation is {self.rotation}: it must be three rows of a rotation")
         if not self.own_profiles.keys() <= set(KINDS):
@@ -116,14 +116,14 @@ def checked_record(**values: Any) -> Record:
 
 
 def _in_words(error: ValidationError) -> str:
-    """What is wrong with a record, its first problem alone."""
+    """A sentence on the first problem of a record."""
     problem: Any = error.errors(include_url=False)[0]
     *_, last = path = problem["loc"] or ("",)
     if problem["type"] == "json_invalid":
         return f"{RECORD} is not JSON"
     if not problem["loc"] and problem["type"] != "value_error":
         return f"{RECORD} is {str(problem['input'])[:LONGEST_VALUE]}: a table of keys is expected"
-    if isinstance(last, int) or path[0] in ("figures", "own_profiles"):  # of a list, or of a table with any keys
+    if isinstance(last, int) or path[0] in ("figures", "own_profiles"):  # an item of a list, or of a table with free keys
         key, expected = ".".join(map(str, path)), problem["msg"].removeprefix("Input should be ")
         return f"{RECORD}: {key} is {str(problem['input'])[:LONGEST_VALUE]}: it must be {expected}"
     return f"{RECORD}: {sentences([problem], Record)[0]}"

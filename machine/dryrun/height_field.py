@@ -20,8 +20,8 @@ CELL_MM, MOST_CELLS = 0.15, 6_000_000
 PIECE_MM = 0.25
 
 Point = tuple[float, float, float]
-# Height of the plastic, what it was below this layer, and one more than the row that laid it, 0 where there is none: together,
-# for a bead that crosses rows of cells meets another page of memory in each.
+# Height of the plastic, its height below this layer, and 1 + the row that laid it, 0 where there is no plastic. Kept together,
+# because a bead that crosses rows of cells touches another page of memory in each row.
 CELL = np.dtype([("top", np.float32), ("below", np.float32), ("owner", np.int32)])
 
 

@@ -154,7 +154,7 @@ def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
     ).all(axis=1)
     if not near.any():
         return []
-    import shapely  # 30 ms, for programs that lay beads beside their purge
+    import shapely  # takes 30 ms to load; needed only where beads lie beside the purge
 
     laid, lines, beads = laid[near], shapely.linestrings(lines), shapely.linestrings(beads[near])
     line, bead = shapely.STRtree(beads).query(lines, "dwithin", reach_mm)

@@ -295,7 +295,7 @@ def _replay_run(moves: Moves, strokes: Strokes, about: Surroundings, contacts: C
 def _replay_rows(
     moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats, lowered: Floats
 ) -> None:
-    """The same; lowered: (2, 3) room for a move's ends."""
+    """As _replay_run; lowered: (2, 3) scratch space for the lowered ends of a move."""
     begin, bead = about.first, about.first_bead
     first, open_mm, most, held = begin, 0.0, 0.0, FREE_END
     for row in range(begin, begin + len(pending)):

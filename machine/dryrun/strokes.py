@@ -66,7 +66,7 @@ class Beads:
         return self._measures[0]
 
     def boxes(self, count: int | None = None) -> Iterator[tuple[slice, Floats]]:
-        """The first beads, all if no number is given, in pieces, and what contains each: (2, 3) least and greatest X Y Z."""
+        """The first `count` beads, by default all, in pieces, each with its bounding box: (2, 3) least and greatest X Y Z."""
         last = len(self.rows) if count is None else count
         return ((slice(some.start, min(some.stop, last)), box) for some, box in self._measures[1] if some.start < last)
 
@@ -147,7 +147,7 @@ def parts_on_plate(program: ParsedProgram, deposited: Beads) -> list[int]:
 
 
 def turned_box(box: Floats, turn: Floats) -> Floats:
-    """(2, 3) least and greatest X Y Z of what a box contains, turned by (3, 3), or turned and moved by (3, 4)."""
+    """(2, 3) bounding box of a box turned by a (3, 3) matrix, or turned and moved by a (3, 4) one."""
     middle = turn[:, :3] @ box.mean(axis=0) + turn[:, 3:].sum(axis=1)
     reach = np.abs(turn[:, :3]) @ np.ptp(box, axis=0) / 2.0 + ROUNDING_MM
     return np.stack([middle - reach, middle + reach])

@@ -83,8 +83,8 @@ def goes_on(start: Floats, end: Floats, row: int) -> bool:
 
 @no_nrt
 def _place(rows: Floats, row: int, chain: Floats, angles: Floats, is_first: bool) -> Point:
-    """The workpiece point of one of (n, 5) rows; angles: (2, 3) place, deg, cosine and sine of both axes as they were last."""
-    axes = rows[row]  # here, where nobody counts who holds it
+    """The workpiece point of one of (n, 5) rows; angles: (2, 3) last place, deg, of both rotary axes, its cosine and sine."""
+    axes = rows[row]  # sliced in here, where no references are counted
     for axis in range(2):
         if is_first or axes[3 + axis] != angles[axis, 0]:
             angle = np.radians(chain[5 + axis, 0] * (axes[3 + axis] - chain[5 + axis, 1]))

@@ -44,7 +44,7 @@ def _parse(text: str, change: bool) -> Stop:
 
 
 def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
-    """Raise SliceError for a stop before a layer of a part that does not exist. count: of the parts."""
+    """Raise SliceError for a stop in a part that does not exist. count: the number of parts."""
     for stop in stops:
         if stop.part > count:
             raise SliceError(f"{stop.option}: there is no part {stop.part}, the parts are 1 to {count}")

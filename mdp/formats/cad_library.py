@@ -14,7 +14,7 @@ from profiles.errors import MeshError
 CODE = "from mdp.formats.cad_library import answer; answer()"
 # How far triangles may lie from the surface: a twentieth of a layer, and a circle in 36 corners at least.
 DEFLECTION_MM, DEFLECTION_RAD = 0.01, 0.17
-SIGKILL = getattr(signal, "SIGKILL", 0)  # sent by Linux to what takes the last of the memory; Windows has none
+SIGKILL = getattr(signal, "SIGKILL", 0)  # Linux sends it to a process that exhausts the memory; Windows has none
 DAMAGED = "is damaged: the CAD library (OpenCASCADE) cannot read it"
 KILLED = "the CAD library (OpenCASCADE) was killed while it read it: there may be too little memory"
 

@@ -3,8 +3,8 @@
     python -m mdp.learning.evaluate FOLDER [--manifest CSV] [--terms NAME,...] [--ranker FILE.onnx ...] [--without NAME,...] ...
     python -m mdp.learning.evaluate --figure7 TABLE.csv [--pictures DIR]
 
-Prints tables in Markdown. figure8-NAME.png: importance of a ranker's features, and their correlation; figure7.png: J against
-core time at the widths of the table that tools/compare_widths.py writes.
+Prints tables in Markdown. figure8-NAME.png: importance of a ranker's features, and their correlation; figure7.png: J and core
+time against the beam's width, from the table that tools/compare_widths.py writes.
 """
 
 import argparse
@@ -51,9 +51,10 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--repeats", type=int, default=10, metavar="K", help="how often each feature is shuffled")
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="where pictures go; here by default")
     parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/compare_widths.py")
-    parser.add_argument("--least-removed", type=float, default=0.0, metavar="SHARE", help="of its models, as there")
+    parser.add_argument("--least-removed", type=float, default=0.0, metavar="SHARE", help="only models with that much gain")
     options = parser.parse_args(arguments)
     check_range(options, "repeats", 1, 10_000)
+    check_range(options, "least_removed", 0.0, 1.0)
     unknown = [name for name in options.without if name not in BASELINES]
     if unknown:
         raise LearningError(f"--without {unknown[0]}: is no baseline; {'; '.join(BASELINES)} are there")
@@ -107,8 +108,6 @@ def _draw_widths(options: argparse.Namespace) -> None:
     from mdp.learning.widths import compare, read_searches
 
     comparisons = compare(read_searches(options.figure7), options.least_removed)
-    if not comparisons:
-        raise LearningError(f"table {options.figure7}: no model of it was searched with every ranker at all its widths")
     file = options.pictures / "figure7.png"
     save(draw_widths(comparisons), file)
     sys.stdout.write(f"![J and time against the beam's width]({file})\n")

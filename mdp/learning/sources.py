@@ -13,7 +13,7 @@ from profiles.errors import LearningError
 
 NEEDED = ("id", "source_repo", "source_path")
 TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest judges
-FOLDS = 4  # splits of which each judges other sources, so that all of them together judge every model
+FOLDS = 4  # splits whose test sets are disjoint and together hold every model
 
 
 class Side(StrEnum):
@@ -25,7 +25,7 @@ class Side(StrEnum):
 
 
 def side(source: str, fold: int = 0) -> Side:
-    """The side of a source in one of the FOLDS splits; it judges in exactly one of them."""
+    """The side of a source in one of the FOLDS splits; it is in the test set of exactly one of them."""
     share = (place(source) + fold / FOLDS) % 1.0
     if share < TRAIN_SHARE:
         return Side.TRAIN

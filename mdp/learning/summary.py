@@ -12,7 +12,7 @@ MOST_NAMES = 20  # of searches that failed: about a screen
 
 
 def summary(rows: Sequence[Row]) -> Iterator[str]:
-    """The searches on each of the terms, and what has no record and why."""
+    """The number of searches on each of the terms, then which of them have no record and why."""
     yield table(HEADS, [_of_terms([row for row in rows if row.terms == terms]) for terms in sorted({row.terms for row in rows})])
     reasons = Counter((row.terms, row.excluded.partition(":")[0]) for row in rows if row.excluded)
     if reasons:

@@ -38,7 +38,7 @@ def table(rankers: Mapping[str, Scores], lists: Sequence[RatedList]) -> str:
 
 
 def regret_table(rankers: Mapping[str, Scores], lists: Sequence[RatedList]) -> str:
-    """A row a ranker: by how much the best of its first few ends with more than the best of the list, as share of that.
+    """One row per ranker: how much worse the best of its first few candidates ends than the best of the list, as a share of that.
 
     lists: without the candidates that nobody followed, of which only the cost of stopping there is known.
     """

@@ -43,8 +43,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def train(arguments: Sequence[str] | None) -> None:
     """Train, write the ranker, say what it is worth on the lists that it never saw."""
     options = _options(arguments)
-    from mdp.learning.export import write
-
     columns = COLUMN_SETS[options.columns or LOSSES[options.loss]]
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
     judge = rate(of_side(lists, Side.TEST, options.fold), columns)
@@ -52,6 +50,8 @@ def train(arguments: Sequence[str] | None) -> None:
         lists = followed(lists)
     teach = rate(of_some_models(of_side(lists, Side.TRAIN, options.fold), options.share), columns)
     stop = rate(of_side(lists, Side.VALIDATION, options.fold), columns)
+    from mdp.learning.export import write
+
     trained = _train_regret if options.loss == "regret" else _train_paper
     scores, export = trained(options, columns, (teach, stop))
     about = {
@@ -112,7 +112,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--batch", type=int, metavar="N", help="lists a step; default 8, 64; the paper takes 1")
     parser.add_argument("--rate", type=float, metavar="R", help="learning rate of Adam; default 1e-4, 2e-3")
     parser.add_argument("--seed", type=int, default=0, metavar="N")
-    parser.add_argument("--share", type=float, default=1.0, metavar="S", help="of the models that train, for a learning curve")
+    parser.add_argument("--share", type=float, default=1.0, metavar="S", help="share of the training models that is used")
     options = parser.parse_args(arguments)
     for name, least, most in (
         ("epochs", 1, 1e6),
@@ -120,7 +120,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         ("batch", 1, 1e5),
         ("rate", 0.0, 10.0),
         ("seed", 0, 1e9),
-        ("share", 0.0, 1.0),
+        ("share", 0.01, 1.0),
     ):
         check_range(options, name, least, most)
     check_range(options, "ensemble", 1, MOST_NETWORKS)

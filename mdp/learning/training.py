@@ -59,7 +59,7 @@ class Epoch:
 
 @dataclass(eq=False)
 class _State:
-    """Where a training is, and the best that it has met."""
+    """How far a training has come, and its best network so far."""
 
     network: torch.nn.Module
     optimizer: torch.optim.Optimizer
@@ -78,7 +78,7 @@ def train(
 ) -> Figures:
     """Train a network in place on the named features of lists for training and for validation; the best figures.
 
-    Lists with a single rating are left out; LearningError where no others are there.
+    Lists with a single rating are left out. Raises LearningError if no others remain.
     """
     torch.set_num_threads(1)
     training, validation = ([rated for rated in side if rated.teaches] for side in lists)

@@ -7,6 +7,7 @@ as a share of what printing straight up leaves risky; where seams and stairs cos
 import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from profiles.errors import LearningError
 NEEDED = ("mesh", "settings", "method", "width", "share", "core_s")
 CLASSIC = "classic"
 RESAMPLES = 10_000
-MORE = 0.01  # of J: a model is worse or better than with a plain beam of the same width
+MORE = 0.01  # share of J by which a model must differ from a plain beam of the same width to count as worse or better
 HEADS = (
     "ranker | B | mean J | of plain B = 1 | 95 % | of the gap from plain 2 to the best plain width | 95 %"
     " | core time, of the widest plain beam | worse than plain by > 1 % | better by > 1 %"
@@ -65,8 +66,9 @@ def read_searches(table: Path) -> list[Search]:
     """
     try:
         with table.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        missing = [name for name in NEEDED if not rows or name not in rows[0]]
+            reader = csv.DictReader(file)
+            rows = list(reader)
+        missing = [name for name in NEEDED if name not in (reader.fieldnames or ())]
         if missing:
             raise LearningError(f"table {table}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
         return [_search(row) for row in rows if not row.get("error") and float(row.get("risky_mm2") or 1.0) > 0.0]
@@ -76,6 +78,8 @@ def read_searches(table: Path) -> list[Search]:
 
 def _search(row: dict[str, str]) -> Search:
     numbers = int(row["width"]), float(row["share"]), float(row["core_s"])
+    if not all(map(isfinite, numbers)):
+        raise ValueError(f"{row['mesh']}, width {row['width']}: share is {row['share']}, core_s {row['core_s']}")
     ranker = Path(row.get("ranker") or CLASSIC).stem  # files of one name are one ranker, trained for different folds
     return Search(row["mesh"], row["settings"], row["method"], ranker, *numbers)
 
@@ -83,20 +87,24 @@ def _search(row: dict[str, str]) -> Search:
 def compare(searches: Sequence[Search], least_removed: float = 0.0) -> list[Comparison]:
     """A comparison for every method and its settings, in the order they come.
 
-    Left out are those of which no model was searched with every ranker at all its widths.
+    A comparison is left out if no model was searched with every ranker at all of its widths; LearningError if none is left.
 
     least_removed: only models of which the widest plain beam removes at least this share of the risky area; the choice depends on
     no learned ranker.
     """
     kinds = dict.fromkeys((search.method, search.settings) for search in searches)
     found = (_comparison(kind, [s for s in searches if (s.method, s.settings) == kind], least_removed) for kind in kinds)
-    return [comparison for comparison in found if comparison.models]
+    known = [comparison for comparison in found if comparison.models]
+    if not known:
+        fewer = f", with {least_removed:g} of its risky area removed by the widest plain beam" if least_removed else ""
+        raise LearningError(f"no model was searched with every ranker at all widths{fewer}: there is nothing to compare")
+    return known
 
 
 def _comparison(method: tuple[str, str], searches: Sequence[Search], least_removed: float) -> Comparison:
     known = {(search.ranker, search.width, search.mesh): search for search in searches}
     if len(known) < len(searches):
-        raise LearningError("a model was searched twice with rankers of one name at one width: give the files other names")
+        raise LearningError("a model was searched twice at one width by rankers of one name: give their files different names")
     kinds = sorted({(search.ranker, search.width) for search in searches}, key=lambda kind: (kind[0] != CLASSIC, *kind))
     models = [mesh for mesh in sorted({search.mesh for search in searches}) if all((*kind, mesh) in known for kind in kinds)]
     widest = max((width for ranker, width in kinds if ranker == CLASSIC), default=None)
@@ -132,7 +140,8 @@ def _cells(comparison: Comparison, kind: Kind, drawn: Ints) -> list[str]:
 
         cells[3:5] = _with_interval(closed, drawn, ".0%")
     if plain:
-        cells[5] = f"{comparison.core_s[kind].sum() / comparison.core_s[CLASSIC, plain[-1]].sum():.2f}"
+        widest_s = comparison.core_s[CLASSIC, plain[-1]].sum()
+        cells[5] = f"{comparison.core_s[kind].sum() / widest_s:.2f}" if widest_s > 0.0 else "-"
     if equal is not None and kind[0] != CLASSIC:
         cells[6:] = [f"{(own > (1.0 + MORE) * equal).mean():.1%}", f"{(own < (1.0 - MORE) * equal).mean():.1%}"]
     return cells

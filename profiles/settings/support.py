@@ -112,7 +112,7 @@ class Support(Frozen):
         2.0,
         ge=0,
         le=20,
-        description="support is wider by up to this in its first layer on the platform, so that it sticks: no wider than twice "
+        description="support is wider by up to this in its first layer on the platform, to stick better; no wider than twice "
         "its own height, mm",
     )
     support_foot_density: float = Field(

@@ -23,7 +23,7 @@ from slicer.strokes.strokes import Strokes, strokes_of
 from slicer.strokes.travels import travels
 
 SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
-NO_GOAL = np.zeros((0, 3))
+NO_GOAL = np.zeros((0, 3))  # x, y and speed; a speed that is not known is NaN, which differs from every other
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 SUPPORTS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
 Speed = Callable[[Bead], float]
@@ -38,14 +38,14 @@ def order_beads(
     tip: Floats | None,
     support: Polygons | None = None,
     skin: Polygons | None = None,
-    fixed: Floats | None = None,
+    kind_mm_s: Floats | None = None,
 ) -> Strokes:
     """The beads of one layer in printing order.
 
     tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
-    beside an edge of an interface, which no travel passes over; fixed: (number of kinds,) speeds of a first layer.
+    beside an edge of an interface, which no travel passes over; kind_mm_s: as for the speeds of a layer.
     """
-    speed_mm_s: Speed = partial(bead_speed_mm_s, process=process, fixed=fixed)
+    speed_mm_s: Speed = partial(bead_speed_mm_s, process=process, kind_mm_s=kind_mm_s)
     support = Polygons() if support is None else support
     placed, retracts, detours = list[Bead](), np.zeros(0, np.bool_), dict[int, Floats]()
     if beads:
@@ -139,7 +139,7 @@ def _middle(beads: Sequence[Bead]) -> Floats:
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
     """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together.
 
-    Inner lines behind no outer wall's seam come with what fills the walls: most are as fast, and lie beside it.
+    Inner walls that are open lines and behind no seam are printed with the infill: most have its speed and lie beside it.
     """
     leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
     walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
@@ -178,7 +178,7 @@ def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
     """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
 
     The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
-    print them first would mean to go there and back. Lines among them, which begin beside nothing, stay by themselves.
+    print them first would mean going there and back. Open lines among them begin beside no other wall and stay single.
     """
     chain, others = [leader], list[Bead]()
     for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):

@@ -1,7 +1,7 @@
 """Path order: a short order of paths that each have a start and an end: greedy nearest neighbour, then exchanges.
 
 A change of speed on the way from one path to the next counts as much as CHANGE_MM of travel, so that paths of one speed follow
-each other where that is no long way round.
+each other unless that means a long detour.
 
 Exchanges are the classic ones of the travelling salesman's problem: 2-opt (a stretch of the order reversed) and Or-opt (up to
 three neighbours moved elsewhere), with true lengths also where a path must not be reversed.
@@ -21,7 +21,7 @@ from mdp.kernels.arrays import flags, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 
-CHANGE_MM = 3.0  # with 15 mm prints of many small islands take 1 % longer: most travels also retract
+CHANGE_MM = 3.0  # at 15 mm, prints with many small islands take 1 % longer, since most of their travels also retract
 TRIES = 2  # the order depends on where lines begin, and that on the order
 WORTH_MM = 5.0  # travel that taking a line in two has to save: a bead that ends and begins once more shows
 CLOSED, OPEN, AS_IT_IS = 2, 1, 0  # what may be done with a line: begun anywhere, begun anywhere in two pieces, nothing
@@ -103,7 +103,7 @@ def _nearer_from_its_end(line: Floats, since: Floats, to: Floats) -> bool:
 def order_paths(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], tip: Floats, goal: Floats) -> Order:
     """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) must not be reversed.
 
-    tip: (3,) where and with which speed all begins; goal: (1, 3) where and with which the order should end up, or (0, 3).
+    tip: (3,) place and speed from which the order starts; goal: (1, 3) those at which it should end, or (0, 3).
     """
     n = len(starts)
     given = table(2 * n + 1, 3)

@@ -106,13 +106,13 @@ def _of_strokes(strokes: Strokes, process: Process) -> Floats:
     return np.where(strokes.over_infill, process.infill_bridge_speed_mm_s, lowered)
 
 
-def bead_speed_mm_s(bead: Bead, process: Process, fixed: Floats | None = None) -> float:
-    """Speed of a bead that neither overhangs nor is cooled by waiting: as in _of_strokes, before there are strokes.
+def bead_speed_mm_s(bead: Bead, process: Process, kind_mm_s: Floats | None = None) -> float:
+    """Speed of a bead before it becomes a stroke: as in _of_strokes, but without overhangs and without slowing down to cool.
 
-    fixed: (number of kinds,) speeds of a first layer.
+    kind_mm_s: by number of the kind, in place of the process's.
     """
-    if fixed is not None:
-        return float(fixed[KINDS.index(bead.kind)])
+    if kind_mm_s is not None:
+        return float(kind_mm_s[KINDS.index(bead.kind)])
     if bead.over_infill:
         return process.infill_bridge_speed_mm_s
     usual: float = getattr(process, SPEED_KEYS[bead.kind])

@@ -17,7 +17,7 @@ from slicer.strokes.travels import may_wipe_over
 
 SHORTEST = 0.5  # line widths: the steps of skin lines are no shorter,
 SHORTEST_STROKE = 4.0  # line widths of a stroke whose steps are lengthened
-ASIDE, ASIDE_ON_TOP = 0.25, 0.15  # where a line need not lie farther aside for that; on tops gaps are seen
+ASIDE, ASIDE_EXACT = 0.25, 0.15  # and lie no farther aside for that than this; exact: tops, whose gaps show, and bridges
 
 
 def timed(
@@ -42,7 +42,7 @@ def _without_short_steps(strokes: Strokes) -> Strokes:
     # A shorter stroke is nothing but its two ends, which lie where the layer below holds them.
     eases = strokes.is_of(*SKINS) & (strokes.lengths_mm > SHORTEST_STROKE * strokes.width_mm)
     width_mm = np.where(eases, strokes.width_mm, 0.0)
-    aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN), ASIDE_ON_TOP, ASIDE)
+    aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN, Kind.BRIDGE), ASIDE_EXACT, ASIDE)
     points, left = lengthen_steps(strokes.points, strokes.starts, SHORTEST * width_mm, aside_mm)
     eased = replace(strokes, points=points[left], starts=np.append(0, np.cumsum(left))[strokes.starts])
     return replace(eased, flow=strokes.flow * strokes.lengths_mm / np.maximum(eased.lengths_mm, 1e-9))

@@ -99,7 +99,7 @@ def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, l
         mm2 = filled.area()
         if mm2 >= least_mm2 or distance_mm >= least_mm:
             break
-        # What is missing asks for as many more steps, if each adds as much as the last one did.
+        # Extrapolate: as many more steps as the missing area needs if each adds as much as the last one did.
         more_mm = 1.02 * step_mm * (least_mm2 - mm2) / max(mm2 - before_mm2, 0.1 * mm2)
         step_mm, before_mm2 = min(more_mm, least_mm - distance_mm), mm2
         distance_mm += step_mm

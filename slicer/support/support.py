@@ -311,7 +311,7 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
 def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
     """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
 
-    Each piece of it gets twice as wide as the support on it is high, as far as support_foot_mm on each side allows.
+    Each piece becomes up to twice as wide as the support on it is high, but grows by at most support_foot_mm on each side.
     """
     outlines, process = areas.sections.outlines, areas.process
     widths_mm = [_width_mm(piece) for piece in islands(printed[0])]
@@ -337,7 +337,7 @@ def _touched(piece: Polygons, others: Sequence[Polygons], boxes: Floats) -> list
 
 
 def _width_mm(piece: Polygons) -> float:
-    """The diameter of a disc; of a strip twice its width."""
+    """Four times the area over the perimeter: the diameter of a disc, twice the width of a long strip."""
     return float(4.0 * piece.area() / sum(length_mm(close_loop(loop)) for loop in contours(piece)))
 
 

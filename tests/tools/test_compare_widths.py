@@ -21,3 +21,12 @@ def test_a_run_writes_one_line_a_search_and_goes_on_where_it_stopped(tmp_path: P
     assert [(row.mesh, row.width, row.error[:9]) for row in read(out)] == [
         *(("branch", 1, ""), ("open", 1, "MeshError"), ("branch", 2, ""), ("open", 2, "MeshError")),
     ]
+
+
+def test_a_summary_of_no_table_of_searches_ends_with_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out.csv"
+    for text in (None, "", "mesh,width\na,wide\n", "\x00"):
+        if text is not None:
+            out.write_text(text)
+        assert main(["--out", str(out), "--summary"]) == 1
+        assert capsys.readouterr().err.startswith(f"error: table {out}: ")

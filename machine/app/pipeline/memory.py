@@ -11,7 +11,7 @@ def return_large_arrays() -> None:
     """Have glibc take arrays of a megabyte and more from the system one by one.
 
     By itself it puts those below 32 MB into its heap, whose gaps a dry run of 700,000 lines leaves 190 MB too large. Where there
-    is no glibc nothing happens. Two megabytes at its end stay for the next ones: else each small array is mapped again.
+    is no glibc nothing happens. Two free megabytes stay at the end of the heap: else small arrays are mapped again and again.
     """
     with suppress(AttributeError, OSError, TypeError):
         libc = ctypes.CDLL(None)

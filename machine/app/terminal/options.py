@@ -112,7 +112,7 @@ class SearchOptions:
 
 @dataclass(frozen=True)
 class FileOptions(SearchOptions):
-    """Options of a command for one model: how it is cut, and its plate and settings in a slicer file."""
+    """Options of a command for one model: how to cut it, and which plate and settings of a slicer file to use."""
 
     plate: Annotated[
         int | None,
@@ -261,9 +261,9 @@ def _over_project(
 
 
 def _given_by(model: str, given: ProfileOptions) -> Given:
-    """The settings inside a slicer file for the profiles that nobody has named; a note on stderr says how many are used.
+    """The settings inside a slicer file for the profiles that no option names; a note on stderr says how many are used.
 
-    Raises ProfileError for a model without, and where both profiles are named.
+    Raises ProfileError if the model has no settings, or if both profiles are named.
     """
     from machine.app.file_settings import settings_inside
     from machine.app.terminal.progress import say

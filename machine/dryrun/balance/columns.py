@@ -100,7 +100,7 @@ def _columns(middle: float, reach: float, axis: int, lattice: Lattice) -> tuple[
 @kernel
 def tops(bars: Bars, lattice: Lattice, least: float) -> Floats:
     """Height at which each column leaves the uppermost of some bars, which may lie at any slant and end round, as beads turn at
-    corners; NOTHING where there is none. Below `least` it may be any that is lower.
+    corners; NOTHING where there is none. A height below `least` may be returned as any lower one, or as NOTHING.
     """
     top = table(lattice.shape[0], lattice.shape[1])
     for i in range(lattice.shape[0]):

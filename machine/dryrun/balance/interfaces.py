@@ -135,7 +135,7 @@ def _printing_directions(program: ParsedProgram, rows: Indices, profile: Profile
 def _interface(
     program: ParsedProgram, deposited: Beads, which: tuple[Indices, Mask], turn: Floats, profile: Profile
 ) -> Interface:
-    """which: beads of the first layer, and which of those before it are of earlier parts; turn: into the part's frame."""
+    """which: beads of the first layer, and which of the beads before it belong to earlier parts; turn: into the part's frame."""
     first, near = which
     layer = _bars(program, deposited, first, turn, profile)
     mm3 = program.e_mm[deposited.rows[first]] * _filament_mm2(profile)
@@ -152,7 +152,7 @@ def _interface(
             near[some] &= (np.abs((deposited.segments(some) @ turn[2]) - tip_mm) < REACH_MM).any(axis=1)
     near_mm = NEAR * max(float(np.median(layer.height)), 0.2)
     room = tops(_bars(program, deposited, np.flatnonzero(near), turn, profile), lattice, tip_mm - near_mm)
-    np.maximum(np.subtract(tip_mm, room, out=room), 0.0, out=room)  # a lattice is large: worked out in its place
+    np.maximum(np.subtract(tip_mm, room, out=room), 0.0, out=room)  # in place, because a lattice is large
     touching = room < near_mm
     room[~touching] = 0.0
     room *= lattice.column_mm2

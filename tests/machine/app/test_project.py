@@ -267,7 +267,7 @@ def test_a_record_that_no_project_has_is_damage(
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_project_that_was_zipped_with_its_folders_opens() -> None:
+def test_a_project_whose_archive_has_entries_for_folders_opens() -> None:
     run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     changed(Path("tee.3mf"), INSIDE, b"")
     run("decompose", "tee.3mf", "-o", "parts")

@@ -259,7 +259,7 @@ def test_rows_are_judged_alike_however_many_are_judged_at_once(rows_at_once: int
         assert all(np.array_equal(own, other) for own, other in zip(run.contacts, expected.contacts, strict=True))
 
 
-def test_a_turned_box_contains_all_beads_of_its_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_turned_bounding_box_of_a_piece_contains_all_its_beads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parsed, "AT_ONCE", 100)
     profile, _, lines = bent("generic_ac")
     deposited = dry_run(lines, profile).deposited

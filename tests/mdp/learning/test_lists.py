@@ -65,13 +65,13 @@ def test_sources_are_split_as_in_the_paper_and_always_alike() -> None:
     assert [side(name) for name in ("a", "b", "c")] == [Side.TEST, Side.TRAIN, Side.TRAIN]
 
 
-def test_every_source_judges_in_exactly_one_fold_and_trains_in_others() -> None:
+def test_every_source_is_tested_in_exactly_one_fold_and_trains_in_at_least_two() -> None:
     sides = np.array([[side(f"source {number}", fold) for fold in range(FOLDS)] for number in range(500)])
     assert ((sides == Side.TEST).sum(axis=1) == 1).all()
     assert ((sides == Side.TRAIN).sum(axis=1) >= 2).all()
 
 
-def test_a_share_of_the_models_is_part_of_a_larger_share(tmp_path: Path) -> None:
+def test_a_larger_share_of_the_models_contains_a_smaller_one(tmp_path: Path) -> None:
     for number in range(60):
         write_record(tmp_path / f"m{number}.0.x.npz", OUTCOME)
     quarter, half, whole = ({rated.model for rated in of_some_models(read_lists(tmp_path), share)} for share in (0.25, 0.5, 1.0))

@@ -105,7 +105,7 @@ def test_what_failed_or_lost_its_record_is_done_again(tmp_path: Path) -> None:
     assert [search.id for search in missing] == ["b", "d", "e"]
 
 
-def test_a_collection_is_told_as_tables() -> None:
+def test_a_collection_is_summarized_in_tables() -> None:
     done = Row("a", 0, "paper", "B=3", lists=3, mean_list_length=3.0, outcome=0.5, seconds=36.0)
     alike = Row("a", 1, "paper", "B=3", lists=1, mean_list_length=5.0, outcome=0.7)
     counts, reasons, failed = summary([done, alike, Row("b", 0, "paper", "B=3", excluded="failed: no mesh")])

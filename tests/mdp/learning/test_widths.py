@@ -18,7 +18,7 @@ def cells(text: str, ranker: str, width: int) -> list[str]:
     return [cell.strip() for cell in line.strip("|").split("|")][2:]
 
 
-def test_a_comparison_is_of_the_models_that_all_searches_have() -> None:
+def test_a_comparison_counts_only_models_for_which_every_search_was_made() -> None:
     learned = [search(mesh, "learned", 1, share) for mesh, share in (("a", 0.2), ("b", 0.4), ("c", 0.9))]
     plain = [search(mesh, "classic", width, 0.5 / width) for mesh in ("a", "b") for width in (2, 1)]
     (comparison,) = compare([*learned, *plain])
@@ -28,15 +28,16 @@ def test_a_comparison_is_of_the_models_that_all_searches_have() -> None:
     assert comparison.core_s["classic", 2].tolist() == [4.0, 4.0]
 
 
-def test_models_on_which_the_widest_plain_beam_wins_little_are_left_out() -> None:
+def test_models_from_which_the_widest_plain_beam_removes_little_are_left_out() -> None:
     plain = [search(mesh, "classic", 50, share) for mesh, share in (("a", 0.94), ("b", 0.96))]
     learned = [search(mesh, "learned", 2, 0.5) for mesh in "ab"]
     (comparison,) = compare([*plain, *learned], least_removed=0.05)
     assert comparison.models == ("a",)
-    assert not compare([*plain, *learned], least_removed=0.5)
+    with pytest.raises(LearningError, match="nothing to compare"):
+        compare([*plain, *learned], least_removed=0.5)
 
 
-def test_a_row_has_the_mean_its_share_of_plain_and_of_the_gap_and_the_time() -> None:
+def test_a_row_holds_the_mean_the_ratio_to_plain_the_closed_gap_and_the_core_time() -> None:
     plain = [search(mesh, "classic", *figures) for mesh in "ab" for figures in ((1, 0.8), (2, 0.6), (10, 0.4), (50, 0.5))]
     learned = [search("a", "learned", 2, 0.6), search("b", "learned", 2, 0.4)]
     (comparison,) = compare([*plain, *learned])
@@ -48,6 +49,11 @@ def test_a_row_has_the_mean_its_share_of_plain_and_of_the_gap_and_the_time() -> 
 def test_a_learned_ranker_without_a_plain_search_beside_it_is_compared_with_nothing() -> None:
     (comparison,) = compare([search("a", "learned", 2, 0.5)])
     assert cells(table(comparison), "learned", 2) == ["0.5000", *"-------"]
+
+
+def test_core_times_of_nothing_are_compared_with_nothing() -> None:
+    (comparison,) = compare([Search("a", "", "best", "classic", 1, 0.5, 0.0)])
+    assert cells(table(comparison), "classic", 1)[5] == "-"
 
 
 def test_the_interval_agrees_with_the_normal_law() -> None:
@@ -66,19 +72,22 @@ def test_models_without_a_risky_face_and_failed_searches_do_not_count(tmp_path: 
     assert read_searches(file) == [Search("a", "s", "best", "classic", 1, 0.5, 2.0)]
 
 
-def test_files_of_one_name_are_one_ranker(tmp_path: Path) -> None:
+def test_ranker_files_of_the_same_name_count_as_one_ranker(tmp_path: Path) -> None:
     file = tmp_path / "widths.csv"
     file.write_text(f"{HEAD},ranker\na,s,best,1,9,0.5,2,,f0/urank.onnx\nb,s,best,1,9,0.5,2,,f1/urank.onnx\n")
     assert [found.ranker for found in read_searches(file)] == ["urank", "urank"]
 
 
-def test_a_table_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_table_of_searches_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "widths.csv"
     with pytest.raises(LearningError, match="cannot be read"):
         read_searches(file)
     file.write_text("mesh,share\na,1\n")
     with pytest.raises(LearningError, match="has no column settings, method, width, core_s"):
         read_searches(file)
-    file.write_text(f"{HEAD}\na,s,best,wide,9,0.5,2,\n")
-    with pytest.raises(LearningError, match="cannot be read"):
-        read_searches(file)
+    for figures in ("wide,9,0.5,2", "1,9,nan,2", "1,9,0.5,inf", "1,9"):
+        file.write_text(f"{HEAD}\na,s,best,{figures},\n")
+        with pytest.raises(LearningError, match="cannot be read"):
+            read_searches(file)
+    file.write_text(f"{HEAD}\n")
+    assert not read_searches(file)

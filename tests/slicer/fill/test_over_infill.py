@@ -62,7 +62,7 @@ def test_a_bridge_over_infill_has_no_tongue_too_narrow_for_a_line() -> None:
     assert bridge.bounds() == pytest.approx((-5.0, -5.0, 5.0, 5.0), abs=0.1 * WIDTH)
 
 
-def test_the_border_of_a_bridge_over_infill_lies_under_the_walls_around_a_pit() -> None:
+def test_a_bridge_over_infill_ends_under_the_walls_around_a_pit() -> None:
     bare, inside = block(0.0, 0.0, 3.0), block(0.0, 0.0, 10.0)  # the floor of a pit, on solid layers 0.4 mm wider all round
     region = Region(bare, inside, Polygons(), Polygons(), Polygons())
     bridge = infill_bridges(region, inside - block(0.0, 0.0, 3.8), WIDTH)

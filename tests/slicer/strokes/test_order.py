@@ -62,11 +62,11 @@ def test_a_first_layer_of_one_speed_is_printed_in_the_shortest_order() -> None:
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], dtype=float)
     beads = [Bead(Kind.OUTER_WALL, (2.0 if k % 2 else 20.0) * square + (1.0 * k, 0.0), 0.45, 0) for k in range(8)]
     section, one_speed = Polygons.square((99, 99), True), np.full(len(KINDS), 20.0)
-    placed = order_beads(beads, section, STANDARD, np.zeros(2), fixed=one_speed)
+    placed = order_beads(beads, section, STANDARD, np.zeros(2), kind_mm_s=one_speed)
     assert np.hypot(*(placed.first_points[1:] - placed.last_points[:-1]).T).sum() == pytest.approx(7.0)
 
 
-def test_inner_lines_behind_no_seam_come_after_all_walls_between_the_lines_of_the_skin() -> None:
+def test_inner_walls_that_are_lines_are_printed_among_the_skin_after_all_other_walls() -> None:
     ring = np.array([[1, 1], [40, 1], [40, 20], [1, 20], [1, 1]], dtype=float)
     walls = [Bead(Kind.OUTER_WALL, ring, 0.45, 0), replace(line(2, 2, 3, 2, -1, Kind.INNER_WALL), line=True)]
     inner = [replace(line(x, 10, x + 5, 10, -1, Kind.INNER_WALL), line=True) for x in (10, 20)]

@@ -89,11 +89,11 @@ def in_turn(step_mm: float) -> tuple[list[int], list[bool]]:
     return order.tolist(), (speeds[order] == 25.0).tolist()
 
 
-def test_close_paths_of_one_speed_follow_each_other() -> None:
+def test_close_paths_of_one_speed_are_printed_together() -> None:
     _, slow = in_turn(1.0)  # to go back along the row once is 7 mm, its seven changes of speed are worth 21
     assert slow == [True] * 4 + [False] * 4
 
 
-def test_paths_of_one_speed_that_are_far_apart_do_not() -> None:
+def test_distant_paths_of_one_speed_are_not_grouped() -> None:
     order, _ = in_turn(50.0)  # to go back is 350 mm
     assert order == list(range(8))

@@ -66,7 +66,7 @@ def test_a_skin_line_that_reaches_into_a_corner_has_no_short_steps_and_keeps_its
     assert float(printed.flow[0] * printed.lengths_mm[0]) == pytest.approx(float(np.hypot(*np.diff(line, axis=0).T).sum()))
 
 
-def test_a_line_that_is_shortened_asks_the_hot_end_for_no_more_than_it_melts() -> None:
+def test_a_shortened_line_is_no_faster_than_the_hot_end_can_melt() -> None:
     line = np.array([[-8.0, -6.0], [-0.55, 0.0], [0.0, 0.0], [0.0, -0.149], [-0.173, -0.173], [-7.0, -7.0]])
     strokes = strokes_of([Bead(Kind.SKIN, line, 0.42, 0)], np.array([True]), {}, 0.0)
     profile = load(settings=["process.skin_speed_mm_s=500", "process.least_layer_time_s=0"])

@@ -274,7 +274,7 @@ def test_support_gets_a_foot_on_the_platform() -> None:
 
 
 @pytest.mark.parametrize(("span", "height"), [(4.0, 1.4), (4.0, 3.0), (4.0, 12.0), (16.0, 3.0), (16.0, 14.0)])
-def test_a_foot_makes_support_twice_as_wide_as_high(span: float, height: float) -> None:
+def test_a_foot_widens_support_to_twice_its_height_at_most(span: float, height: float) -> None:
     feet = (
         supported(whole(table(span, span, height)), "process.bridge_longest_mm=1", "process.support_style=grid", foot)[1].areas[0]
         for foot in ("process.support_foot_mm=1.5", "process.support_foot_mm=0")
@@ -284,7 +284,7 @@ def test_a_foot_makes_support_twice_as_wide_as_high(span: float, height: float) 
     assert wide.bounds[3] - narrow.bounds[3] == pytest.approx(np.clip(0.5 * lacking_mm, 0.0, 1.5), abs=0.12)
 
 
-def test_support_beside_a_slope_comes_under_it_by_half_a_line() -> None:
+def test_support_beside_a_slope_reaches_half_a_line_under_it() -> None:
     sides = ((-1, 0), (1, 0), (-3, 1.2), (3, 1.2), (-3, 4), (3, 4))
     slope = m3.Manifold.hull_points([(x, y, z) for x in (-20, 20) for y, z in sides])
     overhangs, supports = supported(whole(standing(slope)), "process.support_foot_mm=0")

@@ -114,7 +114,7 @@ def settings_of(kind: str) -> dict[str, str]:
     }
 
 
-def test_the_settings_of_a_file_leave_out_the_profile_that_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_profile_named_by_an_option_replaces_the_one_inside_the_file(capsys: pytest.CaptureFixture[str]) -> None:
     mesh = {1: files.threemf_mesh(from_manifold(POST))}
     files.threemf(Path("a.3mf"), mesh, '<item objectid="1"/>', parts=settings_of("PrusaSlicer"))
     export("a.3mf", "--settings-of-file", "--process", "draft")

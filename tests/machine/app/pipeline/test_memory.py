@@ -7,7 +7,7 @@ import pytest
 from machine.app.pipeline.memory import return_large_arrays, return_unused
 
 
-def test_glibc_is_told_to_take_arrays_of_a_megabyte_one_by_one_and_to_keep_two(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_glibc_maps_arrays_of_a_megabyte_one_by_one_and_keeps_two_megabytes_of_heap(monkeypatch: pytest.MonkeyPatch) -> None:
     told = []
     library = type("Library", (), {"mallopt": staticmethod(lambda option, value: told.append((option, value)))})
     monkeypatch.setattr(ctypes, "CDLL", lambda name: library)
