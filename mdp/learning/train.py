@@ -1,6 +1,6 @@
 """Train: a ranker from a folder of records, the paper's or one that is asked for little regret.
 
-    python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--loss urank|ranknet|regret] [--terms NAME,...] ...
+    python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--loss urank|regret] [--terms NAME,...] ...
 
 The lists of the training side teach, those of the validation side say when to stop, those of the test side are only counted in
 the file's figures.
@@ -9,7 +9,7 @@ the file's figures.
 import argparse
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,19 +19,16 @@ from mdp.learning.labels import RatedList, followed, rate
 from mdp.learning.lists import of_side, of_some_models, read_lists
 from mdp.learning.ndcg import as_searched, at
 from mdp.learning.sources import Side
-from profiles.errors import LearningError
 
 if TYPE_CHECKING:
-    import torch
-
     from mdp.learning.ndcg import Scores
+    from mdp.learning.networks import Network
     from mdp.learning.training import Epoch, Schedule
 
-Trained = tuple["Scores", Callable[[Mapping[str, str]], bytes]]  # what a ranker gives a list, and its file with metadata
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
 CUTS = (1, 2, 3, 4, 5)  # of the NDCG, as the paper's table has them
 MOST_NETWORKS = 12  # of an ensemble: its file stays below 200 kB
-LOSSES = {"urank": "paper", "ranknet": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
+LOSSES = {"urank": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
 OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has its own
 
 
@@ -50,50 +47,35 @@ def train(arguments: Sequence[str] | None) -> None:
         lists = followed(lists)
     teach = rate(of_some_models(of_side(lists, Side.TRAIN, options.fold), options.share), columns)
     stop = rate(of_side(lists, Side.VALIDATION, options.fold), columns)
-    from mdp.learning.export import write
+    from mdp.learning.networks import export, scores, write
 
-    trained = _train_regret if options.loss == "regret" else _train_paper
-    scores, export = trained(options, columns, (teach, stop))
+    networks = _trained(options, columns, (teach, stop))
     about = {
         "kind": options.loss,
         "data_set": f"{options.folder.resolve().name}: {counts(teach)}",
         "commit": commit(),
-        "figures": json.dumps(judged(as_searched(scores), [rated for rated in judge if rated.teaches])),
+        "figures": json.dumps(judged(as_searched(scores(networks, columns)), [rated for rated in judge if rated.teaches])),
     }
-    write(options.output, export(about))
+    write(options.output, export(networks, columns, about))
     sys.stdout.write("\n".join(f"{name}: {value}" for name, value in {**about, "written": options.output}.items()) + "\n")
 
 
-def _train_paper(options: argparse.Namespace, columns: Sequence[str], lists: Sides) -> Trained:
-    from mdp.learning import urank
-    from mdp.learning.export import export
-
-    network = urank.Network(len(columns), seed=options.seed)
-    _run(network, columns, lists, _schedule(options))
-    return urank.scores(network, columns), lambda about: export(network.weights(), columns, about)
-
-
-def _train_regret(options: argparse.Namespace, columns: Sequence[str], lists: Sides) -> Trained:
-    from mdp.learning import regret
+def _trained(options: argparse.Namespace, columns: Sequence[str], lists: Sides) -> list["Network"]:
+    """The networks of a ranker; each shows how its training goes."""
+    from mdp.learning.networks import NETWORKS
+    from mdp.learning.training import train
 
     networks = []
     for member in range(options.ensemble):
-        network = regret.Network(columns, seed=options.seed + member)
-        _run(network, columns, lists, _schedule(options, member))
+        network = NETWORKS[options.loss](columns, seed=options.seed + member)
+        train(network, columns, lists, _schedule(options, member), show)
         networks.append(network)
-    return regret.scores(networks, columns), lambda about: regret.export(networks, columns, about)
+        if sys.stderr.isatty():
+            sys.stderr.write("\n")
+    return networks
 
 
-def _run(network: "torch.nn.Module", columns: Sequence[str], lists: Sides, schedule: "Schedule") -> None:
-    """Train a network and show how it goes."""
-    from mdp.learning import training
-
-    training.train(network, columns, lists, schedule, show)
-    if sys.stderr.isatty():
-        sys.stderr.write("\n")
-
-
-def _schedule(options: argparse.Namespace, member: int = 0) -> "Schedule":
+def _schedule(options: argparse.Namespace, member: int) -> "Schedule":
     """The schedule of the loss with what was given in its place; member: of an ensemble, each has a seed of its own."""
     from mdp.learning.training import SCHEDULES
 
@@ -105,8 +87,8 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = Parser(prog="python -m mdp.learning.train", description="train a ranker on records of wide searches")
     add_records(parser, "to learn from; default paper, cheap with --loss regret")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.onnx")
-    parser.add_argument("--loss", choices=LOSSES, default="urank", help="of the paper (urank), of pairs, or the regret to expect")
-    parser.add_argument("--ensemble", type=int, default=1, metavar="N", help="average N networks, with --loss regret")
+    parser.add_argument("--loss", choices=LOSSES, default="urank", help="of the paper (urank), or the regret to expect")
+    parser.add_argument("--ensemble", type=int, default=1, metavar="N", help="average N networks")
     parser.add_argument("--epochs", type=int, metavar="N", help="the most epochs; default 1000, 100 with --loss regret")
     parser.add_argument("--patience", type=int, metavar="N", help="epochs without a gain after which it ends; default 50, 25")
     parser.add_argument("--batch", type=int, metavar="N", help="lists a step; default 8, 64; the paper takes 1")
@@ -124,8 +106,6 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     ):
         check_range(options, name, least, most)
     check_range(options, "ensemble", 1, MOST_NETWORKS)
-    if options.ensemble > 1 and options.loss != "regret":
-        raise LearningError(f"--ensemble is {options.ensemble}: with --loss {options.loss} only 1 is allowed")
     return options
 
 

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 
 import torch
 
-from mdp.learning import regret, urank
 from mdp.learning.labels import RatedList
-from mdp.learning.objective import Figures, Objective, Padded
+from mdp.learning.networks import Network
+from mdp.learning.objective import OBJECTIVES, Figures, Objective, Padded, thin
 from profiles.errors import LearningError
-
-OBJECTIVES: dict[str, Objective] = {**urank.OBJECTIVES, "regret": regret.OBJECTIVE}
 
 Weights = dict[str, torch.Tensor]
 
@@ -40,7 +38,6 @@ class Schedule:
 
 SCHEDULES = {
     "urank": Schedule(),
-    "ranknet": Schedule("ranknet"),
     "regret": Schedule("regret", epochs=100, patience=25, batch=64, rate=2e-3, decay=1e-3),
 }
 
@@ -61,7 +58,7 @@ class Epoch:
 class _State:
     """How far a training has come, and its best network so far."""
 
-    network: torch.nn.Module
+    network: Network
     optimizer: torch.optim.Optimizer
     best_weights: Weights
     epoch: int = 0
@@ -70,7 +67,7 @@ class _State:
 
 
 def train(
-    network: torch.nn.Module,
+    network: Network,
     columns: Sequence[str],
     lists: tuple[Sequence[RatedList], Sequence[RatedList]],
     schedule: Schedule,
@@ -87,7 +84,7 @@ def train(
             raise LearningError(f"no list to {name} with: record more models, of more repositories and folders")
     objective = OBJECTIVES[schedule.loss]
     padded, held_out = objective.pad(training, columns), objective.pad(validation, columns)
-    objective.prepare(network, padded)
+    network.prepare(padded.features, padded.present)
     adam = torch.optim.Adam(network.parameters(), lr=schedule.rate, weight_decay=schedule.decay)
     state = _State(network, adam, deepcopy(network.state_dict()))
     while state.epoch < schedule.epochs and state.epoch - state.best_epoch < schedule.patience:
@@ -108,8 +105,8 @@ def _steps(state: _State, lists: Padded, schedule: Schedule) -> float:
     generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + state.epoch)
     for rows in torch.randperm(len(lists.targets), generator=generator).split(schedule.batch):
         batch = lists.take(rows)
-        seen = objective.thin(batch.present, generator)
-        losses = objective.loss(objective.score(state.network, batch.features, seen), batch.targets, seen)
+        seen = thin(batch.present, generator) if objective.thins else batch.present
+        losses = objective.loss(state.network(batch.features, seen), batch.targets, seen)
         state.optimizer.zero_grad()
         losses.mean().backward()
         torch.nn.utils.clip_grad_norm_(state.network.parameters(), schedule.clip)
@@ -118,9 +115,9 @@ def _steps(state: _State, lists: Padded, schedule: Schedule) -> float:
     return total / len(lists.targets)
 
 
-def _validate(network: torch.nn.Module, lists: Padded, objective: Objective) -> Figures:
+def _validate(network: Network, lists: Padded, objective: Objective) -> Figures:
     with torch.no_grad():
-        scores = objective.score(network, lists.features, lists.present).double().numpy()
+        scores = network(lists.features, lists.present).double().numpy()
     targets, present = lists.targets.numpy(), lists.present.numpy()
     figures = [objective.figures(scores[row][here], targets[row][here]) for row, here in enumerate(present)]
     return tuple(sum(values) / len(figures) for values in zip(*figures, strict=True))

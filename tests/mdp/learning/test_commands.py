@@ -8,8 +8,8 @@ from mdp.learning.sources import Side, side
 from mdp.ranking.features import COLUMNS
 from tests.mdp.learning.records import write_record
 
-EXTRA = ("torch", "onnx", "lightgbm", "xgboost", "matplotlib")
-SLOW = "RankNet,RankNet (XGBoost),LambdaRank (XGBoost),LambdaMART (LightGBM)"
+EXTRA = ("torch", "onnx", "xgboost", "matplotlib")
+SLOW = "RankNet,RankNet (tuned),LambdaRank,LambdaRank (tuned)"
 
 
 @pytest.fixture
@@ -67,8 +67,6 @@ def test_an_ensemble_with_little_regret_is_trained_on_some_terms(
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.onnx", "records"]
     assert train.main([*asked, "--terms", "paper,ours"]) == 1
     assert "holds no record (*.ours.npz)" in capsys.readouterr().err
-    assert train.main([*asked, "--ensemble", "2", "--loss", "urank"]) == 1
-    assert "--ensemble is 2: with --loss urank only 1 is allowed" in capsys.readouterr().err
 
 
 @pytest.mark.train

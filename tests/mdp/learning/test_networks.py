@@ -9,21 +9,24 @@ onnx = pytest.importorskip("onnx", reason="the extra `train` is not installed")
 onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
 
 from mdp.learning.command import COLUMN_SETS
-from mdp.learning.export import write
-from mdp.learning.labels import RatedList, followed, rate, ratings
+from mdp.learning.labels import RatedList, followed, rate, ratings, scale
 from mdp.learning.lists import read_lists
 from mdp.learning.ndcg import best_within
-from mdp.learning.regret import OBJECTIVE, Network, export, regret_loss, scores, thin
+from mdp.learning.networks import Network, RegretNetwork, export, scaled, scores, write
+from mdp.learning.objective import OBJECTIVES, Padded
 from mdp.learning.training import SCHEDULES, Epoch, train
 from mdp.mesh import Floats
-from mdp.ranking.features import COLUMNS
+from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
 from mdp.ranking.network import Network as SearchNetwork
 from mdp.ranking.ranker import ranker_named
+from profiles.errors import LearningError
+from tests.mdp.learning.records import drawn_list
 
 pytestmark = pytest.mark.train
 
 CHEAP = COLUMN_SETS["cheap"]
 SMALL_SET = Path(__file__).parent / "data"
+METADATA = {"kind": "urank", "data_set": "drawn, 3 lists", "commit": "abc", "figures": "NDCG@1 .4"}
 
 
 def planted(seed: int, size: int = 20) -> RatedList:
@@ -35,39 +38,39 @@ def planted(seed: int, size: int = 20) -> RatedList:
     return RatedList(features, COLUMNS, outcome, ratings(outcome), f"m{seed % 7}", f"m{seed % 7}.0.ours")
 
 
-def small(seed: int = 0) -> Network:
-    network = Network(CHEAP, (8, 8), seed)
-    network.standardise(OBJECTIVE.pad([planted(number) for number in range(10)], CHEAP))
+def side_by_side(*lists: RatedList) -> Padded:
+    return OBJECTIVES["regret"].pad(lists, CHEAP)
+
+
+def small(seed: int = 0) -> RegretNetwork:
+    network, lists = RegretNetwork(CHEAP, (8, 8), seed), side_by_side(*(planted(number) for number in range(10)))
+    network.prepare(lists.features, lists.present)
     return network
 
 
-def batch(*lists: list[float]) -> torch.Tensor:
-    return torch.nn.utils.rnn.pad_sequence([torch.tensor(values) for values in lists], batch_first=True)
+def test_the_network_is_the_paper_s() -> None:
+    network = Network(PAPER_COLUMNS)
+    assert sum(parameter.numel() for parameter in network.parameters()) == 10_901
+    assert all(not layer.bias.any() for layer in network.layers)
+    assert float(network.layers[1].weight.detach().abs().max()) == pytest.approx((6 / 200) ** 0.5, rel=1e-2)
 
 
-def test_the_loss_is_the_expected_regret_in_percent() -> None:
-    given = batch([np.log(3.0), 0.0])
-    loss = regret_loss(given, batch([0.0, 0.04]), torch.ones(1, 2, dtype=torch.bool))
-    entropy = -(0.75 * np.log(0.75) + 0.25 * np.log(0.25))
-    assert loss.tolist() == pytest.approx([100 * 0.25 * 0.04 - 0.005 * entropy], abs=1e-6)
+def test_features_are_scaled_over_the_candidates_that_are_there() -> None:
+    lists = [drawn_list(1, 9), drawn_list(2, 4)]
+    padded = OBJECTIVES["urank"].pad(lists, PAPER_COLUMNS)
+    assert np.array_equal(scaled(padded.features, padded.present, 1e-8)[1, :4].numpy(), scale(lists[1].features))
 
 
-def test_regret_is_measured_against_the_best_that_a_step_sees() -> None:
-    present = torch.tensor([[False, True, True]])
-    far = regret_loss(batch([0.0, 50.0, 0.0]), batch([0.0, 0.1, 0.3]), present)
-    assert far.tolist() == pytest.approx([0.0], abs=1e-3)
-
-
-def test_a_step_sees_a_part_of_each_list_and_of_short_ones_all() -> None:
-    present = torch.arange(50).expand(400, 50) < torch.tensor([50, 2] * 200).unsqueeze(1)
-    seen = thin(present, torch.Generator().manual_seed(1))
-    assert not (seen & ~present).any()
-    assert 0.6 < seen[::2].double().mean() < 0.7
-    assert seen[1::2].sum(dim=1).tolist() == [2] * 200
+def test_a_list_is_scored_alike_alone_and_in_a_batch() -> None:
+    network, lists = Network(PAPER_COLUMNS), [drawn_list(1, 9), drawn_list(2, 4)]
+    padded = OBJECTIVES["urank"].pad(lists, PAPER_COLUMNS)
+    with torch.no_grad():
+        batch = network(padded.features, padded.present).numpy()
+    assert np.allclose(scores([network], PAPER_COLUMNS)(lists[1]), batch[1, :4], atol=1e-6)
 
 
 def test_a_candidate_that_a_step_does_not_see_changes_no_score() -> None:
-    network, lists = small(), OBJECTIVE.pad([planted(1, 6)], CHEAP)
+    network, lists = small(), side_by_side(planted(1, 6))
     seen = lists.present.clone()
     seen[0, 2] = False
     changed = lists.features.clone()
@@ -79,7 +82,7 @@ def test_a_candidate_that_a_step_does_not_see_changes_no_score() -> None:
 
 def test_inputs_have_mean_0_and_spread_1_over_the_training_lists() -> None:
     network = small()
-    lists = OBJECTIVE.pad([planted(number) for number in range(10)], CHEAP)
+    lists = side_by_side(*(planted(number) for number in range(10)))
     inputs = (network.inputs(lists.features, lists.present)[lists.present] - network.mean) / network.spread
     assert inputs.mean(dim=0).abs().max() < 1e-4
     assert torch.allclose(inputs.std(dim=0, correction=0), torch.ones(inputs.shape[1]), atol=1e-3)
@@ -87,7 +90,7 @@ def test_inputs_have_mean_0_and_spread_1_over_the_training_lists() -> None:
 
 def test_a_planted_rule_is_learnt() -> None:
     lists = [planted(seed) for seed in range(150)]
-    network = Network(CHEAP, (8, 8))
+    network = RegretNetwork(CHEAP, (8, 8))
     train(network, CHEAP, (lists[:120], lists[120:]), replace(SCHEDULES["regret"], epochs=40, rate=1e-2))
     fresh = [planted(seed) for seed in range(1000, 1100)]
     learnt, within = scores([network], CHEAP), best_within(1)
@@ -98,7 +101,7 @@ def test_the_loss_falls_on_the_small_set() -> None:
     lists = rate(followed(read_lists(SMALL_SET, columns=CHEAP)), CHEAP)
     assert {rated.terms for rated in lists} == {"ours", "paper"}
     epochs: list[Epoch] = []
-    train(Network(CHEAP), CHEAP, (lists, lists), replace(SCHEDULES["regret"], epochs=15, batch=8), on_epoch=epochs.append)
+    train(RegretNetwork(CHEAP), CHEAP, (lists, lists), replace(SCHEDULES["regret"], epochs=15, batch=8), on_epoch=epochs.append)
     assert epochs[-1].loss < 0.7 * epochs[0].loss
     assert epochs[0].measures == ("1 - regret@1", "1 - regret@2")
 
@@ -126,6 +129,40 @@ def test_a_search_takes_the_file_and_scores_by_it(tmp_path: Path) -> None:
 
 
 def test_the_file_of_the_largest_ensemble_is_below_200_kb() -> None:
-    content = export([Network(COLUMNS, seed=seed) for seed in range(12)], COLUMNS, {"kind": "regret"})
+    content = export([RegretNetwork(COLUMNS, seed=seed) for seed in range(12)], COLUMNS, {"kind": "regret"})
     assert len(content) < 200_000
     assert onnx.load_model_from_string(content).metadata_props[0].value == ",".join(COLUMNS)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 50])
+def test_the_graph_scores_as_the_network_does(size: int) -> None:
+    network = Network(PAPER_COLUMNS, seed=3)
+    session = onnxruntime.InferenceSession(export([network], PAPER_COLUMNS, METADATA))
+    for seed in range(20):
+        rated = drawn_list(seed, size)
+        (given,) = session.run(["scores"], {"features": rated.features})
+        assert given.shape == (size,)
+        assert np.abs(given - scores([network], PAPER_COLUMNS)(rated)).max() < 1e-5
+
+
+def test_a_feature_that_is_the_same_for_all_candidates_changes_nothing() -> None:
+    session = onnxruntime.InferenceSession(export([Network(PAPER_COLUMNS)], PAPER_COLUMNS, METADATA))
+    quarter = drawn_list(1, 10).features
+    quarter[:, 2] = 0.25
+    three_quarters = quarter.copy()
+    three_quarters[:, 2] = 0.75
+    assert session.run(None, {"features": quarter})[0].tolist() == session.run(None, {"features": three_quarters})[0].tolist()
+
+
+def test_the_file_says_what_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "ranker.onnx"
+    write(file, export([Network(PAPER_COLUMNS)], PAPER_COLUMNS, METADATA))
+    model = onnx.load(file)
+    assert {entry.key: entry.value for entry in model.metadata_props} == {"features": "M1,M2,M3,M4,M5,M6", **METADATA}
+    assert 43_000 < file.stat().st_size < 46_000
+    assert [path.name for path in tmp_path.iterdir()] == ["ranker.onnx"]
+
+
+def test_a_file_that_cannot_be_written_is_told_in_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(LearningError, match="cannot be written"):
+        write(tmp_path / "nowhere" / "ranker.onnx", b"")

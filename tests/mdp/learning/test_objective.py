@@ -5,9 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from mdp.learning.urank import OBJECTIVES, Network, ranknet_loss, scores, urank_loss
-from mdp.ranking.features import PAPER_COLUMNS
-from tests.mdp.learning.records import drawn_list
+from mdp.learning.objective import regret_loss, thin, urank_loss
 from tests.mdp.learning.reference import reference_lists
 
 pytestmark = pytest.mark.train
@@ -36,9 +34,8 @@ def test_candidates_of_equal_rating_do_not_compete() -> None:
 def test_padding_adds_nothing_and_a_list_of_one_rating_costs_nothing() -> None:
     given, ratings = rows([0.5, 0.2, 0.9], [0.1]), rows([2, 1, 3], [5])
     present = torch.tensor([[True, True, True], [True, False, False]])
-    for loss in (urank_loss, ranknet_loss):
-        alone = loss(given[:1], ratings[:1], present[:1])
-        assert loss(given, ratings, present).tolist() == [float(alone), 0.0]
+    alone = urank_loss(given[:1], ratings[:1], present[:1])
+    assert urank_loss(given, ratings, present).tolist() == [float(alone), 0.0]
 
 
 def test_scores_far_apart_neither_overflow_nor_lose_their_gradient() -> None:
@@ -58,20 +55,22 @@ def test_the_published_scores_have_the_known_loss_and_equal_ones_a_higher_one() 
     assert float(urank_loss(torch.zeros_like(published), ratings, present).mean()) == pytest.approx(37.70, abs=5e-3)
 
 
-def test_ranknet_s_loss_is_the_mean_over_pairs() -> None:
-    loss = ranknet_loss(rows([0.0, 1.0, 0.0]), rows([1, 0, 0]), torch.ones(1, 3, dtype=torch.bool))
-    assert float(loss) == pytest.approx((log(1 + e) + log(2)) / 2)
+def test_the_loss_is_the_expected_regret_in_percent() -> None:
+    given = rows([np.log(3.0), 0.0])
+    loss = regret_loss(given, rows([0.0, 0.04]), torch.ones(1, 2, dtype=torch.bool))
+    entropy = -(0.75 * np.log(0.75) + 0.25 * np.log(0.25))
+    assert loss.tolist() == pytest.approx([100 * 0.25 * 0.04 - 0.005 * entropy], abs=1e-6)
 
 
-def test_the_network_is_the_paper_s() -> None:
-    network = Network(6)
-    assert sum(weight.size + bias.size for weight, bias in network.weights()) == 10_901
-    assert all(not bias.any() for _, bias in network.weights())
-    assert abs(network.weights()[1][0]).max() == pytest.approx((6 / 200) ** 0.5, rel=1e-2)
+def test_regret_is_measured_against_the_best_that_a_step_sees() -> None:
+    present = torch.tensor([[False, True, True]])
+    far = regret_loss(rows([0.0, 50.0, 0.0]), rows([0.0, 0.1, 0.3]), present)
+    assert far.tolist() == pytest.approx([0.0], abs=1e-3)
 
 
-def test_a_list_is_scored_alike_alone_and_in_a_batch() -> None:
-    network, lists = Network(6), [drawn_list(1, 9), drawn_list(2, 4)]
-    with torch.no_grad():
-        batch = network(OBJECTIVES["urank"].pad(lists, PAPER_COLUMNS).features).numpy()
-    assert np.allclose(scores(network, PAPER_COLUMNS)(lists[1]), batch[1, :4], atol=1e-6)
+def test_a_step_sees_a_part_of_each_list_and_of_short_ones_all() -> None:
+    present = torch.arange(50).expand(400, 50) < torch.tensor([50, 2] * 200).unsqueeze(1)
+    seen = thin(present, torch.Generator().manual_seed(1))
+    assert not (seen & ~present).any()
+    assert 0.6 < seen[::2].double().mean() < 0.7
+    assert seen[1::2].sum(dim=1).tolist() == [2] * 200

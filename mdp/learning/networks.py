@@ -1,0 +1,220 @@
+"""Networks: those that are trained, in torch and as ONNX files: raw features in, scores out, all preparation in the graph.
+
+The graph is written node by node, so what a search runs is what stands here, and torch's exporter is not needed.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+
+from mdp.learning.labels import SMALLEST_RANGE, RatedList, Singles
+from mdp.learning.ndcg import Scores
+from mdp.mesh import Floats
+from mdp.ranking.network import INPUT, OUTPUT
+from profiles.errors import LearningError
+from profiles.files import SHARED, write_whole
+
+OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of the last years
+TRADE_OFFS = (1.0, 4.0, 16.0)  # of M6 against M2
+LEAST_RANGE = 1e-4  # features that differ less over a list are hardly told apart: a share of 1e-4 is no reason
+SMALLEST_SPREAD = 1e-6  # an input that spreads less over all lists is the same everywhere
+
+
+class Network(torch.nn.Module):
+    """The paper's network: dense layers with ReLU between them, over features that are scaled by list; Glorot-uniform weights.
+
+    It scores every candidate by itself.
+    """
+
+    def __init__(self, columns: Sequence[str], hidden: Sequence[int] = (100, 100), seed: int = 0) -> None:
+        """columns: names of the features."""
+        super().__init__()
+        self.add_layers(len(columns), hidden)
+        generator = torch.Generator().manual_seed(seed)
+        for layer in self.layers:
+            torch.nn.init.xavier_uniform_(layer.weight, generator=generator)
+            torch.nn.init.zeros_(layer.bias)
+
+    def add_layers(self, inputs: int, hidden: Sequence[int]) -> None:
+        """Dense layers from a number of inputs to one score."""
+        self.layers = torch.nn.ModuleList(torch.nn.Linear(*pair) for pair in pairwise((inputs, *hidden, 1)))
+
+    def prepare(self, features: torch.Tensor, present: torch.Tensor) -> None:
+        """Take from the lists to train with what the network has to know before its training."""
+
+    def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
+        return self.dense(scaled(features, present, SMALLEST_RANGE))
+
+    def dense(self, rows: torch.Tensor) -> torch.Tensor:
+        """(..., inputs) -> (...)."""
+        for layer in self.layers[:-1]:
+            rows = torch.relu(layer(rows))
+        scores: torch.Tensor = self.layers[-1](rows).squeeze(-1)
+        return scores
+
+    def inputs_in(self, graph: "Graph") -> str:
+        """The (n, inputs) value of a graph that the first layer takes."""
+        return graph.scaled(INPUT, SMALLEST_RANGE)
+
+
+class RegretNetwork(Network):
+    """Scores every candidate from its own features and the list's ranges: dense layers with ReLU, and a line beside them.
+
+    It takes the features as they are, scaled by list, and M2 - k M6 below the best of the list for some k (what a cut saves less
+    what it loses for ever: the trade-offs that the slots of a beam follow), all of them standardised.
+    """
+
+    def __init__(self, columns: Sequence[str], hidden: Sequence[int] = (32, 32), seed: int = 0) -> None:
+        """columns: names of the features, M2 and M6 among them."""
+        torch.nn.Module.__init__(self)
+        self.register_buffer("contrasts", torch.from_numpy(contrasts(columns)))
+        inputs = 2 * len(columns) + len(TRADE_OFFS)
+        self.register_buffer("mean", torch.zeros(inputs))
+        self.register_buffer("spread", torch.ones(inputs))
+        self.add_layers(inputs, hidden)
+        self.line = torch.nn.Linear(inputs, 1, bias=False)
+        generator = torch.Generator().manual_seed(seed)
+        for layer in (*self.layers, self.line):
+            most = layer.in_features**-0.5
+            for parameter in layer.parameters():
+                torch.nn.init.uniform_(parameter, -most, most, generator=generator)
+
+    def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, 2F + TRADE_OFFS) what the features are turned into before they are standardised."""
+        saved = features @ self.contrasts
+        most = torch.where(present.unsqueeze(-1), saved, -torch.inf).amax(dim=1, keepdim=True)
+        return torch.cat([features, scaled(features, present, LEAST_RANGE), saved - most], dim=-1)
+
+    def prepare(self, features: torch.Tensor, present: torch.Tensor) -> None:
+        """Take mean and spread of the inputs."""
+        inputs = self.inputs(features, present)[present].double()
+        spread, mean = torch.std_mean(inputs, dim=0, correction=0)
+        self.mean.copy_(mean)
+        self.spread.copy_(torch.where(spread < SMALLEST_SPREAD, 1.0, spread))
+
+    def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
+        inputs = (self.inputs(features, present) - self.mean) / self.spread
+        scores: torch.Tensor = self.dense(inputs) + self.line(inputs).squeeze(-1)
+        return scores
+
+    def inputs_in(self, graph: "Graph") -> str:
+        """The (n, inputs) value of a graph that the first layer takes."""
+        saved = graph.add("MatMul", INPUT, graph.constant(_array(self.contrasts)))
+        below = graph.add("Sub", saved, graph.add("ReduceMax", saved, axes=[0], keepdims=1))
+        inputs = graph.add("Concat", INPUT, graph.scaled(INPUT, LEAST_RANGE), below, axis=1)
+        centred = graph.add("Sub", inputs, graph.constant(_array(self.mean)))
+        return graph.add("Div", centred, graph.constant(_array(self.spread)))
+
+
+NETWORKS = {"urank": Network, "regret": RegretNetwork}
+
+
+def contrasts(columns: Sequence[str]) -> Singles:
+    """(F, TRADE_OFFS) what features are multiplied by to get M2 - k M6."""
+    matrix = np.zeros((len(columns), len(TRADE_OFFS)), np.float32)
+    matrix[columns.index("M2")] = 1.0
+    matrix[columns.index("M6")] = np.negative(TRADE_OFFS)
+    return matrix
+
+
+def scaled(features: torch.Tensor, present: torch.Tensor, smallest_range: float) -> torch.Tensor:
+    """(L, n, F) every feature from 0 to 1 over its list, as `mdp.learning.labels.scale`."""
+    here = present.unsqueeze(-1)
+    low = torch.where(here, features, torch.inf).amin(dim=1, keepdim=True)
+    high = torch.where(here, features, -torch.inf).amax(dim=1, keepdim=True)
+    return (features - low) / (high - low + smallest_range)
+
+
+def scores(networks: Sequence[Network], columns: Sequence[str]) -> Scores:
+    """The mean of what networks give the candidates of a list from the named features."""
+
+    def of_list(rated: RatedList) -> Floats:
+        features = torch.from_numpy(rated.table(columns)).unsqueeze(0)
+        present = torch.ones(features.shape[:2], dtype=torch.bool)
+        with torch.no_grad():
+            given = torch.stack([network(features, present)[0] for network in networks])
+        mean: Floats = given.mean(dim=0).numpy().astype(np.float64)
+        return mean
+
+    return of_list
+
+
+class Graph:
+    """An ONNX graph that grows node by node; values are known by their names."""
+
+    def __init__(self) -> None:
+        self._nodes: list[onnx.NodeProto] = []
+        self._constants: list[onnx.TensorProto] = []
+
+    def add(self, operator: str, *inputs: str, **attributes: object) -> str:
+        """A node with one output; the output's name."""
+        name = f"{operator.lower()}_{len(self._nodes)}"
+        self._nodes.append(helper.make_node(operator, inputs, [name], **attributes))
+        return name
+
+    def constant(self, array: NDArray[np.generic]) -> str:
+        """A tensor of numbers that stay; its name."""
+        name = f"constant_{len(self._constants)}"
+        self._constants.append(numpy_helper.from_array(array, name))
+        return name
+
+    def scaled(self, features: str, smallest_range: float) -> str:
+        """(n, F) every column from 0 to 1 over its list."""
+        low, high = (self.add(operator, features, axes=[0], keepdims=1) for operator in ("ReduceMin", "ReduceMax"))
+        smallest = self.constant(np.array(smallest_range, np.float32))
+        return self.add("Div", self.add("Sub", features, low), self.add("Add", self.add("Sub", high, low), smallest))
+
+    def model(self, columns: Sequence[str], scores: str, metadata: Mapping[str, str]) -> bytes:
+        """The file's content; scores: name of the (n,) value that is given out; columns: names of the (n, F) features."""
+        self._nodes.append(helper.make_node("Identity", [scores], [OUTPUT]))
+        given = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["candidates", len(columns)])
+        taken = helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["candidates"])
+        graph = helper.make_graph(self._nodes, "ranker", [given], [taken], self._constants)
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="tiltprint")
+        model.ir_version = IR_VERSION
+        helper.set_model_props(model, {"features": ",".join(columns), **metadata})
+        onnx.checker.check_model(model)
+        content: bytes = model.SerializeToString()
+        return content
+
+
+def export(networks: Sequence[Network], columns: Sequence[str], metadata: Mapping[str, str]) -> bytes:
+    """The content of an ONNX file that scores by the mean of networks of one kind that were prepared with the same lists.
+
+    Their weights are stacked, so that all of them are one product a layer: (networks, inputs, outputs). metadata: what else a
+    person may want to know of the file (kind, data_set, commit, figures).
+    """
+    graph = Graph()
+    inputs = rows = networks[0].inputs_in(graph)
+    for number in range(len(networks[0].layers)):
+        if number > 0:
+            rows = graph.add("Relu", rows)
+        weight = np.stack([_array(network.layers[number].weight).T for network in networks])
+        bias = np.stack([_array(network.layers[number].bias)[np.newaxis] for network in networks])
+        rows = graph.add("Add", graph.add("MatMul", rows, graph.constant(weight)), graph.constant(bias))
+    given = graph.add("ReduceMean", rows, axes=[0], keepdims=0)
+    lines = [_array(network.line.weight).T for network in networks if isinstance(network, RegretNetwork)]
+    if lines:
+        given = graph.add("Add", given, graph.add("MatMul", inputs, graph.constant(np.mean(lines, axis=0))))
+    return graph.model(columns, graph.add("Squeeze", given, graph.constant(np.array([1], np.int64))), metadata)
+
+
+def _array(tensor: torch.Tensor) -> Singles:
+    values: Singles = tensor.detach().numpy()
+    return values
+
+
+def write(file: Path, content: bytes) -> None:
+    """Write a ranker whole or not at all; LearningError where that cannot be done."""
+    try:
+        write_whole(file, content, SHARED)
+    except OSError as error:
+        raise LearningError(f"ranker {file}: cannot be written ({error.strerror})") from None
