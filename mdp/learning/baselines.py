@@ -9,7 +9,7 @@ from zlib import crc32
 
 import numpy as np
 
-from mdp.learning.labels import RatedList, Singles, scale
+from mdp.learning.lists import RatedList, Singles, scale
 from mdp.learning.ndcg import Scores, ndcg
 from mdp.mesh import Floats
 

@@ -18,9 +18,8 @@ from mdp.batch.rows import append_row, writing_alone
 from mdp.kernels.threads import THREADS
 from mdp.kernels.workers import CallError
 from mdp.learning import command
-from mdp.learning.index import FAILED, INDEX, LOCK, Row, Search, read_index, unfinished, write_index
+from mdp.learning.index import FAILED, INDEX, LOCK, Row, Search, read_index, summary, unfinished, write_index
 from mdp.learning.models import model_files, name_of
-from mdp.learning.summary import summary
 from mdp.learning.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
 from profiles.files import SHARED, write_whole

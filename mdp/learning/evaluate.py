@@ -9,21 +9,25 @@ time against the beam's width, from the table that tools/compare_widths.py write
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from mdp.learning.baselines import BASELINES
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, run, split_names
-from mdp.learning.labels import RatedList, followed, rate
-from mdp.learning.lists import of_side, read_lists
-from mdp.learning.ndcg import Scores, as_searched
+from mdp.learning.lists import RatedList, followed, of_side, read_lists
+from mdp.learning.ndcg import Measure, Scores, as_searched, at, interval, regret
 from mdp.learning.sources import Side
+from mdp.mesh import Floats
 from mdp.ranking.network import Network
 from profiles.errors import LearningError
 
 ALWAYS = ("M2", "M6")  # what lines are fitted in
+SHUFFLES, CUT = 10, 5  # importance is what NDCG@5 loses, as a mean of this many shuffles
+NDCGS = {f"NDCG@{cut}": at(cut) for cut in (1, 2, 3, 4, 5)}
+REGRETS = {f"regret of first {first}": regret(first) for first in (1, 2, 5)}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,12 +52,10 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     leave = f"baselines to leave out, of {'; '.join(BASELINES)}"
     parser.add_argument("--without", type=split_names, default=(), metavar="NAME,...", help=leave)
-    parser.add_argument("--repeats", type=int, default=10, metavar="K", help="how often each feature is shuffled")
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="where pictures go; here by default")
     parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/compare_widths.py")
     parser.add_argument("--least-removed", type=float, default=0.0, metavar="SHARE", help="only models with that much gain")
     options = parser.parse_args(arguments)
-    check_range(options, "repeats", 1, 10_000)
     check_range(options, "least_removed", 0.0, 1.0)
     unknown = [name for name in options.without if name not in BASELINES]
     if unknown:
@@ -65,13 +67,11 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _compare(options: argparse.Namespace) -> None:
     """Tables of all rankers, then what the features of each given one do."""
-    from mdp.learning.tables import regret_table, tables
-
     networks = [Network(file) for file in options.ranker]
     learnt = COLUMN_SETS[options.columns or "paper"]
     columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for network in networks for name in network.columns)]))
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
-    sides = {side: [rated for rated in rate(of_side(lists, side, options.fold), columns) if rated.teaches] for side in Side}
+    sides = {side: [rated for rated in of_side(lists, side, options.fold) if rated.teaches] for side in Side}
     for side, some in sides.items():
         if not some:
             raise LearningError(f"folder {options.folder}: no list of it is on the side {side}; record models of more sources")
@@ -80,11 +80,25 @@ def _compare(options: argparse.Namespace) -> None:
         if name not in options.without:
             sys.stderr.write(f"fitting {name}\n")
             rankers[name] = fit(sides[Side.TRAIN], sides[Side.VALIDATION], learnt)
-    known = [rated for rated in rate(followed(of_side(lists, Side.TEST, options.fold)), columns) if rated.teaches]
-    for text in (*tables(rankers, sides[Side.TEST]), regret_table(rankers, known) if known else "Regret: no list"):
-        sys.stdout.write(f"{text}\n\n")
+    known = [rated for rated in followed(sides[Side.TEST]) if rated.teaches]
+    sys.stdout.write(f"{table('All lists', rankers, sides[Side.TEST], NDCGS)}\n\n")
+    if known:
+        sys.stdout.write(f"{table('Candidates that were followed', rankers, known, REGRETS)}\n\n")
     for network in networks:
         _analyse(network, sides[Side.TEST], options)
+
+
+def table(title: str, rankers: Mapping[str, Scores], lists: Sequence[RatedList], measures: Mapping[str, Measure]) -> str:
+    """A table in Markdown, one row per ranker: the means of the measures, and the 95 % interval of the first over models."""
+    models = [rated.model for rated in lists]
+    heads = f"| ranker | {' | '.join(measures)} | 95 % of {next(iter(measures))} |"
+    lines = [f"{title}: {len(lists)} of {len(set(models))} models", "", heads, "|---|" + "---:|" * (len(measures) + 1)]
+    for name, scores in rankers.items():
+        given = [scores(rated) for rated in lists]
+        values = [np.array([measure(*pair) for pair in zip(given, lists, strict=True)]) for measure in measures.values()]
+        low, high = interval(values[0], models)
+        lines.append(f"| {name} | {' | '.join(f'{value.mean():.4f}' for value in values)} | {low:.4f} to {high:.4f} |")
+    return "\n".join(lines)
 
 
 def _scores(network: Network) -> Scores:
@@ -92,15 +106,43 @@ def _scores(network: Network) -> Scores:
 
 
 def _analyse(network: Network, lists: Sequence[RatedList], options: argparse.Namespace) -> None:
-    from mdp.learning.analysis import correlation, importance
     from mdp.learning.pictures import draw_features, save
 
-    lost = importance(_scores(network), network.columns, lists, options.repeats)
+    lost = importance(_scores(network), network.columns, lists)
     rows = [f"| {name} | {value:.4f} |" for name, value in zip(network.columns, lost, strict=True)]
     sys.stdout.write("\n".join(["| feature | importance |", "|---|---:|", *rows, ""]))
     file = options.pictures / f"figure8-{network.file.stem}.png"
     save(draw_features(network.columns, lost, correlation(network.columns, lists)), file)
     sys.stdout.write(f"\n![importance and correlation]({file})\n")
+
+
+def importance(scores: Scores, columns: Sequence[str], lists: Sequence[RatedList]) -> Floats:
+    """(k,) for each named feature, NDCG@5 less its mean where that feature is shuffled among all candidates (Altmann 2010)."""
+    rng, worth = np.random.default_rng(0), at(CUT)
+
+    def mean(some: Sequence[RatedList]) -> float:
+        return float(np.mean([worth(scores(rated), rated) for rated in some]))
+
+    left = [[mean(shuffled(name, lists, rng)) for _ in range(SHUFFLES)] for name in columns]
+    lost: Floats = mean(lists) - np.mean(left, axis=1)
+    return lost
+
+
+def shuffled(name: str, lists: Sequence[RatedList], rng: np.random.Generator) -> list[RatedList]:
+    """The lists with one feature dealt out anew among the candidates of all of them."""
+    features = np.vstack([rated.features for rated in lists])
+    column = lists[0].columns.index(name)
+    features[:, column] = rng.permutation(features[:, column])
+    parts = np.split(features, np.cumsum([len(rated.features) for rated in lists])[:-1])
+    return [replace(rated, features=part) for rated, part in zip(lists, parts, strict=True)]
+
+
+def correlation(columns: Sequence[str], lists: Sequence[RatedList]) -> Floats:
+    """(k, k) Pearson correlation of the named features over all candidates; 0 with one that never changes."""
+    with np.errstate(invalid="ignore"):
+        matrix = np.corrcoef(np.vstack([rated.table(columns) for rated in lists]).T, dtype=np.float64)
+    known: Floats = np.asarray(np.nan_to_num(matrix))
+    return known
 
 
 def _draw_widths(options: argparse.Namespace) -> None:

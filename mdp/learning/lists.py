@@ -1,11 +1,16 @@
-"""Training lists: the candidates that competed in one stage of a recorded search, and what became of each.
+"""Lists: the candidates that competed in one stage of a recorded search, what became of each, their ratings and their regrets.
 
 Record files are what `mdp.ranking.record` writes, or anything with the same `version`, `model`, `columns`, `features`, `stage`
 and `outcome`; `child` and `node_expanded`, where they are there, tell the candidates whose outcome nobody has followed.
+
+The value of a candidate is the least final cost through it, stopping there included. The paper rates the five best candidates of
+a list 5, 4, 3, 2, 1 and the rest 0; its lists are what the beam kept, so candidates that were never cut are not among them.
+Nor are, where regrets are asked for, those that nobody followed: all that is known of them is that stopping there is worse.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -13,42 +18,66 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.learning.sources import Side, model_id, place, read_sources, side
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Ints
 from mdp.ranking.features import PAPER_COLUMNS
 from mdp.ranking.record import VERSION, Arrays
 from profiles.errors import LearningError
 
 NEEDED = ("model", "columns", "features", "stage", "outcome")
+BEST = 5  # candidates of a list that are rated
+TIE = 1e-9  # outcomes (shares) that differ less are the same
+SMALLEST_RANGE = 1e-8  # added to the range, which is 0 where all of a list have the same
+LEAST_OUTCOME = 0.05  # lists that can end with less count as if they ended with it, else the best of models would weigh most
 
+Singles = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingList:
-    """The n candidates of one stage, in the classic order.
+class RatedList:
+    """The n candidates of one stage of a recorded search that were cut, in the classic order.
 
-    features: (n, F), the columns named in `columns`; outcome: (n,) the least final cost through the candidate as share of the
-    model's risky area, NaN where it was never cut; censored: (n,) the outcome is its own cost, for nobody went on from there;
-    record: the file's name without its ending.
+    features: (n, F) unscaled, in single precision as a ranker gets them, named in `columns`; outcome: (n,) the least final cost
+    through the candidate as share of the model's risky area; censored: (n,) the outcome is its own cost, for nobody went on from
+    there; record: name of the file that the list is from, without its ending; a model has one for each orientation and terms.
     """
 
-    features: Floats
+    features: Singles
     columns: tuple[str, ...]
     outcome: Floats
     censored: Mask
     model: str
-    source: str
-    stage: int
-    record: str
+    source: str = ""
+    record: str = ""
 
-    def table(self, columns: Sequence[str]) -> Floats:
+    @cached_property
+    def ratings(self) -> Ints:
+        """(n,) 5 for the least outcome down to 1 for the fifth, 0 for the rest; equal outcomes in the order they come."""
+        rated = np.zeros(len(self.outcome), np.int32)
+        best = np.argsort(self.outcome, kind="stable")[:BEST]
+        rated[best] = BEST - np.arange(len(best))
+        return rated
+
+    @property
+    def regrets(self) -> Floats:
+        """(n,) by how much each candidate ends with more than the best of the list, as share of the best."""
+        least = float(self.outcome.min())
+        shares: Floats = (self.outcome - least) / max(least, LEAST_OUTCOME)
+        return shares
+
+    @property
+    def teaches(self) -> bool:
+        """False for a list that has but one rating, as a list of one candidate: nothing can be learnt from its order."""
+        return len(np.unique(self.ratings)) > 1
+
+    def table(self, columns: Sequence[str]) -> Singles:
         """(n, k) the named features."""
         return self.features[:, [self.columns.index(name) for name in columns]]
 
 
 def read_lists(
     folder: Path, manifest: Path | None = None, columns: Sequence[str] = PAPER_COLUMNS, terms: Sequence[str] = ()
-) -> list[TrainingList]:
+) -> list[RatedList]:
     """The lists of a folder's record files, by file name and stage; a model's source is that of the manifest, else itself.
 
     terms: only those of searches on one of these terms, MODEL.ORIENTATION.TERMS.npz.
@@ -63,7 +92,7 @@ def read_lists(
             raise LearningError(f"folder {folder}: holds no record ({pattern}); python -m mdp.learning.collect makes them")
         files += some
     sources = None if manifest is None else read_sources(manifest)
-    lists: list[TrainingList] = []
+    lists: list[RatedList] = []
     for file in sorted(files):
         source = model_id(file) if sources is None else sources.get(model_id(file))
         if source is None:
@@ -103,14 +132,13 @@ def _check(file: Path, arrays: Arrays, columns: Sequence[str]) -> None:
         raise LearningError(f"record {file}: feature {name} of a candidate of model {arrays['model']} is {value}")
 
 
-def _lists(record: Arrays, file: Path, source: str) -> Iterator[TrainingList]:
+def _lists(record: Arrays, file: Path, source: str) -> Iterator[RatedList]:
     columns = tuple(str(name) for name in record["columns"])
     censored = _censored(record)
-    for stage in np.unique(record["stage"]):
-        rows = record["stage"] == stage
-        features = record["features"][rows].astype(np.float64)
-        outcome = record["outcome"][rows]
-        yield TrainingList(features, columns, outcome, censored[rows], model_id(file), source, int(stage), file.stem)
+    cut, features = ~np.isnan(record["outcome"]), record["features"].astype(np.float32)
+    for stage in np.unique(record["stage"][cut]):
+        rows = cut & (record["stage"] == stage)
+        yield RatedList(features[rows], columns, record["outcome"][rows], censored[rows], model_id(file), source, file.stem)
 
 
 def _censored(record: Arrays) -> Mask:
@@ -125,11 +153,28 @@ def _censored(record: Arrays) -> Mask:
     return censored
 
 
-def of_side(lists: Sequence[TrainingList], wanted: Side, fold: int = 0) -> list[TrainingList]:
+def of_side(lists: Sequence[RatedList], wanted: Side, fold: int = 0) -> list[RatedList]:
     """The lists whose source is on one side of a split."""
     return [recorded for recorded in lists if side(recorded.source, fold) is wanted]
 
 
-def of_some_models(lists: Sequence[TrainingList], share: float) -> list[TrainingList]:
+def of_some_models(lists: Sequence[RatedList], share: float) -> list[RatedList]:
     """The lists of a share of the models; those of a smaller share are among those of a larger one."""
     return [recorded for recorded in lists if place(f"share of {recorded.model}") < share]
+
+
+def followed(lists: Sequence[RatedList]) -> list[RatedList]:
+    """The lists without the candidates that nobody followed, unless they are the best there."""
+    shorter = []
+    for rated in lists:
+        rows = ~rated.censored | (rated.outcome <= np.min(rated.outcome) + TIE)
+        table, outcome, censored = rated.features[rows], rated.outcome[rows], rated.censored[rows]
+        shorter.append(replace(rated, features=table, outcome=outcome, censored=censored))
+    return shorter
+
+
+def scale(features: Singles) -> Singles:
+    """(n, F) every column from 0 to 1 over its list; a column that is the same everywhere becomes 0."""
+    low, high = features.min(axis=0), features.max(axis=0)
+    scaled: Singles = (features - low) / (high - low + np.float32(SMALLEST_RANGE))
+    return scaled

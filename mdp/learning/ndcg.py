@@ -1,4 +1,4 @@
-"""NDCG as the 2020 paper's table has it, and how often the best of a list is among the first few.
+"""NDCG as the 2020 paper's table has it, and regret: what the order of a list is worth.
 
 NDCG@k = DCG@k / ideal DCG@k, DCG@k = sum over the first k of (2^rating - 1) / log2(place + 1), the ideal list cut at the same
 k, the mean over lists, 0 for a list without a rating above 0. Candidates with equal scores stay in the order they come.
@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mdp.learning.labels import TIE, RatedList
+from mdp.learning.lists import RatedList
 from mdp.mesh import Floats, Ints
 from mdp.ranking.network import DECIMALS
 
-FULL = 50  # candidates of a full list: the beam width that the lists are collected with
 RESAMPLES = 2000  # of a bootstrap: 50 of them lie beyond either end of 95 %
 
 Scores = Callable[[RatedList], Floats]
@@ -46,19 +45,9 @@ def at(cut: int) -> Measure:
     return lambda scores, rated: ndcg(scores, rated.ratings, cut)
 
 
-def best_within(first: int) -> Measure:
-    """1 where a candidate with the least outcome of the list is among the first few, else 0."""
-    return lambda scores, rated: float(rated.outcome[order(scores)[:first]].min() - rated.outcome.min() <= TIE)
-
-
 def regret(first: int) -> Measure:
     """By how much the best of the first few ends with more than the best of the list, as share of that."""
     return lambda scores, rated: float(rated.regrets[order(scores)[:first]].min())
-
-
-def full_lists(lists: Sequence[RatedList]) -> list[RatedList]:
-    """The lists that the beam filled."""
-    return [rated for rated in lists if len(rated.ratings) >= FULL]
 
 
 def interval(values: Floats, models: Sequence[str]) -> tuple[float, float]:

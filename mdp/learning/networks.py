@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from mdp.learning.labels import SMALLEST_RANGE, RatedList, Singles
+from mdp.learning.lists import SMALLEST_RANGE, RatedList, Singles
 from mdp.learning.ndcg import Scores
 from mdp.mesh import Floats
 from mdp.ranking.network import INPUT, OUTPUT
@@ -126,7 +126,7 @@ def contrasts(columns: Sequence[str]) -> Singles:
 
 
 def scaled(features: torch.Tensor, present: torch.Tensor, smallest_range: float) -> torch.Tensor:
-    """(L, n, F) every feature from 0 to 1 over its list, as `mdp.learning.labels.scale`."""
+    """(L, n, F) every feature from 0 to 1 over its list, as `mdp.learning.lists.scale`."""
     here = present.unsqueeze(-1)
     low = torch.where(here, features, torch.inf).amin(dim=1, keepdim=True)
     high = torch.where(here, features, -torch.inf).amax(dim=1, keepdim=True)

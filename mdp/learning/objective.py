@@ -14,7 +14,7 @@ import torch
 from torch.nn.functional import softplus
 from torch.nn.utils.rnn import pad_sequence
 
-from mdp.learning.labels import RatedList
+from mdp.learning.lists import RatedList
 from mdp.learning.ndcg import ndcg, order
 from mdp.mesh import Floats, Ints
 

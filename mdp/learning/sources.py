@@ -42,11 +42,6 @@ def model_id(file: Path) -> str:
     return file.name.split(".")[0]
 
 
-def terms_of(record: str) -> str:
-    """The terms that the search of a record was on, by the name of its file without the ending."""
-    return record.rpartition(".")[2]
-
-
 def read_sources(manifest: Path) -> dict[str, str]:
     """Model -> its repository and folder, of a table with the columns id, source_repo and source_path.
 

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
-from mdp.learning.labels import RatedList, followed, rate
-from mdp.learning.lists import of_side, of_some_models, read_lists
-from mdp.learning.ndcg import as_searched, at
+from mdp.learning.evaluate import NDCGS
+from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists
+from mdp.learning.ndcg import as_searched
 from mdp.learning.sources import Side
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from mdp.learning.training import Epoch, Schedule
 
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
-CUTS = (1, 2, 3, 4, 5)  # of the NDCG, as the paper's table has them
 MOST_NETWORKS = 12  # of an ensemble: its file stays below 200 kB
 LOSSES = {"urank": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
 OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has its own
@@ -42,11 +41,11 @@ def train(arguments: Sequence[str] | None) -> None:
     options = _options(arguments)
     columns = COLUMN_SETS[options.columns or LOSSES[options.loss]]
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
-    judge = rate(of_side(lists, Side.TEST, options.fold), columns)
+    judge = of_side(lists, Side.TEST, options.fold)
     if options.loss == "regret":
         lists = followed(lists)
-    teach = rate(of_some_models(of_side(lists, Side.TRAIN, options.fold), options.share), columns)
-    stop = rate(of_side(lists, Side.VALIDATION, options.fold), columns)
+    teach = of_some_models(of_side(lists, Side.TRAIN, options.fold), options.share)
+    stop = of_side(lists, Side.VALIDATION, options.fold)
     from mdp.learning.networks import export, scores, write
 
     networks = _trained(options, columns, (teach, stop))
@@ -125,8 +124,7 @@ def counts(lists: Sequence[RatedList]) -> str:
 
 def judged(scores: "Scores", lists: Sequence[RatedList]) -> dict[str, float | int]:
     """How many lists, and the means of NDCG over them with four digits."""
-    measures = {f"NDCG@{cut}": at(cut) for cut in CUTS}
-    sums = {name: sum(measure(scores(rated), rated) for rated in lists) for name, measure in measures.items() if lists}
+    sums = {name: sum(measure(scores(rated), rated) for rated in lists) for name, measure in NDCGS.items() if lists}
     return {"lists": len(lists), **{name: round(total / len(lists), 4) for name, total in sums.items()}}
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import torch
 
-from mdp.learning.labels import RatedList
+from mdp.learning.lists import RatedList
 from mdp.learning.networks import Network
 from mdp.learning.objective import OBJECTIVES, Figures, Objective, Padded, thin
 from profiles.errors import LearningError

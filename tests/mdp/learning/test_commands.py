@@ -43,13 +43,13 @@ def test_a_ranker_is_trained_and_judged_by_two_commands(
     assert train.main([str(records), "-o", str(ranker), "--epochs", "3"]) == 0
     assert '"NDCG@5": 0.' in capsys.readouterr().out
     assert sorted(file.name for file in tmp_path.iterdir()) == ["ranker.onnx", "records"]
-    asked = [str(records), "--ranker", str(ranker), "--without", SLOW, "--repeats", "1", "--pictures", str(tmp_path)]
+    asked = [str(records), "--ranker", str(ranker), "--without", SLOW, "--pictures", str(tmp_path)]
     assert evaluate.main(asked) == 0
     printed = capsys.readouterr().out
     rows = (str(ranker), "random", "M2", "M2 - lambda M6")
     assert all(f"| {name} |" in printed for name in rows)
     assert "| M6 |" in printed
-    assert "Regret, followed candidates: " in printed
+    assert "Candidates that were followed: " in printed
     assert (tmp_path / "figure8-ranker.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -87,8 +87,8 @@ def test_figure_7_is_drawn_from_a_table(tmp_path: Path, capsys: pytest.CaptureFi
     ("arguments", "sentence"),
     [
         ([], "a folder of records or --figure7 is needed"),
-        (["--repeats", "0", "nowhere"], "--repeats is 0: 1 to 10000 is allowed"),
-        (["--repeats", "few", "nowhere"], "argument --repeats: invalid int value: 'few'; --help shows what is allowed"),
+        (["--least-removed", "2", "nowhere"], "--least-removed is 2: 0 to 1 is allowed"),
+        (["--fold", "few", "nowhere"], "argument --fold: invalid int value: 'few'; --help shows what is allowed"),
     ],
 )
 def test_what_cannot_be_done_is_told_in_a_sentence(

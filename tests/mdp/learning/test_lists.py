@@ -13,12 +13,17 @@ from tests.mdp.learning.records import write_record
 OUTCOME = np.array([0.5, np.nan, 0.3, 0.2])
 
 
-def test_every_stage_of_a_record_is_a_list(tmp_path: Path) -> None:
+def test_the_candidates_of_a_stage_that_were_cut_are_a_list(tmp_path: Path) -> None:
     write_record(tmp_path / "kitten.0.paper.npz", OUTCOME, np.array([1, 1, 1, 2], np.int32))
     first, second = read_lists(tmp_path)
-    assert (first.model, first.stage, second.stage) == ("kitten", 1, 2)
-    assert np.array_equal(first.outcome, [0.5, np.nan, 0.3], equal_nan=True)
+    assert (first.model, second.model) == ("kitten", "kitten")
+    assert first.outcome.tolist() == [0.5, 0.3]
     assert second.features.shape == (1, 6)
+
+
+def test_a_stage_in_which_nothing_was_cut_is_no_list(tmp_path: Path) -> None:
+    write_record(tmp_path / "a.0.x.npz", np.array([np.nan, 0.3]), np.array([1, 2], np.int32))
+    assert [rated.outcome.tolist() for rated in read_lists(tmp_path)] == [[0.3]]
 
 
 def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
@@ -40,7 +45,7 @@ def test_a_candidate_whose_node_nobody_expanded_is_censored(tmp_path: Path) -> N
     write_record(tmp_path / "a.0.x.npz", OUTCOME, child=child, node_expanded=expanded)
     write_record(tmp_path / "b.0.x.npz", OUTCOME)
     followed, whole = read_lists(tmp_path)
-    assert followed.censored.tolist() == [False, False, True, False]
+    assert followed.censored.tolist() == [False, True, False]
     assert not whole.censored.any()
 
 

@@ -3,8 +3,8 @@ from math import log2
 import numpy as np
 import pytest
 
-from mdp.learning.labels import RatedList, ratings
-from mdp.learning.ndcg import as_searched, at, best_within, full_lists, interval, ndcg, order, regret
+from mdp.learning.lists import RatedList
+from mdp.learning.ndcg import as_searched, at, interval, ndcg, order, regret
 from mdp.mesh import Floats
 from mdp.ranking.features import PAPER_COLUMNS
 from tests.mdp.learning.records import drawn_list
@@ -14,7 +14,7 @@ RATINGS = np.array([0, 5, 1, 4, 2, 3], np.int32)
 
 
 def listed(outcome: Floats) -> RatedList:
-    return RatedList(np.zeros((len(outcome), 6), np.float32), PAPER_COLUMNS, outcome, ratings(outcome), "m")
+    return RatedList(np.zeros((len(outcome), 6), np.float32), PAPER_COLUMNS, outcome, np.zeros(len(outcome), np.bool_), "m")
 
 
 def test_the_right_order_has_an_ndcg_of_one_and_the_reverse_what_its_last_places_give() -> None:
@@ -35,10 +35,9 @@ def test_the_published_scores_have_the_published_ndcg() -> None:
     assert means == pytest.approx([0.42256, 0.45508, 0.48323, 0.50974, 0.53157], abs=5e-6)
 
 
-def test_the_best_is_within_the_first_two_when_one_as_good_is() -> None:
+def test_regret_is_that_of_the_best_of_the_first_few() -> None:
     rated = listed(np.array([0.4, 0.1, 0.3, 0.1]))
     scores = np.array([4.0, 1.0, 3.0, 2.0])
-    assert [best_within(first)(scores, rated) for first in (1, 2, 3)] == [0, 0, 1]
     assert [regret(first)(scores, rated) for first in (1, 2, 3)] == pytest.approx([3, 2, 0])
 
 
@@ -46,10 +45,6 @@ def test_scores_that_a_search_takes_for_equal_leave_candidates_in_the_order_they
     rated = listed(np.array([0.1, 0.2, 0.3]))
     scores = as_searched(lambda rated: np.array([1.0, 1.00001, 1.0002]))
     assert order(scores(rated)).tolist() == [2, 0, 1]
-
-
-def test_full_lists_have_fifty_candidates() -> None:
-    assert [len(rated.ratings) for rated in full_lists([drawn_list(1, 49), drawn_list(2, 50)])] == [50]
 
 
 def test_an_interval_resamples_models_not_lists() -> None:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from mdp.batch.rows import append_row
-from mdp.learning.index import INDEX, Row, Search, read_index, unfinished, write_index
+from mdp.learning.index import INDEX, Row, Search, read_index, summary, unfinished, write_index
 from mdp.learning.models import coarser, model_files, oriented, read_model
-from mdp.learning.summary import summary
 from mdp.learning.task import Settings, run
 from mdp.mesh import Mesh
 from profiles.errors import LearningError, MeshError

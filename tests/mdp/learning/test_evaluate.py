@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from mdp.learning.analysis import correlation, importance, shuffled
 from mdp.learning.baselines import trade_off
-from mdp.learning.tables import regret_table, tables
+from mdp.learning.evaluate import NDCGS, REGRETS, correlation, importance, shuffled, table
 from mdp.mesh import Floats
 from tests.mdp.learning.records import drawn_list
 
@@ -14,31 +13,21 @@ def cells(text: str, name: str) -> list[str]:
     return next([cell.strip() for cell in line.split("|")[2:-1]] for line in text.splitlines() if line.startswith(f"| {name} |"))
 
 
-def test_the_right_order_has_full_marks_in_every_table() -> None:
-    whole, full = tables({"right": lambda rated: -rated.outcome, "M2": trade_off(0.0)}, LISTS)
-    for text in (whole, full):
-        assert cells(text, "right") == ["1.000"] * 5 + ["1.000 to 1.000"] + ["100.0%"] * 3
-    assert float(cells(full, "M2")[0]) < float(cells(whole, "M2")[0]) < 1
+def test_the_right_order_has_full_marks() -> None:
+    text = table("All lists", {"right": lambda rated: -rated.outcome, "M2": trade_off(0.0)}, LISTS, NDCGS)
+    assert text.startswith("All lists: 40 of 7 models")
+    assert cells(text, "right") == ["1.0000"] * 5 + ["1.0000 to 1.0000"]
+    assert 0 < float(cells(text, "M2")[0]) < 1
 
 
 def test_the_wrong_order_costs_the_largest_regret() -> None:
-    text = regret_table({"wrong": lambda rated: rated.outcome, "right": lambda rated: -rated.outcome}, LISTS)
+    text = table("", {"wrong": lambda rated: rated.outcome, "right": lambda rated: -rated.outcome}, LISTS, REGRETS)
     assert float(cells(text, "wrong")[0]) == pytest.approx(np.mean([rated.regrets.max() for rated in LISTS]), abs=1e-4)
-    assert cells(text, "right") == ["0.0000"] * 3
-
-
-def test_tables_say_how_many_lists_and_models_they_are_of() -> None:
-    whole, full = tables({"M2": trade_off(0.0)}, LISTS)
-    assert whole.startswith("All lists: 40 of 7 models")
-    assert full.startswith("Full lists: 10 of 6 models")
-
-
-def test_without_a_full_list_there_is_no_table_of_them() -> None:
-    assert list(tables({"M2": trade_off(0.0)}, LISTS[:2]))[1] == "Full lists: none"
+    assert cells(text, "right")[:3] == ["0.0000"] * 3
 
 
 def test_only_features_that_a_ranker_looks_at_are_important() -> None:
-    m1, m2, m6 = importance(trade_off(0.5), ("M1", "M2", "M6"), LISTS, 3)
+    m1, m2, m6 = importance(trade_off(0.5), ("M1", "M2", "M6"), LISTS)
     assert m1 == 0
     assert m2 > m6 > 0.02
 
