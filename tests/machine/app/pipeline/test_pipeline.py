@@ -19,21 +19,17 @@ from tests.shapes import from_manifold
 from tests.slicer.hand import cut
 
 SHARED = Path(__file__).parents[4].parent / "shared" / "models"
-RUNS = [("generic_ac", f"demo:{name}") for name in ("bracket", "figure", "lattice", "tree")] + [("fractal5pro", "demo:tree")]
+RUNS = [("generic_ac", "demo:figure"), ("generic_ac", "demo:lattice"), ("fractal5pro", "demo:tree")]
 if SHARED.exists():
-    RUNS += [("generic_ac", str(SHARED / name)) for name in ("hook.stl", "bracket.3mf", "kitten.off")]
-    RUNS += [("fractal5pro", str(SHARED / "deer.ply"))]
-WHOLE = {"hook.stl", "bracket.3mf"}  # no cut makes more of them safe
-QUICK = ["search.directions=100", "search.beam_width=1", "process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
-QUICK += ["process.scale=0.35", "process.walls=1", "process.infill_density=0.05"]  # a twentieth of the lines, the same shapes
-LARGE = ("bracket", "hook.stl", "kitten.off")  # those whose lines are most of all
+    RUNS += [("generic_ac", str(SHARED / "bracket.3mf")), ("fractal5pro", str(SHARED / "kitten.off"))]
+WHOLE = "bracket.3mf"  # no cut makes more of it safe
+QUICK = ["search.directions=40", "search.beam_width=1", "process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
+QUICK += ["process.scale=0.25", "process.walls=1", "process.infill_density=0.05"]  # a fortieth of the lines, the same shapes
 QUICK += ["search.seam_mm=0", "search.cut_mm2=0"]  # else nobody would cut what is so small
 
 
 def _built(model: str, machine: str) -> Program:
-    smaller = ["process.scale=0.25"] if model.endswith(LARGE) else []
-    finer = ["search.directions=200"] if model.endswith("deer.ply") else []
-    profile = load(machine=machine, settings=[*QUICK, *smaller, *finer])
+    profile = load(machine=machine, settings=QUICK)
     return build(decompose_model(ModelRequest(model, profile, orient=False)).decomposition, profile)
 
 
@@ -50,7 +46,7 @@ def test_the_simulated_printer_lays_the_plastic_where_the_model_is(machine: str,
     assert volumes.sum() == pytest.approx(program.run.segment_mm3.sum(), rel=1e-3)
     assert np.abs(segments - program.run.deposited.segments()).max() < 2e-3
     assert program.decomposition is not None
-    assert (len(program.decomposition.parts) == 1) == (Path(model).name in WHOLE)
+    assert (len(program.decomposition.parts) == 1) == (Path(model).name == WHOLE)
     assert inside_share(program.run, program.decomposition.mesh, profile.process.line_width_mm).share >= 0.99
     assert (record.clamped, record.unknown, record.nozzle_target_c, record.bed_target_c) == (0, 0, 0.0, 0.0)
 
