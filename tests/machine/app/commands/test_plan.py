@@ -18,7 +18,7 @@ FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4",
 FAST += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6", "--set", "process.infill_density=0.05"]
 # So small an arm, whose stairs and seam count nearly as much as support, is cut all the same.
 FAST += ["--set", "search.seam_mm=0.8", "--set", "search.stair_weight=0.01", "--set", "search.least_saving=0"]
-FAST += ["--set", "search.cut_mm2=20"]
+FAST += ["--set", "search.cut_mm2=20", "--set", "search.beam_width=2"]
 PARTS = ["part-01.stl", "part-02.stl", "decomposition.3mf"]
 
 
@@ -135,8 +135,8 @@ OTHER = f"sha256 = 'abc'\nmodel = 'other.stl'\n{HIGH}"
 REFUSED = [
     ("--plan", HIGH, "plan mine.toml: part 2 cannot be cut off: its plane misses the model"),
     ("--planes", HIGH, "plan mine.toml: part 2 cannot be cut off: its plane misses the model"),
-    ("--plan", OTHER, "plan mine.toml was made of another model: other.stl is not demo:tree as it is read now"),
-    ("--planes", OTHER, "plan mine.toml was made of another model: other.stl is not demo:tree as it is read now"),
+    ("--plan", OTHER, "plan mine.toml was made of another model: other.stl is not tee.stl as it is read now"),
+    ("--planes", OTHER, "plan mine.toml was made of another model: other.stl is not tee.stl as it is read now"),
     ("--planes", "version = 1\n[[part]]\n[[part]]\n", "part 2 has neither normal nor offset_mm"),
 ]
 
@@ -145,8 +145,9 @@ REFUSED = [
 def test_planes_that_cannot_be_cut_end_in_one_sentence(
     folder: Path, capsys: pytest.CaptureFixture[str], option: str, text: str, sentence: str
 ) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
     Path("mine.toml").write_text(text)
-    assert main(["decompose", "demo:tree", option, "mine.toml", "-o", "parts", *FAST]) == 1
+    assert main(["decompose", "tee.stl", option, "mine.toml", "-o", "parts", *FAST]) == 1
     last = capsys.readouterr().err.splitlines()[-1]
     assert last.startswith("tiltprint: ")
     assert sentence in last
@@ -166,14 +167,16 @@ def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Pa
 
 
 def test_planes_by_hand_are_in_the_plan_with_their_zones(folder: Path) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
     zone = "[[keep]]\nmin_mm = [-2.0, -2.0, 10.0]\nmax_mm = [2.0, 2.0, 11.0]\n"
     Path("mine.toml").write_text(f"version = 1\n{zone}")
-    _run("decompose", "demo:tree", "--planes", "mine.toml", "--plan", "tree.toml", "--json", "zone.json")
-    assert zone in Path("tree.toml").read_text()
-    last = _values("zone.json")["parts"][-1]["base"]
-    Path("mine.toml").write_text(f"version = 1\n[[part]]\n[[part]]\nnormal = {last['normal']}\noffset_mm = {last['offset_mm']}\n")
-    _run("decompose", "demo:tree", "--planes", "mine.toml", "--json", "planes.json")
-    assert _values("planes.json")["parts"][-1]["base"] == last
+    _run("decompose", "tee.stl", "--planes", "mine.toml", "--plan", "tee.toml", "--json", "zone.json")
+    assert zone in Path("tee.toml").read_text()
+    *_, last = _values("zone.json")["parts"][1:]
+    base = f"normal = {last['base']['normal']}\noffset_mm = {last['base']['offset_mm']}"
+    Path("mine.toml").write_text(f"version = 1\n[[part]]\n[[part]]\n{base}\n")
+    _run("decompose", "tee.stl", "--planes", "mine.toml", "--json", "planes.json")
+    assert _values("planes.json")["parts"][-1]["base"] == last["base"]
 
 
 def test_a_planes_file_says_what_the_colours_of_a_model_mean_and_the_plan_keeps_it(folder: Path) -> None:
