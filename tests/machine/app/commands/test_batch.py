@@ -5,8 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -18,7 +22,8 @@ from mdp.mesh import Mesh
 from mdp.save import stl
 from tests import shapes
 
-FAST = ("--set", "process.layer_height_mm=0.3", "--as-is", "--beam-width", "1")
+FAST = ("--set", "process.layer_height_mm=0.3", "--as-is", "--beam-width", "1", "--set", "search.directions=20")
+FAST += ("--set", "process.scale=0.4", "--set", "process.infill_density=0.05")
 
 
 def models(folder: Path, **meshes: Mesh) -> Path:
@@ -26,6 +31,18 @@ def models(folder: Path, **meshes: Mesh) -> Path:
     for name, mesh in meshes.items():
         (folder / f"{name}.stl").write_bytes(stl(mesh))
     return folder
+
+
+class ThisProcess:
+    """Does in this process what a batch gives to its workers, each of which takes a second to start."""
+
+    def completed(self, task: Callable[..., Any], calls: Mapping[str, Any], _: Any) -> Iterator[tuple[str, Any]]:
+        return ((name, task(*given)) for name, given in calls.items())
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.app.commands.batch.connected", lambda _: nullcontext(ThisProcess()))
 
 
 def rows_of(table: Path) -> dict[str, dict[str, str]]:
@@ -64,13 +81,16 @@ def test_only_what_has_changed_or_is_gone_is_done_again_and_workers_do_not_chang
         first[part.parent.name] = part.stat().st_mtime_ns
     models(folder, b=shapes.tee())
     (tmp_path / "out" / "c" / "part-01.stl").unlink()
-    assert main(command) == 0
-    again = {part.parent.name: part.stat().st_mtime_ns for part in (tmp_path / "out").glob("*/part-01.stl")}
-    assert {name for name in again if again[name] != first[name]} == {"b", "c"}
-    assert main([*command[:3], str(tmp_path / "one"), *command[4:], "--workers", "1"]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("machine.app.commands.batch.connected", lambda _: nullcontext(ThisProcess()))
+        assert main(command) == 0
+        again = {part.parent.name: part.stat().st_mtime_ns for part in (tmp_path / "out").glob("*/part-01.stl")}
+        assert {name for name in again if again[name] != first[name]} == {"b", "c"}
+        assert main([*command[:3], str(tmp_path / "one"), *command[4:]]) == 0
     assert without_seconds(table) == without_seconds(tmp_path / "one" / "decompose.csv")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_other_options_do_everything_again_and_leave_no_file_of_the_ones_before(tmp_path: Path) -> None:
     folder, out = models(tmp_path / "models", box=shapes.box()), tmp_path / "out"
     command = ["batch", str(folder), "-o", str(out), *FAST]
@@ -82,22 +102,27 @@ def test_other_options_do_everything_again_and_leave_no_file_of_the_ones_before(
     assert not (out / "box.gcode").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_rows_of_models_that_are_gone_stay(tmp_path: Path) -> None:
     folder, out = models(tmp_path / "models", a=shapes.box(), b=shapes.box()), tmp_path / "out"
-    command = ["batch", str(folder), "-o", str(out), "--do", "estimate", *FAST, "--workers", "1"]
+    command = ["batch", str(folder), "-o", str(out), "--do", "estimate", *FAST]
     assert main(command) == 0
     (folder / "a.stl").unlink()
     assert main(command) == 0
     assert list(rows_of(out / "estimate.csv")) == ["a.stl", "b.stl"]
 
 
-def test_a_model_that_takes_too_long_is_a_row_and_is_tried_again_by_the_next_run(tmp_path: Path) -> None:
+def test_a_model_that_takes_too_long_is_a_row_and_is_tried_again_by_the_next_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder, out = models(tmp_path / "models", ball=shapes.ball(30.0, 256)), tmp_path / "out"
     command = ["batch", str(folder), "-o", str(out), "--do", "estimate", "--beam-width", "50"]
     assert main([*command, "--limit-s", "1"]) == 1
     row = rows_of(out / "estimate.csv")["ball.stl"]
     assert (row["status"], row["sentence"]) == (FAILED, "ball.stl: it took longer than 1 s")
-    assert main([*command, "--as-is", "--beam-width", "1"]) == 0
+    in_time = SimpleNamespace(completed=lambda *_: [("ball.stl", Row("ball.stl"))])
+    monkeypatch.setattr("machine.app.commands.batch.connected", lambda _: nullcontext(in_time))
+    assert main(command) == 0
 
 
 def test_after_ctrl_c_no_process_is_left_and_the_batch_goes_on(tmp_path: Path) -> None:
@@ -126,6 +151,7 @@ def children_of(pid: int) -> list[Path]:
     return [Path("/proc") / child for thread in threads for child in thread.read_text().split()]
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_two_models_of_one_name_do_not_write_over_each_other(tmp_path: Path) -> None:
     assert same_files(["b.stl", "a.stl", "A.obj", "a.ply"]) == {"a.ply": "A.obj", "a.stl": "A.obj"}
     folder, out = models(tmp_path / "models", tee=shapes.box()), tmp_path / "out"
