@@ -19,7 +19,8 @@ from tests import shapes
 # So coarse a T, whose arms show high stairs and are small beside their seams, is cut all the same.
 IN_PARTS = ["--as-is", "--set", "search.seam_mm=0.8", "--set", "search.stair_weight=0.01"]
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "process.first_layer_height_mm=0.3"]
-FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6"]
+FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6", "--set", "process.infill_density=0.05"]
+COARSE = ["--set", "search.directions=20", "--set", "process.layer_height_mm=0.4"]
 
 WRONG = [
     (["decompose", "nowhere.stl"], "nowhere.stl"),
@@ -239,7 +240,7 @@ def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest
     assert {**first, "seconds": None} == {**again, "seconds": None}
 
 
-@pytest.mark.parametrize("command", [["decompose"], ["export", "-o", "a.gcode"], ["simulate"], ["print", "--port", "sim"]])
+@pytest.mark.parametrize("command", [["decompose"], ["export", "-o", "a.gcode"]])
 def test_a_time_limit_of_nothing_prints_one_part_and_says_so(
     folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
 ) -> None:
@@ -276,7 +277,7 @@ def test_several_models_are_exported_as_one_plate_and_a_number_stands_for_copies
     assert json.loads(Path("model.json").read_text())["model"]["outside"] == 0.0
 
 
-@pytest.mark.parametrize("turned", [[], ["--set", "process.rotate_deg=[0, 30, 20]", "--orient"], ["--as-is"]])
+@pytest.mark.parametrize("turned", [["--set", "process.rotate_deg=[0, 30, 20]", "--orient"], ["--as-is"]])
 def test_the_plastic_of_a_file_is_held_against_its_model_however_it_was_laid_down(folder: Path, turned: list[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     assert main(["export", "tee.stl", *FAST, *turned, "-o", "a.gcode"]) == 0
@@ -287,10 +288,10 @@ def test_the_plastic_of_a_file_is_held_against_its_model_however_it_was_laid_dow
 
 
 def test_g_code_on_standard_output_is_the_file_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Path("tee.stl").write_bytes(stl(shapes.tee()))
-    assert main(["export", "tee.stl", "--as-is", *FAST, "-o", "a.gcode"]) == 0
+    Path("box.stl").write_bytes(stl(shapes.box(20, 20, 2)))
+    assert main(["export", "box.stl", "--as-is", *FAST, "-o", "a.gcode"]) == 0
     table = capsys.readouterr().out
-    assert main(["export", "tee.stl", "--as-is", *FAST, "-o", "-"]) == 0
+    assert main(["export", "box.stl", "--as-is", *FAST, "-o", "-"]) == 0
     output = capsys.readouterr()
     assert (output.out, table in output.err) == (Path("a.gcode").read_text(), True)
     assert not Path("-").exists()
@@ -321,7 +322,7 @@ def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: 
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     turned, told = [], []
     for arguments in (["--as-is"], [], ["--orient"]):
-        assert main(["decompose", "tee.stl", *arguments, "--set", "search.directions=20", "--json", "out.json"]) == 0
+        assert main(["decompose", "tee.stl", *arguments, *COARSE, "--json", "out.json"]) == 0
         out = json.loads(Path("out.json").read_text())
         turned.append(out["rotate_deg"])
         told.append("tee.stl: it is laid down on its front (turned 90 about x): in one piece" in capsys.readouterr().err)
@@ -353,7 +354,7 @@ STAYS = [
 def test_a_model_stays_as_it_is_where_something_says_how_it_lies(folder: Path, arguments: list[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     Path("planes.toml").write_text("version = 1\n")
-    assert main(["decompose", "tee.stl", *arguments, "--set", "search.directions=20", "--json", "out.json"]) == 0
+    assert main(["decompose", "tee.stl", *arguments, *COARSE, "--json", "out.json"]) == 0
     turn = 30.0 if "process.rotate_deg" in arguments[-1] else 0.0
     assert json.loads(Path("out.json").read_text())["rotate_deg"] == [0.0, 0.0, turn]
 
@@ -375,17 +376,18 @@ def _program(folder: Path) -> Path:
     return file
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path, number: int) -> None:
+def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path) -> None:
     options = ["--port", "sim", "--sim-speed", "60", "--force"]
     command = [sys.executable, "-m", "machine.app.cli", "print", str(_program(folder)), *options]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3])
-    assert process.stderr is not None
-    _wait_for(process, "printing:")
-    os.kill(process.pid, number)
-    _, message = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "heaters off" in message
+    pipe = subprocess.PIPE
+    for process, number in [
+        (subprocess.Popen(command, stderr=pipe, stdout=pipe, text=True, cwd=Path(__file__).parents[3]), number)
+        for number in (signal.SIGINT, signal.SIGTERM)  # both heat up at once
+    ]:
+        _wait_for(process, "printing:")
+        os.kill(process.pid, number)
+        _, message = process.communicate(timeout=60)
+        assert (process.returncode, "heaters off" in message) == (130, True)
 
 
 INTERRUPTED = """
@@ -408,9 +410,7 @@ PIPELINE = "machine.app.pipeline.pipeline"
     ("module", "stage", "later_s", "written"),
     [
         (PIPELINE, "read_model", 0.0, []),
-        (PIPELINE, "slice_parts", 0.0, []),
         (PIPELINE, "slice_parts", 0.2, []),
-        (PIPELINE, "plan", 0.0, []),
         (PIPELINE, "dry_run", 0.0, []),
         ("profiles.files", "_umask", 0.0, []),  # between the file's content and its name
         ("machine.app.commands.export", "write_json", 0.0, ["out.gcode"]),
@@ -421,6 +421,7 @@ def test_an_interrupted_export_leaves_no_file_half_written_and_no_process(
 ) -> None:
     script = INTERRUPTED.format(module=module, stage=stage, later_s=later_s)
     words = ["export", "demo:bracket", "--as-is", "--parts", "1", "-o", "out.gcode", "--json", "out.json"]
+    words += [] if later_s else [*COARSE, "--set", "process.scale=0.2"]  # else it would end before it is interrupted
     given = {"PYTHONPATH": str(Path(__file__).parents[3])}
     with subprocess.Popen(
         [sys.executable, "-c", script, *words], stderr=subprocess.PIPE, text=True, start_new_session=True, env=os.environ | given
