@@ -21,7 +21,8 @@ from mdp.read import read_mesh
 from mdp.save import MODEL_PART, stl
 from tests.shapes import tee
 
-FAST = ("--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "machine.thumbnails_px=[]")
+FAST = ("--set", "search.directions=20", "--set", "process.layer_height_mm=0.4", "--set", "machine.thumbnails_px=[]")
+FAST += ("--set", "process.infill_density=0.05", "--set", "process.first_layer_height_mm=0.4")
 
 PLAN = """
 version = 1
@@ -60,6 +61,23 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def run(*words: str) -> None:
     assert main(words) == 0
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A project of one part that stands as it is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("saved"))
+        Path("tee.stl").write_bytes(stl(tee()))
+        run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
+        return Path("tee.3mf").read_bytes()
+
+
+@pytest.fixture
+def project(folder: Path, saved: bytes) -> Path:
+    """It lies beside the other files of the folder."""
+    Path("tee.3mf").write_bytes(saved)
+    return folder
 
 
 @pytest.mark.parametrize(
@@ -126,7 +144,7 @@ def test_a_mark_s_mesh_with_a_long_name_is_read_again_from_the_project() -> None
     run("decompose", "long.3mf", "-o", "parts")
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
@@ -137,7 +155,6 @@ def test_a_mark_s_mesh_with_a_long_name_is_read_again_from_the_project() -> None
 def test_options_that_a_project_leaves_no_room_for_are_refused_by_its_name(
     options: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     capsys.readouterr()
     assert main(["decompose", "tee.3mf", *options]) == 1
     assert capsys.readouterr().err.strip().endswith(sentence)
@@ -170,11 +187,10 @@ def changed(path: Path, name: str, content: bytes | None) -> None:
         (INSIDE + "plan.toml", b"version = ", "this project is damaged"),
     ],
 )
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_damaged_project_is_refused_in_one_sentence(
     name: str, content: bytes | None, sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     changed(Path("tee.3mf"), name, content)
     capsys.readouterr()
     assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
@@ -185,9 +201,8 @@ def test_a_damaged_project_is_refused_in_one_sentence(
 
 
 @pytest.mark.parametrize("name", ["", "..", "a/b.stl", "a\0b.stl", 400 * "a", "\ud800.stl"])
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_model_s_name_that_no_file_can_have_is_damage(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     with zipfile.ZipFile("tee.3mf") as archive:
         record = json.loads(archive.read(INSIDE + RECORD))
     changed(Path("tee.3mf"), INSIDE + RECORD, json.dumps(record | {"name": name}).encode())
@@ -195,9 +210,8 @@ def test_a_model_s_name_that_no_file_can_have_is_damage(name: str, capsys: pytes
     assert "this project is damaged" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_files_of_a_project_never_lie_outside_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     changed(Path("tee.3mf"), INSIDE + "../../outside.txt", b"x")
     assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
     assert "this project is damaged" in capsys.readouterr().err
@@ -206,9 +220,8 @@ def test_files_of_a_project_never_lie_outside_its_folder(capsys: pytest.CaptureF
 @pytest.mark.parametrize(
     "words", [("save", "-o", "tee.3mf"), ("export", "-o", "tee.3mf"), ("export", "-o", "a.gcode", "--json", "tee.3mf")]
 )
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_project_that_is_read_is_never_written_over(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     before = Path("tee.3mf").read_bytes()
     assert main([words[0], "tee.3mf", *words[1:]]) == 1
     assert "the same file as the project, which is read" in capsys.readouterr().err
@@ -252,11 +265,10 @@ def test_a_name_with_letters_of_all_kinds_is_kept() -> None:
         ("given", GIVEN | {"machine": 3}, "given.machine is 3: it must be a text"),
     ],
 )
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_record_that_no_project_has_is_damage(
     key: str, value: object, sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     with zipfile.ZipFile("tee.3mf") as archive:
         record = json.loads(archive.read(INSIDE + RECORD))
     changed(Path("tee.3mf"), INSIDE + RECORD, json.dumps(record | {key: value}).encode())
@@ -266,9 +278,8 @@ def test_a_record_that_no_project_has_is_damage(
     assert sentence in said
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_project_whose_archive_has_entries_for_folders_opens() -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     changed(Path("tee.3mf"), INSIDE, b"")
     run("decompose", "tee.3mf", "-o", "parts")
 
@@ -280,9 +291,8 @@ def test_a_pause_before_a_part_that_does_not_exist_is_not_saved(capsys: pytest.C
     assert not Path("tee.3mf").exists()
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_project_whose_model_was_replaced_is_damage(capsys: pytest.CaptureFixture[str]) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     with zipfile.ZipFile("tee.3mf") as archive:
         (model,) = (name for name in archive.namelist() if name.startswith(INSIDE + "model-"))
     changed(Path("tee.3mf"), model, Path("insert.stl").read_bytes())
@@ -290,9 +300,8 @@ def test_a_project_whose_model_was_replaced_is_damage(capsys: pytest.CaptureFixt
     assert f"this project is damaged: its file {model.removeprefix(INSIDE)} is not as it was saved" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_machine_that_is_not_known_is_named_with_the_project_that_asks_for_it(capsys: pytest.CaptureFixture[str]) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     with zipfile.ZipFile("tee.3mf") as archive:
         record = json.loads(archive.read(INSIDE + RECORD))
     changed(Path("tee.3mf"), INSIDE + RECORD, json.dumps(record | {"given": GIVEN | {"machine": "nosuch"}}).encode())
@@ -312,9 +321,8 @@ def test_a_batch_has_its_options_over_a_project_as_export_has() -> None:
 
 
 @pytest.mark.parametrize("models", [("tee.3mf", "tee.stl"), ("tee.stl", "tee.3mf"), ("tee.3mf:2",)])
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("project")
 def test_a_project_is_a_plate_of_its_own(models: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
     assert main(["export", *models, "-o", "after.gcode"]) == 1
     assert "is a project, which is a plate of its own" in capsys.readouterr().err
 
