@@ -15,7 +15,7 @@ from tests.machine.hand import printed
 
 def test_export_draws_the_layer_that_it_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     gcode, svg = tmp_path / "a.gcode", tmp_path / "a.svg"
-    whole = ["--as-is", "--set", "process.support=none", "--time-limit", "0"]
+    whole = ["--as-is", "--set", "process.scale=0.3", "--set", "process.support=none", "--time-limit", "0"]
     assert main(["export", "demo:bracket", *FAST, *whole, "-o", str(gcode), "--svg", str(svg), "--layer", "1:3"]) == 0
     third = gcode.read_text().split(";LAYER_CHANGE")[3]
     ids = {g.get("id") for g in ET.fromstring(svg.read_text()).iter("{http://www.w3.org/2000/svg}g")} - {None, "travels", "seams"}

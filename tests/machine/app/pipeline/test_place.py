@@ -1,6 +1,7 @@
 """Place: a model stands elsewhere on the plate, with the same parts, and all that comes after the search is there, too."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from machine.app.pipeline.plate import on_one_plate
 from machine.dryrun.conformity.agreement import agreement
 from machine.planning.arrange import places_on_plate
 from machine.planning.fit import standing_at
+from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.by_plan import cut_by_plan
@@ -22,7 +24,7 @@ from tests.slicer.hand import whole
 
 COARSE = (
     *(f"process.{key}" for key in ("layer_height_mm=0.4", "first_layer_height_mm=0.4", "line_width_mm=0.8")),
-    "search.nozzle_load_n=0",
+    *("search.nozzle_load_n=0", "search.directions=20", "process.walls=1", "process.infill_density=0.05"),
 )
 ARM = PlanFile("arm", parts=(PlannedPart((1.0, 0.0, 0.0), 8.0),))  # the arm of a T, printed sideways
 
@@ -35,8 +37,13 @@ def in_arms(profile: Profile) -> Decomposition:
     return cut_by_plan(tee(), "T", profile, ARM)
 
 
-def printed_middle(profile: Profile) -> np.ndarray:
-    run = build(in_arms(profile), profile).run
+@cache
+def printed(x: float, y: float) -> Program:
+    return build(in_arms(at(x, y)), at(x, y))
+
+
+def printed_middle(x: float, y: float) -> np.ndarray:
+    run = printed(x, y).run
     own = [name not in ("Custom", "Skirt/Brim") for name in run.segment_type]
     ends = run.deposited.segments(own).reshape(-1, 3)
     middle: np.ndarray = 0.5 * (ends.min(axis=0) + ends.max(axis=0))[:2]
@@ -46,15 +53,14 @@ def printed_middle(profile: Profile) -> np.ndarray:
 def test_a_plan_gives_the_same_parts_wherever_the_model_stands_and_they_are_printed_there() -> None:
     here, there = in_arms(at(0, 0)), in_arms(at(20, -10))
     assert [part.mesh.vertices.tolist() for part in here.parts] == [part.mesh.vertices.tolist() for part in there.parts]
-    assert printed_middle(at(20, -10)) - printed_middle(at(0, 0)) == pytest.approx([20.0, -10.0], abs=0.1)
+    assert printed_middle(20, -10) - printed_middle(0, 0) == pytest.approx([20.0, -10.0], abs=0.1)
 
 
 def test_the_plastic_at_a_place_is_that_of_the_model_there() -> None:
-    profile = at(20, -10)
-    program = build(in_arms(profile), profile)
+    program = printed(20, -10)
     assert program.decomposition is not None
     assert program.decomposition.mesh.bounds_mm[:, 0] == pytest.approx([0.0, 40.0])
-    agreed, _ = agreement(program.run, program.decomposition.mesh, profile)
+    agreed, _ = agreement(program.run, program.decomposition.mesh, at(20, -10))
     assert agreed.outside < 0.01
     assert [finding.severity for finding in program.run.findings if finding.severity == "error"] == []
 
