@@ -75,19 +75,19 @@ def test_every_model_has_a_row_and_its_gcode_is_that_of_export(tmp_path: Path, c
 def test_only_what_has_changed_or_is_gone_is_done_again_and_workers_do_not_change_the_table(tmp_path: Path) -> None:
     folder = models(tmp_path / "models", a=shapes.box(), b=shapes.box(), c=shapes.box())
     command = ["batch", str(folder), "-o", str(tmp_path / "out"), "--do", "decompose", *FAST]
-    assert main(command) == 0
-    table, first = tmp_path / "out" / "decompose.csv", {}
-    for part in (tmp_path / "out").glob("*/part-01.stl"):
-        first[part.parent.name] = part.stat().st_mtime_ns
-    models(folder, b=shapes.tee())
-    (tmp_path / "out" / "c" / "part-01.stl").unlink()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("machine.app.commands.batch.connected", lambda _: nullcontext(ThisProcess()))
         assert main(command) == 0
-        again = {part.parent.name: part.stat().st_mtime_ns for part in (tmp_path / "out").glob("*/part-01.stl")}
-        assert {name for name in again if again[name] != first[name]} == {"b", "c"}
-        assert main([*command[:3], str(tmp_path / "one"), *command[4:]]) == 0
-    assert without_seconds(table) == without_seconds(tmp_path / "one" / "decompose.csv")
+        table, first = tmp_path / "out" / "decompose.csv", {}
+        for part in (tmp_path / "out").glob("*/part-01.stl"):
+            first[part.parent.name] = part.stat().st_mtime_ns
+        models(folder, b=shapes.tee())
+        (tmp_path / "out" / "c" / "part-01.stl").unlink()
+        assert main(command) == 0
+    again = {part.parent.name: part.stat().st_mtime_ns for part in (tmp_path / "out").glob("*/part-01.stl")}
+    assert {name for name in again if again[name] != first[name]} == {"b", "c"}
+    assert main([*command[:3], str(tmp_path / "workers"), *command[4:]]) == 0
+    assert without_seconds(table) == without_seconds(tmp_path / "workers" / "decompose.csv")
 
 
 @pytest.mark.usefixtures("in_this_process")
