@@ -2,14 +2,13 @@ import io
 from collections.abc import Sequence
 from concurrent.futures import Future, wait
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise, product
 from typing import Any
 
 import manifold3d as m3
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mdp.clearance import least_tip_height_mm
 from mdp.decomposition import Decomposition, Part
@@ -32,11 +31,17 @@ from tests.mdp.solids import random_solid
 
 
 def _decompose(mesh: Mesh, *settings_: str, machine: str = "generic_ac") -> Decomposition:
-    return decompose(mesh, "shape", load(machine=machine, settings=("search.directions=200", "search.seam_mm=0.8", *settings_)))
+    return decompose(mesh, "shape", load(machine=machine, settings=("search.directions=100", "search.seam_mm=0.8", *settings_)))
+
+
+@cache
+def _found(name: str, *settings_: str, machine: str = "generic_ac") -> Decomposition:
+    """What the search finds for a named shape, searched once for all tests."""
+    return _decompose(getattr(shapes, name)(), *settings_, machine=machine)
 
 
 def test_a_leaning_arm_becomes_a_part_of_its_own_without_risk() -> None:
-    decomposition = _decompose(shapes.branch())
+    decomposition = _found("branch")
     assert len(decomposition.parts) == 2
     assert decomposition.parts[1].direction[0] > 0.2
     assert decomposition.reduction > 0.85
@@ -44,7 +49,7 @@ def test_a_leaning_arm_becomes_a_part_of_its_own_without_risk() -> None:
 
 def test_voids_forbid_no_cut() -> None:
     """Arms with a void in each are cut as solid ones are, but for the stairs inside; the ceilings of 4 mm are bridged."""
-    solid, hollow = (_decompose(mesh, "search.stair_weight=0") for mesh in (shapes.tee(), shapes.hollow_tee()))
+    solid, hollow = (_found(name, "search.stair_weight=0") for name in ("tee", "hollow_tee"))
     assert [tuple(part.direction) for part in hollow.parts] == [tuple(part.direction) for part in solid.parts]
     assert len(hollow.parts) == 2
     assert hollow.risky_area_mm2 == pytest.approx(solid.risky_area_mm2) == pytest.approx(2 * 15 * 10)
@@ -54,8 +59,8 @@ def test_voids_forbid_no_cut() -> None:
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
 @pytest.mark.parametrize("name", ["tee", "branch", "bowl", "hollow_tee"])
 def test_parts_are_closed_add_up_and_come_in_a_printable_order(name: str, machine: str) -> None:
-    mesh = getattr(shapes, name)()
-    parts = _decompose(mesh, machine=machine).parts
+    decomposition = _found(name, machine=machine)
+    mesh, parts = getattr(shapes, name)(), decomposition.parts
     assert sum(part.volume_mm3 for part in parts) == pytest.approx(mesh.volume_mm3, rel=1e-9)
     assert parts[0].base.heights_mm(parts[0].mesh.vertices).min() == pytest.approx(parts[0].mesh.bounds_mm[0, 2]) == 0.0
     for position, part in enumerate(parts):
@@ -98,7 +103,7 @@ def _area_in_plane(mesh: Mesh, plane: Plane, looking: float) -> float:
 
 
 def test_each_cut_costs_its_price_beside_its_seam_and_one_that_saves_less_is_not_made() -> None:
-    free, priced, dear = (_decompose(shapes.branch(), f"search.cut_mm2={price}") for price in (0, 7, 1000))
+    free, priced, dear = (_found("branch", f"search.cut_mm2={price}") for price in (0, 7, 1000))
     assert [len(found.parts) for found in (free, priced, dear)] == [2, 2, 1]
     assert priced.front[1].cost_mm2 == pytest.approx(free.front[1].cost_mm2 + 7.0, abs=1e-6)
     assert priced.front[1].support_area_mm2 == pytest.approx(free.front[1].support_area_mm2, abs=1e-6)
@@ -118,7 +123,7 @@ def test_one_part_that_is_asked_for_needs_no_search() -> None:
 
 
 def test_one_part_that_is_asked_for_costs_what_the_search_counts_for_the_uncut_model() -> None:
-    whole, searched = decompose(shapes.branch(), "shape", load(), parts=1).front[0], _decompose(shapes.branch()).front[0]
+    whole, searched = decompose(shapes.branch(), "shape", load(), parts=1).front[0], _found("branch").front[0]
     assert (whole.support_area_mm2, whole.cost_mm2) == (searched.support_area_mm2, searched.cost_mm2)
     assert whole.support_area_mm2 > 0.0
 
@@ -150,7 +155,7 @@ def test_a_pedestal_makes_low_cuts_printable() -> None:
 
 
 def test_a_record_holds_the_search_and_changes_nothing() -> None:
-    profile = load(settings=["search.directions=200", "search.beam_width=2", "search.polish=false"])
+    profile = load(settings=["search.directions=100", "search.beam_width=2", "search.polish=false"])
     records: list[bytes] = []
     decomposition = decompose(shapes.tee(), "tee", profile, on_record=records.append)
     record = np.load(io.BytesIO(records[0]))
@@ -162,21 +167,20 @@ def test_a_record_holds_the_search_and_changes_nothing() -> None:
 
 
 def test_the_same_search_twice_gives_the_same_parts() -> None:
-    first, second = _decompose(shapes.branch()), _decompose(shapes.branch())
+    first, second = _found("branch"), _decompose(shapes.branch())
     for a, b in zip(first.parts, second.parts, strict=True):
         assert np.array_equal(a.mesh.vertices, b.mesh.vertices)
         assert a.pose == b.pose
 
 
 def test_a_wider_beam_is_never_worse_on_a_tee() -> None:
-    narrow, wide = (_decompose(shapes.tee(), f"search.beam_width={width}").residual_area_mm2 for width in (1, 4))
+    narrow, wide = (_found("tee", f"search.beam_width={width}").residual_area_mm2 for width in (1, 5))
     assert wide <= narrow + 1e-9
 
 
 @pytest.mark.parametrize("name", ["tee", "branch"])
 def test_each_width_of_the_ladder_is_as_good_as_the_one_before_within_what_laying_planes_symmetric_may_cost(name: str) -> None:
-    mesh = getattr(shapes, name)()
-    found = [_decompose(mesh, f"search.beam_width={width}") for width in (1, 2, 5)]
+    found = [_found(name, f"search.beam_width={width}") for width in (1, 2, 5)]
     costs = [min(row.cost_mm2 for row in decomposition.front) for decomposition in found]
     assert all(wider <= 1.01 * narrower for narrower, wider in pairwise(costs))
 
@@ -207,13 +211,13 @@ def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr("mdp.search.beam.ahead", note)
     with pytest.raises(KeyboardInterrupt):
-        decompose(shapes.branch(), "branch", load(settings=["search.beam_width=8"]), on_stage=interrupt)
+        decompose(shapes.branch(), "branch", load(settings=["search.beam_width=8", "search.directions=200"]), on_stage=interrupt)
     assert len(begun) > 2
     assert wait(begun, timeout=60).not_done == set()
 
 
 def test_space_that_a_fold_winds_around_twice_is_reported_and_no_other_difference_is_allowed() -> None:
-    decomposition = _decompose(shapes.tee())
+    decomposition = _found("tee")
     folded = shapes.tee(arm=40.004)  # as if its volume counted 0.4 mm3 twice
     assert folded_mm3(decomposition.mesh, decomposition.parts) == 0.0
     assert folded_mm3(folded, decomposition.parts) == pytest.approx(0.4)
@@ -224,7 +228,7 @@ def test_space_that_a_fold_winds_around_twice_is_reported_and_no_other_differenc
 
 
 def test_swapped_parts_are_refused() -> None:
-    decomposition = _decompose(shapes.branch())
+    decomposition = _found("branch")
     swapped = [decomposition.parts[1], decomposition.parts[0]]
     fields = vars(decomposition) | {"parts": tuple(swapped)}
     with pytest.raises(DecompositionError, match="stands at place 1"):
@@ -253,7 +257,7 @@ def test_directions_are_spread_over_the_cap() -> None:
 
 @pytest.mark.parametrize("method", ["published", "best"])
 def test_the_least_outcome_on_record_is_the_result(method: str) -> None:
-    words = (f"search.method={method}", "search.objective=risky", "search.polish=false", "search.directions=200")
+    words = (f"search.method={method}", "search.objective=risky", "search.polish=false", "search.directions=100")
     records: list[bytes] = []
     decomposition = decompose(shapes.ball(), "ball", load(settings=words), on_record=records.append)
     with np.load(io.BytesIO(records[0])) as record:
@@ -263,7 +267,7 @@ def test_the_least_outcome_on_record_is_the_result(method: str) -> None:
 
 
 def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
-    words = ("search.method=published", "search.objective=risky", "search.directions=200", "search.beam_width=3")
+    words = ("search.method=published", "search.objective=risky", "search.directions=100", "search.beam_width=3")
     records: list[bytes] = []
     decompose(shapes.tee(), "tee", load(settings=words), on_record=records.append)
     with np.load(io.BytesIO(records[0])) as record:
@@ -274,7 +278,7 @@ def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
 
 @pytest.mark.parametrize("method", ["published", "best"])
 def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    words = (f"search.method={method}", "search.objective=risky", "search.directions=200", "search.polish=false")
+    words = (f"search.method={method}", "search.objective=risky", "search.directions=100", "search.polish=false")
     usual, offer = decompose(shapes.tee(), "tee", load(settings=words)), Front.offer
     monkeypatch.setattr(Front, "offer", lambda front, node: offer(front, replace(node)))
     twin = decompose(shapes.tee(), "tee", load(settings=words))
@@ -284,7 +288,7 @@ def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best(method:
 
 def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_needs_support_tells_nothing() -> None:
     told: list[int] = []
-    decompose(shapes.tee(), "tee", load(), on_stage=lambda progress: told.append(progress.stage))
+    decompose(shapes.tee(), "tee", load(settings=["search.directions=60"]), on_stage=lambda progress: told.append(progress.stage))
     assert told[:2] == [0, 1]
     told.clear()
     decompose(shapes.box(10.0, 10.0, 10.0), "box", load(), on_stage=lambda progress: told.append(progress.stage))
@@ -307,12 +311,10 @@ def test_a_cut_through_the_bulk_of_a_model_is_made_only_on_demand() -> None:
 
 
 @pytest.mark.parametrize(("solid", "parts"), [(shapes.tee(), 2), (shapes.branch(), 2), (random_solid(3), 4)])
-@settings(max_examples=3, deadline=None)
-@given(turn_deg=st.floats(0.0, 360.0))
-def test_a_model_costs_the_same_within_2_percent_however_it_is_turned_about_z(solid: Mesh, parts: int, turn_deg: float) -> None:
-    profile, turned = load(settings=("search.directions=300",)), standing_still(solid, about(UP, np.radians(turn_deg)))
-    cost_mm2 = decompose(standing_still(solid, np.eye(3)), "", profile, parts=parts).cost_mm2
-    assert decompose(turned, "", profile, parts=parts).cost_mm2 == pytest.approx(cost_mm2, rel=0.02)
+def test_a_model_costs_the_same_within_2_percent_however_it_is_turned_about_z(solid: Mesh, parts: int) -> None:
+    profile, turns = load(settings=("search.directions=150",)), [about(UP, np.radians(deg)) for deg in (0.0, 37.0, 211.0)]
+    costs = [decompose(standing_still(solid, turn), "", profile, parts=parts).cost_mm2 for turn in turns]
+    assert costs[1:] == pytest.approx([costs[0]] * 2, rel=0.02)
 
 
 def test_where_nothing_needs_support_no_candidate_is_evaluated() -> None:
