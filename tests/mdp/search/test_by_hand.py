@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import manifold3d as m3
@@ -31,7 +32,7 @@ FREE = "search.clearance=false"
 
 
 def _profile(*settings: str, machine: str = "generic_ac") -> Profile:
-    return load(machine=machine, settings=("search.directions=200", "search.seam_mm=0.8", *settings))
+    return load(machine=machine, settings=("search.directions=100", "search.seam_mm=0.8", *settings))
 
 
 def _by_hand(*parts: tuple[Vector | None, float | None], zones: Zones | None = None) -> PlanFile:
@@ -75,8 +76,14 @@ def _two_arms() -> Mesh:
     return shapes.standing(m3.Manifold.cylinder(45, 8, 8, 48) + arms[0] + arms[1])
 
 
+@cache
+def _searched_arms() -> Decomposition:
+    """What the search finds for a post with two arms, searched once for all tests."""
+    return decompose(_two_arms(), "shape", _profile())
+
+
 def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
-    searched = decompose(_two_arms(), "shape", _profile())
+    searched = _searched_arms()
     plan = plan_of(searched)
     assert len(searched.parts) > 2
     for count in range(1, len(searched.front) + 1):
@@ -87,7 +94,7 @@ def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
 
 
 def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_row_is_cut() -> None:
-    searched = plan_of(decompose(_two_arms(), "shape", _profile()))
+    searched = plan_of(_searched_arms())
     mine = replace(searched, parts=_by_hand((UP, 35.0), (UP, 40.0)).parts)
     for front in (searched.front, tuple(row for row in searched.front if len(row.parts) < 2)):
         saved = plan_of(cut_by_plan(_two_arms(), "shape", _profile(), replace(mine, front=front), parts=2))
@@ -96,7 +103,7 @@ def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_ro
 
 
 def test_a_search_for_so_many_parts_takes_that_row_of_the_front() -> None:
-    free, two, many = (decompose(_two_arms(), "shape", _profile(), parts=parts) for parts in (None, 2, 50))
+    free, (two, many) = _searched_arms(), (decompose(_two_arms(), "shape", _profile(), parts=parts) for parts in (2, 50))
     assert len(free.parts) > len(two.parts) == 2
     assert len(many.parts) == len(many.front)
     assert many.notes == (f"--parts 50: the search found no more than {len(many.front)}",)
