@@ -1,6 +1,7 @@
 """Helpers without numba's runtime: what they must not do would free an array twice or never, and nobody would see it."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
@@ -50,7 +51,12 @@ def test_helpers_without_the_runtime_call_no_others_and_make_no_array() -> None:
 
 def _decorated(kind: str) -> list[ast.FunctionDef]:
     """All functions of the packages with a decorator."""
+    return [function for function in _functions() if kind in map(ast.unparse, function.decorator_list)]
+
+
+@cache
+def _functions() -> list[ast.FunctionDef]:
+    """All functions of the files that know the decorators."""
     paths = [path for package in ("mdp", "slicer", "machine") for path in (ROOT / package).rglob("*.py")]
-    nodes = [node for path in paths for node in ast.walk(ast.parse(path.read_text("utf-8")))]
-    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
-    return [function for function in functions if kind in map(ast.unparse, function.decorator_list)]
+    texts = [text for text in (path.read_text("utf-8") for path in paths) if "mdp.kernels.kernel" in text]
+    return [node for text in texts for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
