@@ -8,10 +8,10 @@ from tools.compare_widths import main, read
 
 
 def test_a_run_writes_one_line_a_search_and_goes_on_where_it_stopped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mesh, out = shapes.branch(), tmp_path / "out.csv"
-    np.savez(tmp_path / "branch.npz", vertices=mesh.vertices.astype(np.float32), faces=mesh.faces)
-    np.savez(tmp_path / "open.npz", vertices=mesh.vertices.astype(np.float32), faces=mesh.faces[20:])
-    words = [str(tmp_path), "--out", str(out), "--set", "search.directions=100", "--widths"]
+    mesh, out = shapes.tee(), tmp_path / "out.csv"
+    np.savez(tmp_path / "tee.npz", vertices=mesh.vertices.astype(np.float32), faces=mesh.faces)
+    np.savez(tmp_path / "open.npz", vertices=mesh.vertices.astype(np.float32), faces=mesh.faces[5:])
+    words = [str(tmp_path), "--out", str(out), "--set", "search.directions=40", "--widths"]
     main([*words, "1"])
     once = out.read_text()
     capsys.readouterr()
@@ -19,7 +19,7 @@ def test_a_run_writes_one_line_a_search_and_goes_on_where_it_stopped(tmp_path: P
     assert "2 of 4 searches failed\n- open, best, width 1: MeshError" in capsys.readouterr().out
     assert out.read_text().startswith(once)
     assert [(row.mesh, row.width, row.error[:9]) for row in read(out)] == [
-        *(("branch", 1, ""), ("open", 1, "MeshError"), ("branch", 2, ""), ("open", 2, "MeshError")),
+        *(("open", 1, "MeshError"), ("tee", 1, ""), ("open", 2, "MeshError"), ("tee", 2, "")),
     ]
 
 
