@@ -14,13 +14,13 @@ from slicer.slice import SlicingProgress, slice_parts
 from tests.shapes import box, hollow_tee
 from tests.slicer.hand import content, cut, profile, whole
 
-PLANES = (((0.0, 0.0, 1.0), 40.0), ((0.0, 0.0, 1.0), 20.0))
+PLANES = (((0.0, 0.0, 1.0), 12.0), ((0.0, 0.0, 1.0), 6.0))
 CORES = pytest.mark.parametrize("cores", [1, 3])
 
 
 @CORES
 def test_parts_side_by_side_are_the_same_bytes_as_one_after_the_other(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    parts = cut(box(10, 10, 60), *PLANES)
+    parts = cut(box(10, 10, 18), *PLANES)
     monkeypatch.setattr(threads, "THREADS", cores)
     together = slice_parts(parts, profile())
     monkeypatch.setattr(slicer.slice, "parallel_map", lambda work, count, *_, **__: map(work, range(count)))
@@ -34,17 +34,17 @@ def test_layers_side_by_side_are_the_same_bytes_as_one_after_the_other(
 ) -> None:
     model = whole(hollow_tee())
     sliced = []
-    for cores in (1, 2, 3):
+    for cores in (1, 3):
         monkeypatch.setattr(threads, "THREADS", cores)
-        sliced.append(content(slice_parts([model], profile(*keys))[0]))
-    assert sliced[0] == sliced[1] == sliced[2]
+        sliced.append(content(slice_parts([model], profile("process.layer_height_mm=0.4", *keys))[0]))
+    assert sliced[0] == sliced[1]
 
 
 @CORES
 def test_progress_rises_to_all_layers(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "THREADS", cores)
     reports: list[SlicingProgress] = []
-    sliced = slice_parts(cut(box(10, 10, 60), *PLANES), profile(), reports.append)
+    sliced = slice_parts(cut(box(10, 10, 18), *PLANES), profile(), reports.append)
     layers = [sum(progress.layers) for progress in reports]
     assert layers == sorted(layers)
     assert reports[-1].layers == tuple(len(piece.layers) for piece in sliced)
@@ -57,7 +57,7 @@ def test_progress_rises_to_all_layers(cores: int, monkeypatch: pytest.MonkeyPatc
 def test_a_part_is_handed_over_as_soon_as_it_is_sliced(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "THREADS", cores)
     reports: list[SlicingProgress] = []
-    sliced = slice_parts(cut(box(10, 10, 60), *PLANES), profile(), reports.append)
+    sliced = slice_parts(cut(box(10, 10, 18), *PLANES), profile(), reports.append)
     ready = [sum(piece is not None for piece in progress.ready) for progress in reports]
     assert ready == sorted(ready)
     assert set(ready) == {0, 1, 2, 3}
@@ -70,7 +70,7 @@ def test_the_first_part_in_order_that_gives_no_path_is_named(cores: int, monkeyp
     layers = ("top_layers", "bottom_layers", "interface_bottom_layers")
     nothing = profile("process.walls=0", "process.infill_density=0", *(f"process.{key}=0" for key in layers))
     with pytest.raises(SliceError, match="part 3 gives no path at all"):
-        slice_parts(cut(box(10, 10, 60), *PLANES), nothing)
+        slice_parts(cut(box(10, 10, 18), *PLANES), nothing)
 
 
 def test_no_parts_are_sliced_to_none() -> None:
