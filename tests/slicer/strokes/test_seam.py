@@ -128,14 +128,14 @@ def test_on_a_twisting_box_the_seam_stays_on_its_corner(rule: str) -> None:
 
 
 def test_on_a_real_model_few_layers_break_the_line() -> None:
-    sliced = slice_part(whole(shared("org_kitten", 40.0)), profile(*BARE))
+    sliced = slice_part(whole(shared("org_kitten", 30.0)), profile(*BARE))
     jumps = np.hypot(*np.diff(outer_seams(sliced), axis=0).T)
     assert (jumps > 3).mean() < 0.05
     assert np.median(jumps) < 0.25
 
 
 def test_inner_walls_begin_beside_their_outer_wall() -> None:
-    layer = slice_part(whole(branch()), profile(*BARE)).layers[20]
+    layer = slice_part(whole(branch()), profile(*BARE, "process.layer_height_mm=0.4")).layers[10]
     outer = next(p for p in layer.paths if p.kind is Kind.OUTER_WALL)
     for wall in (p for p in layer.paths if p.kind is Kind.INNER_WALL):
         assert np.hypot(*(wall.points[0] - outer.points[0])) < 2.1 * 0.45
@@ -156,9 +156,9 @@ def distance_mm(seam: Floats, z: float, segments: Floats) -> float:
 
 
 def test_no_seam_lies_on_the_edge_where_a_later_part_begins() -> None:
-    mesh = standing(m3.Manifold.cylinder(40, 8, 8, 96))
-    base, top = cut(mesh, ((0, np.sin(0.7), np.cos(0.7)), 20.0))
-    edge = rim(8.0, 0.7, 20.0)
+    mesh = standing(m3.Manifold.cylinder(20, 5, 5, 96))
+    base, top = cut(mesh, ((0, np.sin(0.7), np.cos(0.7)), 7.0))
+    edge = rim(5.0, 0.7, 7.0)
     for rule in ("aligned", "rear", "corner", "nearest", "random"):
         sliced = slice_part(base, profile(*BARE, f"process.seam={rule}", "process.interface_seam_mm=1.5"), later=[top])
         starts = [(points[0], lay.z_mm - 0.5 * lay.height_mm) for lay in sliced.layers for points in outer(lay)]
