@@ -1,6 +1,7 @@
 """What a person marks on a part, in its layers: where none begins, and where no support is printed."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import manifold3d as m3
@@ -22,7 +23,7 @@ from tests.slicer.hand import BARE, cut, of_kind, profile, sections_at, volume_m
 
 BACK = Grown((0.0, 10.0, 5.0), 1.0)
 BACK_BOX = Zone((-20.0, 8.0, -1.0), (20.0, 12.0, 30.0))
-SUPPORTED = profile("process.skirt_loops=0", "process.support=auto")
+SUPPORTED = profile("process.skirt_loops=0", "process.support=auto", "process.layer_height_mm=0.3")
 LEANING = ((0.8, 0.36, 0.48), (-0.6, 0.48, 0.64), (0.0, -0.8, 0.6))  # rows of a rotation
 RIGHT_ARM = Zone((4.5, -10.0, -1.0), (25.0, 10.0, 35.0))
 RIGHT_MESH = MeshVolume(Path("arm.stl"), box(20.5, 20.0, 36.0).transform(np.eye(3), (14.75, 0.0, -1.0)))
@@ -87,19 +88,28 @@ def test_a_wall_on_which_no_seam_is_wanted_anywhere_begins_inside() -> None:
     assert np.abs(begins(without)).max(axis=1).max() < 9.6
 
 
+@cache
+def supported_tee() -> SlicedPart:
+    """The tee with support under both arms, sliced once for all tests."""
+    return slice_parts([whole(tee())], SUPPORTED)[0]
+
+
 @pytest.mark.parametrize("zone", [RIGHT_ARM, RIGHT_MESH, Grown((12.0, 0.0, 30.0), 1.0)])
 def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zone: AnyZone) -> None:
-    part = whole(tee())
-    (free,) = slice_parts([part], SUPPORTED)
+    part, free = whole(tee()), supported_tee()
     (without,) = slice_parts([replace(part, no_support=Marked.of(part.mesh, [zone]))], SUPPORTED)
     assert support_x_mm(free).max() > 15.0
     assert support_x_mm(without).max() < 6.0
     assert support_x_mm(without).min() == pytest.approx(support_x_mm(free).min(), abs=0.5)
     ((mm2, why),) = [(missed.mm2, missed.reason) for missed in without.unsupported]
     assert (why, mm2) == ("no support is wanted there", pytest.approx(150.0, rel=0.05))
+    assert volume_mm3(without, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
+
+
+def test_what_is_supported_nowhere_is_estimated_without_support() -> None:
+    part = whole(tee())
     counted = [estimate(variant, SUPPORTED).support_mm3 for variant in (part, bare(part))]
     assert (counted[0] > 0, counted[1]) == (True, 0)
-    assert volume_mm3(without, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
 
 
 def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> None:
@@ -137,7 +147,7 @@ def test_a_slope_that_carries_itself_is_supported_where_a_person_wants_it(zone: 
 
 
 def test_enforced_holds_up_nothing_else_and_a_place_without_support_comes_first() -> None:
-    enforced = profile("process.skirt_loops=0", "process.support=enforced")
+    enforced = profile("process.skirt_loops=0", "process.support=enforced", "process.layer_height_mm=0.3")
     assert not of_kind(slice_part(whole(tee()), enforced), Kind.SUPPORT)
     right = replace(whole(tee()), support=Marked((RIGHT_ARM,)))
     assert support_x_mm(slice_part(right, enforced)).min() > 0.0
