@@ -24,7 +24,7 @@ from slicer.slice import slice_part
 from tests.machine.moves import moves_of, program_of
 
 LEANING = np.array([0.0, np.sin(np.radians(25.0)), np.cos(np.radians(25.0))])
-LIGHT = ["process.walls=1", "process.infill_density=0.05"]  # a third of the lines
+LIGHT = ["process.walls=1", "process.infill_density=0.05", "process.layer_height_mm=0.4"]  # a sixth of the lines
 
 
 def _tilting(name: str) -> bool:
