@@ -27,8 +27,8 @@ def _profile(faces: int, *settings: str) -> Profile:
     return load(settings=("search.directions=100", f"search.simplify_faces={faces}", *settings))
 
 
-def _fine(bumps_mm: float = 0.02) -> Mesh:
-    """A post with a leaning arm, its surface wavy, of some 30,000 faces."""
+def _fine(bumps_mm: float = 0.02, edges_mm: float = 0.7) -> Mesh:
+    """A post with a leaning arm, its surface wavy, of some 30,000 faces; edges_mm: how long edges may be before they are bent."""
 
     def wavy(points: Floats) -> Floats:
         waves: Floats = bumps_mm * np.sin(2.0 * points[:, [1, 2, 0]])
@@ -36,7 +36,7 @@ def _fine(bumps_mm: float = 0.02) -> Mesh:
 
     arm = m3.Manifold.cylinder(35, 5, 5, 48).rotate((0, 60, 0)).translate((0, 0, 25))
     solid = m3.Manifold.cylinder(40, 8, 8, 48) + arm
-    return shapes.standing(solid.refine_to_length(0.7).warp_batch(wavy).trim_by_plane((0.0, 0.0, 1.0), 0.1))
+    return shapes.standing(solid.refine_to_length(edges_mm).warp_batch(wavy).trim_by_plane((0.0, 0.0, 1.0), 0.1))
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +86,8 @@ def test_a_copy_that_spares_few_faces_is_not_used() -> None:
 
 
 def test_the_model_itself_is_cut_for_about_the_cost_that_its_own_search_finds() -> None:
-    fine = _fine(0.01)  # the slopes of higher bumps count as stairs, which the copy has none of
-    copied, itself = (decompose(fine, "shape", _profile(faces)) for faces in (10000, 0))
+    fine = _fine(0.005, 1.5)  # the slopes of higher bumps count as stairs, which the copy has none of
+    copied, itself = (decompose(fine, "shape", _profile(faces)) for faces in (3000, 0))
     assert len(copied.parts) == len(itself.parts) == 2
     assert copied.mesh is fine
     assert sum(part.volume_mm3 for part in copied.parts) == pytest.approx(fine.volume_mm3, rel=1e-9)
@@ -125,7 +125,7 @@ def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itse
 
 def test_a_search_that_is_recorded_is_one_of_the_model_itself(fine: Mesh) -> None:
     records = list[bytes]()
-    decompose(fine, "shape", _profile(2000), on_record=records.append)
+    decompose(fine, "shape", _profile(2000, "search.directions=10", "search.beam_width=1"), on_record=records.append)
     assert len(records) == 1
 
 
