@@ -25,13 +25,15 @@ from tests.machine.calibration.person import Person
 from tests.machine.calibration.touches import really
 
 GENERIC = load().machine
+COARSE = ["--set", "process.layer_height_mm=0.4", "--set", "search.directions=20"]
 READINGS = "2,-1,1.25 0,0.5,- 1,0,1.2 -1,0,1.15"
 
 
 @pytest.fixture(scope="module")
 def gcode(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("piece") / "piece.gcode"
-    assert main(["export", "demo:calibration", "--process", "draft", "-o", str(out)]) == 0
+    light = ["--set", "process.walls=1", "--set", "process.infill_density=0.05", "--set", "search.directions=20"]
+    assert main(["export", "demo:calibration", "--process", "draft", *light, "-o", str(out)]) == 0
     return out
 
 
@@ -165,7 +167,7 @@ def test_nobody_types_readings_that_could_not_be_saved(gcode: Path, mine: Path, 
 
 
 def test_one_part_that_is_asked_for_is_printed_without_the_demos_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["decompose", "demo:calibration", "--parts", "1", "--set", "search.directions=20", "--json", "-"]) == 0
+    assert main(["decompose", "demo:calibration", "--parts", "1", "--as-is", *COARSE, "--json", "-"]) == 0
     assert len(json.loads(capsys.readouterr().out)["parts"]) == 1
 
 
