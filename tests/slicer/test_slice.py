@@ -1,6 +1,7 @@
 """Whole parts: plastic, places, frames, speeds, flow, determinism, errors."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import manifold3d as m3
@@ -65,7 +66,7 @@ def test_any_solid_block_extrudes_its_volume(x: float, y: float, z: float, turn:
 
 @pytest.mark.parametrize("name", ["org_kitten", "org_deer", "mec_bracket"])
 def test_a_solid_real_model_extrudes_its_volume(name: str) -> None:
-    mesh = shared(name, 30.0)
+    mesh = shared(name, 20.0)
     assert slice_part(whole(mesh), profile(*SOLID)).volume_mm3 == pytest.approx(mesh.volume_mm3, rel=0.02)
 
 
@@ -164,13 +165,18 @@ def test_any_number_of_walls_fills_the_part(walls: int) -> None:
     assert slice_part(whole(mesh), profile(*SOLID, f"process.walls={walls}")).volume_mm3 == pytest.approx(800, rel=0.02)
 
 
+@cache
+def coarse_branch() -> SlicedPart:
+    """The branch with its support, in thick layers, sliced once for all tests."""
+    return slice_part(whole(branch()), profile("process.layer_height_mm=0.4"))
+
+
 def test_the_same_part_gives_the_same_bytes() -> None:
-    first, second = (content(slice_part(whole(branch()), profile())) for _ in range(2))
-    assert first == second
+    assert content(slice_part(whole(branch()), profile("process.layer_height_mm=0.4"))) == content(coarse_branch())
 
 
 def test_every_path_has_length_and_width_and_speed() -> None:
-    for path in of_kind(slice_part(whole(branch()), profile()), *OWN):
+    for path in of_kind(coarse_branch(), *OWN):
         assert path.length_mm > 0.04
         assert 0.09 < path.width_mm < 0.91  # the least gap is 0.12 of a line, and its bead 0.04 mm wider
         assert 0 < path.speed_mm_s <= 80
@@ -191,9 +197,9 @@ def test_settings_that_leave_nothing_to_print_are_named() -> None:
 
 def test_a_plate_with_a_thousand_holes_is_sliced() -> None:
     pins = [m3.Manifold.cylinder(2, 0.8, 0.8, 12).translate((3 * i, 3 * j, -0.5)) for i in range(32) for j in range(32)]
-    plate = m3.Manifold.cube((100, 100, 0.4)).translate((-4, -4, 0)) - m3.Manifold.batch_boolean(pins, m3.OpType.Add)
+    plate = m3.Manifold.cube((100, 100, 0.2)).translate((-4, -4, 0)) - m3.Manifold.batch_boolean(pins, m3.OpType.Add)
     sliced = slice_part(whole(standing(plate)), profile(*BARE))
-    walls_ = [p for p in sliced.layers[1].paths if p.kind is Kind.OUTER_WALL]
+    walls_ = [p for p in sliced.layers[0].paths if p.kind is Kind.OUTER_WALL]
     assert len(walls_) == 1025
 
 
@@ -215,8 +221,7 @@ def test_islands_below_one_line_are_printed_beside_larger_ones() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("file", "scale"), [
-    ("hook.stl", 1.0), ("fan_support.stl", 0.7), ("bracket.3mf", 0.7), ("dancinggirl.stl", 0.7), ("pencildome.stl", 0.6),
-    ("deer.ply", 0.7)])  # fmt: skip
+    ("hook.stl", 0.5), ("fan_support.stl", 0.5), ("dancinggirl.stl", 0.4), ("pencildome.stl", 0.3)])  # fmt: skip
 def test_every_solid_model_extrudes_its_volume(file: str, scale: float) -> None:
     path = Path(__file__).resolve().parents[3] / "shared" / "models" / file
     if not path.exists():
