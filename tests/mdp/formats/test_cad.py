@@ -51,7 +51,7 @@ def area(base: list[Corner]) -> float:
 
 ELL: list[Corner] = [(-9, -9), (9, -9), (9, -3), (-3, -3), (-3, 9), (-9, 9)]
 CHANNEL: list[Corner] = [(-9, -9), (9, -9), (9, 9), (5, 9), (5, -5), (-5, -5), (-5, 9), (-9, 9)]
-BASES = [*(ring(count, 10.0) for count in range(3, 9)), *(ring(2 * count, 10.0, 5.0) for count in (3, 4, 6)), ELL, CHANNEL]
+BASES = [ring(3, 10.0), ring(8, 10.0), ring(8, 10.0, 5.0), ELL, CHANNEL]
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -61,7 +61,7 @@ def test_a_prism_has_its_volume(tmp_path: Path, base: list[Corner]) -> None:
     assert mesh.volume_mm3 == pytest.approx(12.0 * area(base), rel=1e-6)
 
 
-@pytest.mark.parametrize("base", BASES[:6])
+@pytest.mark.parametrize("base", BASES[:2])
 def test_a_frustum_has_its_volume(tmp_path: Path, base: list[Corner]) -> None:
     pytest.importorskip("cascadio")
     mesh, _ = read_mesh(save(tmp_path / "frustum.stp", step_prism(base, 12.0, top=0.5).encode()))
@@ -87,7 +87,7 @@ def test_the_colour_of_a_whole_solid_marks_nothing(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("radius", [1.0, 10.0, 60.0])
+@pytest.mark.parametrize("radius", [1.0, 60.0])
 def test_a_cylinder_has_its_volume_but_for_its_corners(tmp_path: Path, radius: float) -> None:
     pytest.importorskip("cascadio")
     mesh, _ = read_mesh(save(tmp_path / "cylinder.step", step_cylinder(radius, 20.0).encode()))
@@ -95,8 +95,7 @@ def test_a_cylinder_has_its_volume_but_for_its_corners(tmp_path: Path, radius: f
     assert (1.0 - 0.17**2 / 6.0) * whole_mm3 < mesh.volume_mm3 < whole_mm3
 
 
-@pytest.mark.parametrize("scale", [1.0, 2.0])
-@pytest.mark.parametrize(("unit", "unit_mm"), [("MM", 1.0), ("IN", 25.4)])
+@pytest.mark.parametrize(("unit", "unit_mm", "scale"), [("MM", 1.0, 2.0), ("IN", 25.4, 1.0)])
 def test_the_faces_of_an_iges_solid_are_sewn_and_read_in_mm(tmp_path: Path, unit: str, unit_mm: float, scale: float) -> None:
     pytest.importorskip("cascadio")
     file = save(tmp_path / "cylinder.igs", iges_cylinder(10.0 / unit_mm, 20.0 / unit_mm, unit).encode())
@@ -116,7 +115,7 @@ def test_an_assembly_is_told_by_the_names_of_its_parts_and_so_is_one_that_is_ope
         repair([*boxes, replace(open_one, name="lid")])
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 0.95])
+@pytest.mark.parametrize("share", [0.2, 0.95])
 def test_a_step_file_that_was_cut_off_is_refused(tmp_path: Path, share: float) -> None:
     pytest.importorskip("cascadio")
     whole = step_cylinder(10.0, 20.0).encode()
