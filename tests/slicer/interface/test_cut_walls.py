@@ -10,7 +10,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from slicer.geometry.polygons import Polygons, contours, offset, strips
 from slicer.overhangs import find_overhangs
-from slicer.paths import Kind
+from slicer.paths import Kind, SlicedPart
 from slicer.sectioning import Sections, section_part
 from slicer.shells import Shells, build_shells, interface_mm3
 from slicer.slice import slice_part
@@ -61,7 +61,13 @@ def in_model(part: Part, points: Floats, z_mm: float) -> Floats:
     return placed
 
 
-CASES = [(shape, normal) for shape in ("cube", "cylinder") for normal in (STRAIGHT, TILTED, STEEP)]
+CASES = [("cube", STRAIGHT), ("cube", STEEP), ("cylinder", TILTED)]
+
+
+@cache
+def sliced_parts(shape: str, normal: tuple[float, ...]) -> list[SlicedPart]:
+    both, settings = parts(shape, normal), profile(*PLAIN)
+    return [slice_part(part, settings, both[:k], both[k + 1 :]) for k, part in enumerate(both)]
 
 
 @pytest.mark.parametrize(("shape", "normal"), CASES)
@@ -77,10 +83,7 @@ def test_no_infill_is_sparse_within_the_shell_s_thickness_of_the_surface(shape: 
 
 @pytest.mark.parametrize(("shape", "normal"), CASES)
 def test_all_of_a_layer_is_covered_by_beads_but_for_the_infill(shape: str, normal: tuple[float, ...]) -> None:
-    settings = profile(*PLAIN)
-    both = parts(shape, normal)
-    for k, layers in enumerate(shells(shape, normal)):
-        sliced = slice_part(both[k], settings, both[:k], both[k + 1 :])
+    for sliced, layers in zip(sliced_parts(shape, normal), shells(shape, normal), strict=True):
         for at in range(1, len(sliced.layers) - 1, 6):
             lines = [path for path in sliced.layers[at].paths if path.kind is not Kind.INFILL]
             covered = Polygons()
@@ -111,7 +114,7 @@ def test_a_later_part_s_first_layer_lies_on_solid_plastic(shape: str, normal: tu
 def test_inner_walls_end_on_the_one_along_the_face_of_a_cut() -> None:
     settings = profile(*PLAIN)
     lower, upper = parts("cube", STEEP)
-    layer = slice_part(lower, settings, (), [upper]).layers[70]
+    layer = sliced_parts("cube", STEEP)[0].layers[70]
     walls = [path for path in layer.paths if path.kind in (Kind.OUTER_WALL, Kind.INNER_WALL)]
     assert [path.kind for path in walls].count(Kind.OUTER_WALL) == 1
     inner = [path for path in walls if path.kind is Kind.INNER_WALL]
