@@ -19,10 +19,13 @@ from tests.slicer.hand import whole
 SETTINGS = [
     *((f"process.infill_pattern={pattern}",) for pattern in ("grid", "rectilinear", "triangles", "cubic", "gyroid", "honeycomb")),
     ("process.infill_pattern=lightning",),
-    *((f"process.infill_density={density}",) for density in (0.0, 0.05, 0.1, 0.45, 0.6, 1.0)),
+    *((f"process.infill_density={density}",) for density in (0.0, 0.05, 0.45, 1.0)),
     ("process.walls=1",), ("process.walls=0",), ("process.layer_height_mm=0.3",), ("process.top_layers=1",),
-    ("process.layer_height_mm=0.15",),
 ]  # fmt: skip
+
+
+# a grid, lightning, and the thinnest and the densest infill
+TELLING = [SETTINGS[0], SETTINGS[6], SETTINGS[8], SETTINGS[10]]
 
 
 @cache
@@ -46,7 +49,7 @@ def test_a_sound_print_has_no_finding_whatever_it_spans(settings: tuple[str, ...
     assert not {"air", "gap"} & {f.code for f in run.findings}
 
 
-@pytest.mark.parametrize("settings", SETTINGS[::3], ids=lambda settings: settings[0])
+@pytest.mark.parametrize("settings", TELLING, ids=lambda settings: settings[0])
 @pytest.mark.parametrize("layer", range(3, 24, 4))
 def test_a_layer_without_its_beads_is_found_at_the_next_one(settings: tuple[str, ...], layer: int) -> None:
     profile, lines = stepped(settings)
@@ -55,7 +58,7 @@ def test_a_layer_without_its_beads_is_found_at_the_next_one(settings: tuple[str,
     assert (layer + 1) in {f.layer for f in dry_run(edited, profile).errors if f.code == "gap"}
 
 
-@pytest.mark.parametrize("layer", [20, 30, 40])
+@pytest.mark.parametrize("layer", [20, 40])
 @pytest.mark.parametrize("rise_mm", [0.1, -0.1])
 def test_a_layer_at_the_wrong_height_is_found_though_support_is_laid_before_the_part(layer: int, rise_mm: float) -> None:
     profile, lines = stepped(("process.support_least_mm2=2",))
