@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 from machine.app.cli import main
-from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.requests import ModelRequest
+from machine.app.pipeline.pipeline import build
 from machine.kinematics.table import workpiece_path
 from machine.view.contents import of_parts
 from machine.view.page import page, print_page
+from mdp.model_file import locate
+from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.read import read_mesh
 from mdp.save import stl
+from mdp.search.by_plan import cut_by_plan
 from profiles.profile import load
 from tests.machine import hand
 from tests.machine.pages import opened
@@ -210,15 +213,13 @@ def test_another_machine_is_held_against_its_own_shipped_values() -> None:
     assert [row[0] for row in settings_tables(profile)[0]["rows"]] == ["machine.clearance_mm"]
 
 
-KITTEN = Path(__file__).parents[3].parent / "shared" / "models" / "kitten.off"
-
-
 @pytest.mark.slow
 def test_a_page_takes_a_third_of_what_it_may_and_holds_the_path_to_a_hundredth() -> None:
-    profile = load(settings=["process.scale=0.45", "search.beam_width=1", "search.directions=60"])
-    model = str(KITTEN) if KITTEN.exists() else "demo:figure"
-    program = build(decompose_model(ModelRequest(model, profile), to_build=True).decomposition, profile)
-    content = print_page(model, program, profile)
+    profile = load(settings=["search.fragile_mm=0", "search.nozzle_load_n=0"])
+    by_hand = PlanFile("plan.toml", parts=(PlannedPart((0.6, 0.0, 0.8), 21.2),))
+    figure = read_mesh(locate("demo:figure"), 0.45)[0]
+    program = build(cut_by_plan(figure, "demo:figure", profile, by_hand), profile)
+    content = print_page("demo:figure", program, profile)
     header, arrays = opened(content)
     moves = len(program.run.program.line)
     assert len(content) < 8e6 / 3 * moves / 300_000 + 0.3e6
