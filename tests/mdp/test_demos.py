@@ -74,7 +74,9 @@ def test_the_risky_faces_of_a_demo_lie_high_above_the_platform(name: str) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "reduction"), [("bracket", 0.75), ("figure", 0.9), ("lattice", 0.5), ("tree", 0.8)])
 def test_several_directions_make_most_of_a_demo_safe(name: str, reduction: float) -> None:
-    decomposition = decompose(demo(name), name, load(settings=["search.seam_mm=0.8"]))
+    decomposition = decompose(
+        demo(name), name, load(settings=["search.seam_mm=0.8", "search.directions=100", "search.beam_width=1"])
+    )
     assert len(decomposition.parts) >= 3
     assert decomposition.reduction > reduction
 
