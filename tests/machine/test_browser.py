@@ -15,7 +15,8 @@ from machine.dryrun.dryrun import dry_run
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
 from machine.program import Program
-from machine.view.page import parts_page, print_page
+from machine.view.bundle import bundle
+from machine.view.page import TEMPLATE, parts_page, print_page
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from profiles.profile import load
@@ -307,12 +308,18 @@ def test_findings_that_lie_together_share_a_marker_that_goes_through_them(browse
         assert message in page.value("document.querySelector('#findings .chosen').textContent")
 
 
-def test_a_long_print_is_drawn_coarsely_at_once_and_then_every_move(browser: Browser, tmp_path: Path) -> None:
+def test_a_long_print_is_drawn_coarsely_at_once_and_then_every_move(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     profile, lines = load(), [*FOREIGN.splitlines()]
-    for k in range(110_000):
+    for k in range(6000):
         lines.append(f"G1 X{k % 40} Y{k // 1000 % 30 + k % 2} E{10 + k * 0.01:.2f} F1200")
     long = Program(tuple(lines), dry_run(lines, profile), None)
-    page = opened(browser, tmp_path, print_page("long.gcode", long, profile, known=False))
+    script = bundle(TEMPLATE / "main.js")
+    assert script.count("AT_FIRST = 100000;") == 1  # rows from which on a print is long
+    monkeypatch.setattr("machine.view.page.bundle", lambda _: script.replace("AT_FIRST = 100000;", "AT_FIRST = 5000;"))
+    content = print_page("long.gcode", long, profile, known=False)
+    page = opened(browser, tmp_path, content)
     browser.wait("document.documentElement.dataset.picture === 'idle'")
     first, whole = (int(page.value(f"document.documentElement.dataset.{name}Ms")) for name in ("first", "whole"))
     assert 0 < first < whole
