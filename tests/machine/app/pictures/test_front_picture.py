@@ -7,15 +7,19 @@ import numpy as np
 from machine.app.pictures.front_picture import BORDER, front_picture
 from machine.view.parts import part_colours
 from mdp.decomposition import FrontRow
-from tests.machine.app.pictures.test_picture import PROFILE, example, share_like
+from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.search.by_plan import cut_by_plan
+from tests.machine.app.pictures.test_picture import PROFILE, share_like
+from tests.shapes import branch
 
 PIXELS, TITLE = 240, 20
+ARM = PlannedPart((1.0, 0.0, 0.0), 10.0)
 
 
 def test_every_row_has_a_frame_with_its_parts_in_colour_and_the_one_taken_a_border() -> None:
-    cut = example().front[-1]
-    rows = (FrontRow((), 100.0, 0.0, 100.0), replace(cut, chosen=True))
-    sheet = front_picture(replace(example(), front=rows), PROFILE, PIXELS)
+    tree = cut_by_plan(branch(70.0), "branch", PROFILE, PlanFile("", parts=(ARM,)))
+    rows = (FrontRow((), 100.0, 0.0, 100.0), replace(tree.front[-1], chosen=True))
+    sheet = front_picture(replace(tree, front=rows), PROFILE, PIXELS)
     assert sheet.shape == (PIXELS + TITLE, 2 * PIXELS, 3)
     whole, parts = sheet[TITLE:, :PIXELS], sheet[TITLE:, PIXELS:]
     second = part_colours(2)[1]

@@ -1,13 +1,17 @@
 """Progress of long work: lines in a log, one live line on a terminal."""
 
 import threading
+from pathlib import Path
 
 import pytest
 
 from machine.app.terminal import progress
 from machine.app.terminal.progress import PLAIN_AGAIN_S, PLAIN_EVERY_S, PlainLines
 from mdp.kernels import threads
+from mdp.save import stl
 from tests.machine.person import Person
+from tests.machine.workbench import QUICK
+from tests.shapes import tee
 
 
 def test_a_log_hears_of_what_changes_every_five_seconds_and_of_what_does_not_once_a_minute(
@@ -22,8 +26,9 @@ def test_a_log_hears_of_what_changes_every_five_seconds_and_of_what_does_not_onc
     assert capsys.readouterr().err == "a\nb\nb\n"
 
 
-def test_on_a_terminal_the_work_under_way_is_one_live_line_that_goes_away() -> None:
-    with Person("decompose", "demo:bracket", "--set", "search.directions=60") as person:
+def test_on_a_terminal_the_work_under_way_is_one_live_line_that_goes_away(tmp_path: Path) -> None:
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+    with Person("decompose", str(tmp_path / "tee.stl"), *QUICK, "--set=search.directions=200", "--as-is") as person:
         person.see("searching parts: stage")
         person.see("part  tilt deg")
         assert person.end() == 0
