@@ -29,8 +29,8 @@ def program_of(strokes: int) -> list[str]:
     return [*START, ";PART:1 of 2", "G0 X10 Y10 Z60 F6000", *laid, *turned, *laid]
 
 
-PROGRAM = program_of(120)
-IN_PART_2 = len(PROGRAM) - 60
+PROGRAM = program_of(80)
+IN_PART_2 = len(PROGRAM) - 40
 LOST = "this print can no longer be resumed: journal "
 PROMISED = "goes on with it"
 
