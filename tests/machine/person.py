@@ -16,6 +16,15 @@ from typing import Self
 ROOT = Path(__file__).parents[2]
 ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 PATIENCE_S = 60.0
+# Instead of `-m machine.app.cli`: the same, but a line of progress comes, and a server is asked, every tenth of a second.
+HASTY = """
+import sys
+from machine.app.cli import main
+from machine.app.terminal import progress
+from machine.network import follow
+progress.PLAIN_EVERY_S = follow.POLL_S = 0.1
+sys.exit(main(sys.argv[1:]))
+"""
 
 
 class Person:

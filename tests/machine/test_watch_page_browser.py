@@ -20,11 +20,11 @@ LIVE = "$('live').textContent"
 
 @contextmanager
 def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
-    """`print --watch` of minutes on the simulated printer, and the address that it tells."""
+    """`print --watch` of hours on the simulated printer, which at its speed nobody sees end, and the address that it tells."""
     file = folder / "long.gcode"
-    moves = "".join(f"G1 X{10 + 30 * (k % 2)} E{k + 1} F600\n" for k in range(2000))
-    file.write_text(BEGIN + moves + END)
-    options = ["--port", "sim", "--sim-speed", "20", "--watch", "--no-browser", "--force"]
+    strokes = "".join(f"G1 X40 E{k + 1} F120\nG0 X10 F6000\n" for k in range(4000))  # a pause waits for a stroke's end
+    file.write_text(BEGIN + strokes + END)
+    options = ["--port", "sim", "--sim-speed", "200", "--watch", "--no-browser", "--force"]
     command = [sys.executable, "-m", "machine.app.cli", "print", str(file), *options]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     try:
@@ -36,8 +36,8 @@ def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
         process.wait(PATIENCE_S)
 
 
-def test_a_print_is_paused_resumed_and_stopped_by_buttons(tmp_path: Path) -> None:
-    with Browser() as browser, printing(tmp_path) as (process, address):
+def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_path: Path) -> None:
+    with printing(tmp_path) as (process, address):
         browser.open(address)
         browser.value("{ window.$ = (id) => document.getElementById(id); }")
         browser.wait(f"{LIVE}.startsWith('printing') && !$('orders').hidden")
@@ -54,8 +54,8 @@ def test_a_print_is_paused_resumed_and_stopped_by_buttons(tmp_path: Path) -> Non
         assert browser.complaints == []
 
 
-def test_an_emergency_stop_is_asked_once_and_the_print_ends(tmp_path: Path) -> None:
-    with Browser() as browser, printing(tmp_path) as (process, address):
+def test_an_emergency_stop_is_asked_once_and_the_print_ends(browser: Browser, tmp_path: Path) -> None:
+    with printing(tmp_path) as (process, address):
         browser.open(address)
         browser.wait("document.getElementById('live').textContent.startsWith('printing')")
         browser.click("#emergency")

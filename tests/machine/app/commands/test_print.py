@@ -13,7 +13,7 @@ from machine.app.cli import main
 from machine.app.terminal.keys import SURE
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.profile import load
-from tests.machine.person import ROOT, Person
+from tests.machine.person import HASTY, ROOT, Person
 
 MACHINE = load().machine
 HEAT = ["G21", "G90", "M83", "G28", "G92 A0 C0", "M140 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
@@ -22,7 +22,7 @@ OFF = ["M104 S0", "M140 S0"]
 
 @pytest.fixture
 def hours(tmp_path: Path) -> str:
-    """A file of ten hours of careful strokes, each in a place of its own: nobody sees its end, and none waits long for a stroke."""
+    """A file of ten hours of careful strokes, each in a place of its own: at 240 times real time nobody sees its end."""
     places = [(25 * (k // 250), 0.4 * (k % 250)) for k in range(2000)]
     strokes = [f"G0 X{x} Y{y:.1f}\nG1 X{x + 20} E1.0 F60" for x, y in places]
     file = tmp_path / "hours.gcode"
@@ -116,7 +116,7 @@ def test_a_dumb_terminal_gets_plain_lines_and_no_keys(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_without_a_terminal_plain_lines_tell_the_progress(hours: str) -> None:
-    command = [sys.executable, "-m", "machine.app.cli", *print_of(hours)]
+    command = [sys.executable, "-c", HASTY, *print_of(hours)]
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT)
     assert process.stderr is not None
     line = next(line for line in process.stderr if line.startswith(b"printing:") and b"nozzle" in line)
