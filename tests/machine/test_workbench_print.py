@@ -23,6 +23,11 @@ from tests.machine.prints import commands_sent, kinds_of_fields, prints_line
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import box
 
+# The process of a print asks its server often.
+HASTY = """
+from machine.app.workbench.printing import running_print
+running_print.MAIN = f"from machine.network import follow; follow.POLL_S = 0.1; {running_print.MAIN}"
+"""
 PRINTING, VIEW = "document.documentElement.dataset.printing", "$('print-page').contentDocument"
 
 
@@ -44,7 +49,7 @@ def key() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def sliced(folder: Path, key: None) -> Iterator[Running]:
     """A workbench on which a little box is sliced in one piece."""
-    with workbench(*QUICK) as running:
+    with workbench(*QUICK, before=HASTY) as running:
         with running.line() as page, prints_line(running, "first") as printing:
             printing.do("check", port="sim")
             assert printing.refused() == "there is no model on the workbench yet: choose a file first"
@@ -95,11 +100,11 @@ def listen_to_nothing(running: Running) -> socket.socket:
     return own
 
 
-def test_fifty_pages_that_read_nothing_leave_the_print_what_the_command_line_sends(sliced: Running, folder: Path) -> None:
+def test_pages_that_read_nothing_leave_the_print_what_the_command_line_sends(sliced: Running, folder: Path) -> None:
     by_hand = ("print", str(folder / "box.stl"), *QUICK, "--parts", "1", "--port", "sim", "--log", str(folder / "own.log"))
     assert main(by_hand) == 0
     with ExitStack() as stack, prints_line(sliced, "first") as page:
-        for _ in range(50):
+        for _ in range(8):
             stack.enter_context(listen_to_nothing(sliced))
         page.do("check", port="sim")
         page.until(lambda seen: seen["phase"] == "ready")

@@ -113,17 +113,18 @@ def open_workbench(*arguments: str) -> Iterator[OpenToNetwork]:
 
 
 @contextmanager
-def workbench(*arguments: str) -> Iterator[Running]:
-    """`tiltprint edit` with these arguments, ended by Ctrl-C."""
-    with _running(arguments, subprocess.DEVNULL) as process:
+def workbench(*arguments: str, before: str = "") -> Iterator[Running]:
+    """`tiltprint edit` with these arguments, ended by Ctrl-C. before: Python code that its process runs first."""
+    with _running(arguments, subprocess.DEVNULL, before) as process:
         assert process.stdout is not None
         yield Running(process, process.stdout.readline().strip())
 
 
 @contextmanager
-def _running(arguments: Iterable[str], errors: int | IO[str]) -> Iterator["subprocess.Popen[str]"]:
+def _running(arguments: Iterable[str], errors: int | IO[str], before: str = "") -> Iterator["subprocess.Popen[str]"]:
     (state_folder() / FILE).unlink(missing_ok=True)  # which printer another test has used is not this one's
-    command = [sys.executable, "-m", "machine.app.cli", "edit", "--no-browser", *arguments]
+    program = ["-c", f"{before}\nimport sys\nfrom machine.app.cli import main\nsys.exit(main(sys.argv[1:]))"]
+    command = [sys.executable, *(program if before else ["-m", "machine.app.cli"]), "edit", "--no-browser", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
     try:
         yield process
