@@ -131,7 +131,7 @@ def whole() -> np.ndarray:
     return moved(printer)
 
 
-@pytest.mark.parametrize("writings", [50, 77, 90, 120, 180, 200, 233])
+@pytest.mark.parametrize("writings", [50, 90, 120, 233])
 def test_after_the_host_has_died_the_rest_follows_without_gap_or_overlap(
     text: GcodeFile, whole: np.ndarray, writings: int
 ) -> None:
@@ -219,7 +219,7 @@ def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whol
 
 @pytest.mark.parametrize("advanced", [True, False])
 def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: GcodeFile, advanced: bool) -> None:
-    for line in range(20, len(PROGRAM), 31):
+    for line in range(20, len(PROGRAM), 47):
         fault = FaultScript((Fault("reset", at=line, unit="line"),))
         printer = VirtualPrinter(PROFILE.machine, None if advanced else BuildOptions(advanced_ok=False), fault)
         with journal_of(text, f"at {line}") as journal, pytest.raises(FirmwareError):
@@ -300,7 +300,7 @@ def test_a_height_in_doubt_is_not_guessed(text: GcodeFile, tmp_path: Path, capsy
     assert "a person must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in errors
 
 
-@pytest.mark.parametrize(("said", "called"), [("1", "Z62 "), ("2", "Z62.2 "), ("n", "")])
+@pytest.mark.parametrize(("said", "called"), [("2", "Z62.2 "), ("n", "")])
 def test_the_height_that_a_person_sees_is_what_the_axis_is_called(
     text: GcodeFile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, called: str
 ) -> None:

@@ -146,7 +146,7 @@ def test_whoever_dies_the_heaters_go_off(
     end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(running_print, "EMERGENCY_S", 0.2)
-    with SimulatedPrinter(PROFILE.machine, speed=20.0) as printer:
+    with SimulatedPrinter(PROFILE.machine, speed=100.0) as printer:
         state = print_until(printer.path, heats, end)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
     assert re.fullmatch(expected, state["sentence"])
