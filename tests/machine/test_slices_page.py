@@ -147,7 +147,7 @@ def slice_it(browser: Browser) -> None:
 
 
 def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(browser: Browser, bench: Running) -> None:
-    open_model(browser, bench, "tee.stl", stl(tee()))
+    open_model(browser, bench, "tee.stl", stl(tee(6.0, 24.0, 24.0)))
     browser.click("#add")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: add a plane'")
     slice_it(browser)

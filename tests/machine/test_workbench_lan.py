@@ -22,6 +22,7 @@ from machine.app.workbench.access.addresses import network_addresses
 from mdp.save import stl
 from tests.machine.browser import Browser
 from tests.machine.prints import PrintPage
+from tests.machine.test_workbench_page import choose
 from tests.machine.workbench import PATIENCE_S, QUICK, OpenToNetwork, Page, open_workbench
 from tests.shapes import box
 
@@ -213,8 +214,8 @@ def test_from_the_phone_a_model_is_turned_and_a_print_stopped(bench: OpenToNetwo
     browser.value("document.querySelector('button').click()")
     browser.wait("document.documentElement?.dataset.line === 'open' && document.documentElement.dataset.state === 'ready'")
     assert browser.complaints == []
-    browser.value("$('demo').value = 'demo:bracket'; $('demo').dispatchEvent(new Event('change'))")
-    browser.wait(f"$('title').textContent === 'bracket' || $('title').textContent.includes('bracket') && {IDLE}")
+    choose(browser, "post.stl", stl(box(8.0, 8.0, 12.0)))
+    browser.wait(f"$('title').textContent === 'post.stl' && {IDLE}")
     browser.click("[data-turn=x][data-deg='90']")
     browser.wait(f"$('undo').ariaLabel === 'undo: turn the model' && {IDLE}")
     browser.screenshot(tmp_path / "model.png")
