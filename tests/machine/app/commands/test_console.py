@@ -301,7 +301,7 @@ def test_a_bug_while_a_line_is_sent_ends_the_console_with_the_heaters_off(
     assert "ZeroDivisionError: planted; the printer reports its heaters off" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("after_s", [0.0, 0.002, 0.01, 0.6])  # in the midst of putting the answer above the prompt, or at rest
+@pytest.mark.parametrize("after_s", [0.002, 0.6])  # in the midst of putting the answer above the prompt, or at rest
 def test_a_closed_terminal_leaves_with_the_heaters_off(after_s: float) -> None:
     with SimulatedPrinter(MACHINE) as printer:
         with Person("console", "--port", printer.path) as person:
