@@ -16,6 +16,7 @@ from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, un
 from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
 
 SLENDER = 12.0  # largest height above a piece, in diameters of the piece; taller support sways under the nozzle
+LONG = 3.0  # distances between sparse lines: in a longer piece a zigzag has too many turns to hang between the walls
 TRIES = 5  # at most, of a distance over which a piece grows into the room beside it
 
 
@@ -126,8 +127,9 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
     """The pieces of each layer's support that are printed as walls without lines inside.
 
     printed, dense: one area per layer. A piece is filled if it is wider than the distance between sparse lines and lies under
-    filled or dense support of the layer above. A narrower piece is filled only directly under dense support, whose lines may run
-    along it. Without walls no piece is hollow.
+    filled or dense support of the layer above. A short piece that is narrower is filled only directly under dense support, whose
+    lines may run along it. A long one is filled wherever a wide one is: the zigzag in the layer above it would touch walls at
+    its turns only, and hang over all of the piece's length. Without walls no piece is hollow.
     """
     hollow, filled = [Polygons()] * len(printed), Polygons()
     if process.support_walls == 0:
@@ -149,7 +151,8 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
 def _has_lines(piece: Polygons, lying: Polygons, dense_above: Polygons, walls_mm: float, cell_mm: float) -> bool:
     """Whether lines are printed inside a piece; lying: its area under lines of the layer above."""
     x0, y0, x1, y1 = piece.bounds()
-    if max(x1 - x0, y1 - y0) <= 2.0 * walls_mm + cell_mm:
-        return False
+    long_mm = max(x1 - x0, y1 - y0) - 2.0 * walls_mm
+    if not cell_mm < long_mm <= LONG * cell_mm:
+        return long_mm > cell_mm
     is_narrow = offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
     return not is_narrow or not (lying ^ dense_above).is_empty()

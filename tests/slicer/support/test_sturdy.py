@@ -7,9 +7,14 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from machine.dryrun.dryrun import dry_run
+from machine.gcode.writer import write_gcode
+from machine.planning.plan import plan
+from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from slicer.bead import support_cell_mm
 from slicer.geometry.polygons import Polygons, islands
+from slicer.slice import slice_parts
 from slicer.support.beads import support_beads
 from slicer.support.sturdy import SLENDER, hollow_places, least_diameter_mm
 from slicer.support.support import Supports
@@ -124,12 +129,29 @@ def test_a_trunk_under_a_narrow_tip_is_hollow_and_a_wide_column_is_not() -> None
     assert support_beads(stem, nothing, stem, process, 0.2, True)[1:], "the first layer is filled"
 
 
-def test_a_ridge_as_narrow_as_the_cells_is_filled_only_right_under_its_dense_lines() -> None:
+def test_a_short_ridge_as_narrow_as_the_cells_is_filled_only_right_under_its_dense_lines() -> None:
+    process = profile().process
+    ridge = Polygons.square((support_cell_mm(process), 2.0 * support_cell_mm(process)), True)
+    nothing = Polygons()
+    hollow = hollow_places([ridge] * 4, [nothing, nothing, nothing, ridge], process)
+    assert [area.is_empty() for area in hollow] == [False, False, True, False]
+
+
+def test_a_long_ridge_as_narrow_is_filled_down_to_the_ground() -> None:
     process = profile().process
     ridge = Polygons.square((support_cell_mm(process), 20.0), True)
     nothing = Polygons()
     hollow = hollow_places([ridge] * 4, [nothing, nothing, nothing, ridge], process)
-    assert [area.is_empty() for area in hollow] == [False, False, True, False]
+    assert [area.is_empty() for area in hollow] == [True, True, True, False]
+
+
+def test_lines_of_long_narrow_support_lie_on_lines_and_not_in_the_air() -> None:
+    wall, plate = m3.Manifold.cube((60, 2, 6), True), m3.Manifold.cube((60, 8.4, 1), True)
+    part, settings = whole(standing(wall + plate.translate((0, 0, 3.5)))), profile("process.support_style=grid")
+    decomposition = Decomposition("ledges", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    program = plan(decomposition, slice_parts([part], settings), settings)
+    run = dry_run(tuple(write_gcode(program, settings)), settings)
+    assert [finding.message for finding in run.findings if finding.code == "air"] == []
 
 
 def test_support_without_walls_is_never_hollow() -> None:
