@@ -153,6 +153,6 @@ def _has_lines(piece: Polygons, lying: Polygons, dense_above: Polygons, walls_mm
     x0, y0, x1, y1 = piece.bounds()
     long_mm = max(x1 - x0, y1 - y0) - 2.0 * walls_mm
     if not cell_mm < long_mm <= LONG * cell_mm:
-        return long_mm > cell_mm
+        return bool(long_mm > cell_mm)
     is_narrow = offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
     return not is_narrow or not (lying ^ dense_above).is_empty()
