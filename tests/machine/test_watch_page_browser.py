@@ -20,9 +20,10 @@ LIVE = "$('live').textContent"
 
 @contextmanager
 def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
-    """`print --watch` of hours on the simulated printer, which at its speed nobody sees end, and the address that it tells."""
+    """`print --watch` of an hour and more on the simulated printer, and the address that it tells."""
     file = folder / "long.gcode"
-    strokes = "".join(f"G1 X40 E{k + 1} F120\nG0 X10 F6000\n" for k in range(4000))  # a pause waits for a stroke's end
+    # A pause waits for the end of a stroke, so they are short in time; in places of their own they are soon drawn.
+    strokes = "".join(f"G1 X40 Y{k % 100} E{k + 1} F60\nG0 X10 F6000\n" for k in range(1000))
     file.write_text(BEGIN + strokes + END)
     options = ["--port", "sim", "--sim-speed", "200", "--watch", "--no-browser", "--force"]
     command = [sys.executable, "-m", "machine.app.cli", "print", str(file), *options]
@@ -38,6 +39,7 @@ def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
 
 def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_path: Path) -> None:
     with printing(tmp_path) as (process, address):
+        browser.resize(400, 300)  # little to draw: the print's moves are many
         browser.open(address)
         browser.value("{ window.$ = (id) => document.getElementById(id); }")
         browser.wait(f"{LIVE}.startsWith('printing') && !$('orders').hidden")
@@ -56,6 +58,7 @@ def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_
 
 def test_an_emergency_stop_is_asked_once_and_the_print_ends(browser: Browser, tmp_path: Path) -> None:
     with printing(tmp_path) as (process, address):
+        browser.resize(400, 300)  # little to draw: the print's moves are many
         browser.open(address)
         browser.wait("document.getElementById('live').textContent.startsWith('printing')")
         browser.click("#emergency")
