@@ -15,8 +15,6 @@ from mdp.learning.networks import Network
 from mdp.learning.objective import OBJECTIVES, Figures, Objective, Padded, thin
 from profiles.errors import LearningError
 
-Weights = dict[str, torch.Tensor]
-
 
 @dataclass(frozen=True)
 class Schedule:
@@ -54,18 +52,6 @@ class Epoch:
     best: int
 
 
-@dataclass(eq=False)
-class _State:
-    """How far a training has come, and its best network so far."""
-
-    network: Network
-    optimizer: torch.optim.Optimizer
-    best_weights: Weights
-    epoch: int = 0
-    best_epoch: int = 0
-    best: Figures = ()
-
-
 def train(
     network: Network,
     columns: Sequence[str],
@@ -86,31 +72,33 @@ def train(
     padded, held_out = objective.pad(training, columns), objective.pad(validation, columns)
     network.prepare(padded.features, padded.present)
     adam = torch.optim.Adam(network.parameters(), lr=schedule.rate, weight_decay=schedule.decay)
-    state = _State(network, adam, deepcopy(network.state_dict()))
-    while state.epoch < schedule.epochs and state.epoch - state.best_epoch < schedule.patience:
-        state.epoch += 1
-        loss = _steps(state, padded, schedule)
+    best: Figures = ()
+    best_epoch, best_weights = 0, deepcopy(network.state_dict())
+    for epoch in range(1, schedule.epochs + 1):
+        loss = _steps(network, adam, padded, schedule, epoch)
         figures = _validate(network, held_out, objective)
-        if figures > state.best:
-            state.best, state.best_epoch, state.best_weights = figures, state.epoch, deepcopy(network.state_dict())
+        if figures > best:
+            best, best_epoch, best_weights = figures, epoch, deepcopy(network.state_dict())
         if on_epoch is not None:
-            on_epoch(Epoch(state.epoch, loss, figures, objective.measures, state.best_epoch))
-    network.load_state_dict(state.best_weights)
-    return state.best
+            on_epoch(Epoch(epoch, loss, figures, objective.measures, best_epoch))
+        if epoch - best_epoch >= schedule.patience:
+            break
+    network.load_state_dict(best_weights)
+    return best
 
 
-def _steps(state: _State, lists: Padded, schedule: Schedule) -> float:
+def _steps(network: Network, adam: torch.optim.Optimizer, lists: Padded, schedule: Schedule, epoch: int) -> float:
     """One epoch; the mean loss of the lists, each as its step met it."""
     total, objective = 0.0, OBJECTIVES[schedule.loss]
-    generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + state.epoch)
+    generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + epoch)
     for rows in torch.randperm(len(lists.targets), generator=generator).split(schedule.batch):
         batch = lists.take(rows)
         seen = thin(batch.present, generator) if objective.thins else batch.present
-        losses = objective.loss(state.network(batch.features, seen), batch.targets, seen)
-        state.optimizer.zero_grad()
+        losses = objective.loss(network(batch.features, seen), batch.targets, seen)
+        adam.zero_grad()
         losses.mean().backward()
-        torch.nn.utils.clip_grad_norm_(state.network.parameters(), schedule.clip)
-        state.optimizer.step()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), schedule.clip)
+        adam.step()
         total += float(losses.detach().sum())
     return total / len(lists.targets)
 
