@@ -24,13 +24,13 @@ from dataclasses import asdict, dataclass, fields
 from functools import cache
 from itertools import product
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, TextIO, get_type_hints
 
 from mdp.learning.command import Parser, check_range, run
 from mdp.learning.models import coarser, read_model
 from mdp.learning.sources import FOLDS, Side, read_sources, side
 from mdp.learning.task import PAPER_TERMS
-from mdp.learning.widths import compare, read_searches, table
+from mdp.learning.widths import NOTHING_COMMON, compare, read_searches, table
 from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.ranking.ranker import CLASSIC
@@ -70,7 +70,7 @@ class Row:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Search what is missing in the file, or print its tables; the exit code."""
-    return run(_main, arguments, "the same command goes on from here")
+    return run(_main, arguments, "run the same command again to continue")
 
 
 def _main(arguments: Sequence[str] | None) -> None:
@@ -79,7 +79,7 @@ def _main(arguments: Sequence[str] | None) -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--summary", action="store_true")
     parser.add_argument("--least-removed", type=float, default=0.0, metavar="SHARE")
-    parser.add_argument("--widths", default="1,2,10")
+    parser.add_argument("--widths", type=_widths, default="1,2,10")
     parser.add_argument("--methods", default="best")
     parser.add_argument("--rankers", default=CLASSIC)
     parser.add_argument("--faces", type=int, default=None, help="models with more faces are made coarser")
@@ -93,6 +93,7 @@ def _main(arguments: Sequence[str] | None) -> None:
     parser.add_argument("--only", default="", help="only models whose name has this in it")
     options = parser.parse_args(arguments)
     check_range(options, "least_removed", 0.0, 1.0)
+    check_range(options, "every", 1)
     if not options.summary:
         if options.folder is None or not options.folder.is_dir():
             parser.error(f"FOLDER is {options.folder}: a folder of npz files is needed")
@@ -102,19 +103,22 @@ def _main(arguments: Sequence[str] | None) -> None:
     searches, records = read_searches(options.out), read(options.out)
     failed = [f"- {row.mesh}, {row.method}, width {row.width}: {row.error}" for row in records if row.error]
     print("\n".join([f"{len(failed)} of {len(records)} searches failed", *failed]))
-    for comparison in compare(searches, options.least_removed):
+    comparisons = compare(searches, options.least_removed)
+    if options.summary and not comparisons:
+        raise LearningError(f"table {options.out}: {NOTHING_COMMON}")
+    for comparison in comparisons:
         print(f"\n{table(comparison)}")
 
 
 def _search_models(options: argparse.Namespace) -> None:
     settings = [*(PAPER_TERMS if options.paper_terms else ()), *options.set]
     done = {row.key for row in read(options.out)}
-    with options.out.open("a", newline="", encoding="utf-8") as file:
+    with _opened(options.out) as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Row)], lineterminator="\n")
         if file.tell() == 0:
             writer.writeheader()
         for path in _models(options):
-            kinds = product(options.methods.split(","), _widths(options.widths), options.rankers.split(","))
+            kinds = product(options.methods.split(","), options.widths, options.rankers.split(","))
             wanted = [(path.stem, " ".join(settings), *kind) for kind in kinds]
             for row in rows(path, [key for key in wanted if key not in done], options.limit, options.faces):
                 writer.writerow(asdict(row))
@@ -122,6 +126,13 @@ def _search_models(options: argparse.Namespace) -> None:
                 print(
                     row.mesh, row.method, row.width, row.ranker, f"{row.share:.4f} {row.core_s:.1f} s", row.error, file=sys.stderr
                 )
+
+
+def _opened(table: Path) -> TextIO:
+    try:
+        return table.open("a", newline="", encoding="utf-8")
+    except OSError as error:
+        raise LearningError(f"table {table}: cannot be written ({error.strerror})") from None
 
 
 def _models(options: argparse.Namespace) -> list[Path]:
@@ -134,7 +145,10 @@ def _models(options: argparse.Namespace) -> list[Path]:
 
 
 def _widths(text: str) -> list[int]:
-    return sorted(int(width) for width in text.split(","))
+    try:
+        return sorted(int(width) for width in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: whole numbers between commas are allowed") from None
 
 
 def rows(path: Path, missing: Sequence[Key], limit: int | None, most_faces: int | None) -> Iterator[Row]:

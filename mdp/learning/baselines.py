@@ -1,6 +1,6 @@
 """Baselines: orders without learning, a line in two features, and the learners that the paper compares uRank with.
 
-Trees are boosted by XGBoost, as in the paper, on the features scaled by list as uRank gets them.
+XGBoost's trees: as in the paper, on the features scaled by list, and tuned, on the unscaled features as well.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ PAPER = {"max_depth": 8, "eta": 0.1, "gamma": 1.0, "min_child_weight": 0.1, "tre
 PAPER_PAIRS = {"lambdarank_pair_method": "mean", "lambdarank_num_pair_per_sample": 1}
 PAPER_ROUNDS = 500
 TUNED = {"max_depth": 4, "eta": 0.05, "min_child_weight": 5.0, "subsample": 0.8, "tree_method": "hist", "nthread": 1, "seed": 0}
-TUNED_ROUNDS, TUNED_PATIENCE = 1000, 50  # validation ends it: after 50 rounds, a twentieth, that better nothing
+TUNED_ROUNDS, TUNED_PATIENCE = 1000, 50  # rounds; 50 without a gain on the validation lists end it
 
 Lists = Sequence[RatedList]
 Columns = Sequence[str]
@@ -68,7 +68,7 @@ def fit_trees(objective: str) -> Fit:
 
 
 def fit_tuned_trees(objective: str) -> Fit:
-    """The same with flatter trees and the unscaled features beside the scaled ones, until validation lists get no better."""
+    """As fit_trees with TUNED, XGBoost's own pairs and the unscaled features as well; the validation lists stop the training."""
 
     def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
         import xgboost

@@ -59,7 +59,7 @@ def add_records(parser: argparse.ArgumentParser, use: str, nargs: str | None = N
         metavar="NAME,...",
         help="only records of searches on these terms; all by default",
     )
-    parser.add_argument("--fold", type=int, choices=range(FOLDS), default=0, help="split by source; each has other test models")
+    parser.add_argument("--fold", type=int, choices=range(FOLDS), default=0, help="split by source; each has its own test models")
     parser.add_argument("--columns", choices=COLUMN_SETS, help=f"features {use}; cheap: known without a check")
 
 

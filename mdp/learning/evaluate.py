@@ -18,7 +18,7 @@ import numpy as np
 from mdp.learning.baselines import BASELINES
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, run, split_names
 from mdp.learning.lists import RatedList, followed, of_side, read_lists
-from mdp.learning.ndcg import Measure, Scores, as_searched, at, interval, regret
+from mdp.learning.ndcg import NDCGS, REGRETS, Measure, Scores, as_searched, at, interval
 from mdp.learning.sources import Side
 from mdp.mesh import Floats
 from mdp.ranking.network import Network
@@ -26,8 +26,6 @@ from profiles.errors import LearningError
 
 ALWAYS = ("M2", "M6")  # what lines are fitted in
 SHUFFLES, CUT = 10, 5  # importance is what NDCG@5 loses, as a mean of this many shuffles
-NDCGS = {f"NDCG@{cut}": at(cut) for cut in (1, 2, 3, 4, 5)}
-REGRETS = {f"regret of first {first}": regret(first) for first in (1, 2, 5)}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -54,7 +52,13 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--without", type=split_names, default=(), metavar="NAME,...", help=leave)
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="where pictures go; here by default")
     parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/compare_widths.py")
-    parser.add_argument("--least-removed", type=float, default=0.0, metavar="SHARE", help="only models with that much gain")
+    parser.add_argument(
+        "--least-removed",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="of --figure7: the widest plain beam removes it",
+    )
     options = parser.parse_args(arguments)
     check_range(options, "least_removed", 0.0, 1.0)
     unknown = [name for name in options.without if name not in BASELINES]
@@ -81,9 +85,9 @@ def _compare(options: argparse.Namespace) -> None:
             sys.stderr.write(f"fitting {name}\n")
             rankers[name] = fit(sides[Side.TRAIN], sides[Side.VALIDATION], learnt)
     known = [rated for rated in followed(sides[Side.TEST]) if rated.teaches]
-    sys.stdout.write(f"{table('All lists', rankers, sides[Side.TEST], NDCGS)}\n\n")
-    if known:
-        sys.stdout.write(f"{table('Candidates that were followed', rankers, known, REGRETS)}\n\n")
+    sys.stdout.write(f"{table('NDCG over all lists', rankers, sides[Side.TEST], NDCGS)}\n\n")
+    regrets = table("Regret over the candidates that were followed", rankers, known, REGRETS) if known else "Regret: no list"
+    sys.stdout.write(f"{regrets}\n\n")
     for network in networks:
         _analyse(network, sides[Side.TEST], options)
 
@@ -91,8 +95,8 @@ def _compare(options: argparse.Namespace) -> None:
 def table(title: str, rankers: Mapping[str, Scores], lists: Sequence[RatedList], measures: Mapping[str, Measure]) -> str:
     """A table in Markdown, one row per ranker: the means of the measures, and the 95 % interval of the first over models."""
     models = [rated.model for rated in lists]
-    heads = f"| ranker | {' | '.join(measures)} | 95 % of {next(iter(measures))} |"
-    lines = [f"{title}: {len(lists)} of {len(set(models))} models", "", heads, "|---|" + "---:|" * (len(measures) + 1)]
+    heads = f"| ranker | {' | '.join(measures)} | 95 % interval of {next(iter(measures))} |"
+    lines = [f"{title}: {len(lists)} lists of {len(set(models))} models", "", heads, "|---|" + "---:|" * (len(measures) + 1)]
     for name, scores in rankers.items():
         given = [scores(rated) for rated in lists]
         values = [np.array([measure(*pair) for pair in zip(given, lists, strict=True)]) for measure in measures.values()]
@@ -117,7 +121,7 @@ def _analyse(network: Network, lists: Sequence[RatedList], options: argparse.Nam
 
 
 def importance(scores: Scores, columns: Sequence[str], lists: Sequence[RatedList]) -> Floats:
-    """(k,) for each named feature, NDCG@5 less its mean where that feature is shuffled among all candidates (Altmann 2010)."""
+    """(k,) the drop in mean NDCG@5 when each named feature is shuffled among all candidates (Altmann 2010)."""
     rng, worth = np.random.default_rng(0), at(CUT)
 
     def mean(some: Sequence[RatedList]) -> float:
@@ -139,17 +143,20 @@ def shuffled(name: str, lists: Sequence[RatedList], rng: np.random.Generator) ->
 
 def correlation(columns: Sequence[str], lists: Sequence[RatedList]) -> Floats:
     """(k, k) Pearson correlation of the named features over all candidates; 0 with one that never changes."""
+    rows = np.vstack([rated.table(columns) for rated in lists])
     with np.errstate(invalid="ignore"):
-        matrix = np.corrcoef(np.vstack([rated.table(columns) for rated in lists]).T, dtype=np.float64)
-    known: Floats = np.asarray(np.nan_to_num(matrix))
+        matrix = np.corrcoef(rows, rowvar=False, dtype=np.float64)
+    known: Floats = np.atleast_2d(np.nan_to_num(matrix))
     return known
 
 
 def _draw_widths(options: argparse.Namespace) -> None:
     from mdp.learning.pictures import draw_widths, save
-    from mdp.learning.widths import compare, read_searches
+    from mdp.learning.widths import NOTHING_COMMON, compare, read_searches
 
     comparisons = compare(read_searches(options.figure7), options.least_removed)
+    if not comparisons:
+        raise LearningError(f"table {options.figure7}: {NOTHING_COMMON}")
     file = options.pictures / "figure7.png"
     save(draw_widths(comparisons), file)
     sys.stdout.write(f"![J and time against the beam's width]({file})\n")

@@ -12,6 +12,7 @@ from mdp.batch.rows import read_rows, write_rows
 INDEX = "index.csv"
 LOCK = "index.lock"
 NO_RISK, NO_CUT, NO_SIDE, FAILED = "no risky face", "nothing feasible", "no further side to rest on", "failed: "
+STAYS = (NO_RISK, NO_CUT, NO_SIDE)  # reasons for which a search has no record however often it is made
 HEADS = ("terms", "settings", "searches", "models", "records", "lists", "mean length", "mean J", "core h", "late")
 MOST_NAMES = 20  # of searches that failed: about a screen
 
@@ -77,13 +78,8 @@ def write_index(folder: Path, rows: Iterable[Row]) -> None:
 
 def unfinished(folder: Path, rows: Iterable[Row], wanted: Iterable[Search]) -> list[Search]:
     """The searches that have no line yet, whose record is gone, or that failed."""
-    done = {row.search for row in rows if (not row.excluded and (folder / row.search.file).is_file()) or is_settled(row)}
+    done = {row.search for row in rows if (not row.excluded and (folder / row.search.file).is_file()) or row.excluded in STAYS}
     return [search for search in wanted if search not in done]
-
-
-def is_settled(row: Row) -> bool:
-    """Whether a search has no record for a reason that stays."""
-    return row.excluded in (NO_RISK, NO_CUT, NO_SIDE)
 
 
 def summary(rows: Sequence[Row]) -> Iterator[str]:

@@ -47,8 +47,8 @@ class RatedList:
     outcome: Floats
     censored: Mask
     model: str
-    source: str = ""
-    record: str = ""
+    source: str
+    record: str
 
     @cached_property
     def ratings(self) -> Ints:
@@ -67,8 +67,8 @@ class RatedList:
 
     @property
     def teaches(self) -> bool:
-        """False for a list that has but one rating, as a list of one candidate: nothing can be learnt from its order."""
-        return len(np.unique(self.ratings)) > 1
+        """Whether there is an order to learn: a list of one candidate has none."""
+        return len(self.outcome) > 1
 
     def table(self, columns: Sequence[str]) -> Singles:
         """(n, k) the named features."""
@@ -97,7 +97,7 @@ def read_lists(
         source = model_id(file) if sources is None else sources.get(model_id(file))
         if source is None:
             raise LearningError(f"record {file}: its model {model_id(file)} is not in {manifest}")
-        lists += _lists(read_record(file, columns), file, source)
+        lists += _lists(read_record(file, columns), file, source, columns)
     return lists
 
 
@@ -132,13 +132,15 @@ def _check(file: Path, arrays: Arrays, columns: Sequence[str]) -> None:
         raise LearningError(f"record {file}: feature {name} of a candidate of model {arrays['model']} is {value}")
 
 
-def _lists(record: Arrays, file: Path, source: str) -> Iterator[RatedList]:
-    columns = tuple(str(name) for name in record["columns"])
-    censored = _censored(record)
-    cut, features = ~np.isnan(record["outcome"]), record["features"].astype(np.float32)
+def _lists(record: Arrays, file: Path, source: str, columns: Sequence[str]) -> Iterator[RatedList]:
+    names = record["columns"].tolist()
+    features = record["features"][:, [names.index(name) for name in columns]].astype(np.float32)
+    cut, censored = ~np.isnan(record["outcome"]), _censored(record)
     for stage in np.unique(record["stage"][cut]):
         rows = cut & (record["stage"] == stage)
-        yield RatedList(features[rows], columns, record["outcome"][rows], censored[rows], model_id(file), source, file.stem)
+        yield RatedList(
+            features[rows], tuple(columns), record["outcome"][rows], censored[rows], model_id(file), source, file.stem
+        )
 
 
 def _censored(record: Arrays) -> Mask:

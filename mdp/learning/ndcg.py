@@ -50,6 +50,10 @@ def regret(first: int) -> Measure:
     return lambda scores, rated: float(rated.regrets[order(scores)[:first]].min())
 
 
+NDCGS = {f"NDCG@{cut}": at(cut) for cut in (1, 2, 3, 4, 5)}
+REGRETS = {f"regret@{first}": regret(first) for first in (1, 2, 5)}
+
+
 def interval(values: Floats, models: Sequence[str]) -> tuple[float, float]:
     """95 % interval of the mean of the lists' values, the models resampled: the lists of one model stand or fall together."""
     names, inverse = np.unique(np.asarray(models), return_inverse=True)

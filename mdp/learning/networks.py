@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import onnx
 import torch
-from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from mdp.learning.lists import SMALLEST_RANGE, RatedList, Singles
@@ -27,70 +26,74 @@ SMALLEST_SPREAD = 1e-6  # an input that spreads less over all lists is the same 
 
 
 class Network(torch.nn.Module):
-    """The paper's network: dense layers with ReLU between them, over features that are scaled by list; Glorot-uniform weights.
+    """Dense layers with ReLU between them, and a line beside them where there is one; those below prepare the inputs."""
 
-    It scores every candidate by itself.
-    """
+    line: torch.nn.Linear | None
+
+    def __init__(self, inputs: int, hidden: Sequence[int]) -> None:
+        super().__init__()
+        self.layers = torch.nn.ModuleList(torch.nn.Linear(*pair) for pair in pairwise((inputs, *hidden, 1)))
+        self.line = None
+
+    def prepare(self, features: torch.Tensor, present: torch.Tensor) -> None:
+        """Set what depends on the training lists; nothing by default."""
+
+    def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
+        rows = inputs = self.inputs(features, present)
+        for layer in self.layers[:-1]:
+            rows = torch.relu(layer(rows))
+        scores: torch.Tensor = self.layers[-1](rows)
+        return (scores if self.line is None else scores + self.line(inputs)).squeeze(-1)
+
+    def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, inputs) what the layers take."""
+        raise NotImplementedError
+
+    def inputs_in(self, graph: "Graph") -> str:
+        """The (n, inputs) value of a graph that the layers take."""
+        raise NotImplementedError
+
+
+class PaperNetwork(Network):
+    """The paper's: scores each candidate from its features, scaled over its list; Glorot-uniform weights."""
 
     def __init__(self, columns: Sequence[str], hidden: Sequence[int] = (100, 100), seed: int = 0) -> None:
         """columns: names of the features."""
-        super().__init__()
-        self.add_layers(len(columns), hidden)
+        super().__init__(len(columns), hidden)
         generator = torch.Generator().manual_seed(seed)
         for layer in self.layers:
             torch.nn.init.xavier_uniform_(layer.weight, generator=generator)
             torch.nn.init.zeros_(layer.bias)
 
-    def add_layers(self, inputs: int, hidden: Sequence[int]) -> None:
-        """Dense layers from a number of inputs to one score."""
-        self.layers = torch.nn.ModuleList(torch.nn.Linear(*pair) for pair in pairwise((inputs, *hidden, 1)))
-
-    def prepare(self, features: torch.Tensor, present: torch.Tensor) -> None:
-        """Take from the lists to train with what the network has to know before its training."""
-
-    def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
-        return self.dense(scaled(features, present, SMALLEST_RANGE))
-
-    def dense(self, rows: torch.Tensor) -> torch.Tensor:
-        """(..., inputs) -> (...)."""
-        for layer in self.layers[:-1]:
-            rows = torch.relu(layer(rows))
-        scores: torch.Tensor = self.layers[-1](rows).squeeze(-1)
-        return scores
+    def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, F) the features scaled by list."""
+        return scaled(features, present, SMALLEST_RANGE)
 
     def inputs_in(self, graph: "Graph") -> str:
-        """The (n, inputs) value of a graph that the first layer takes."""
+        """The same in a graph."""
         return graph.scaled(INPUT, SMALLEST_RANGE)
 
 
 class RegretNetwork(Network):
-    """Scores every candidate from its own features and the list's ranges: dense layers with ReLU, and a line beside them.
+    """Ours: takes the features as they are, scaled by list, and M2 - k M6 below the best of the list for some k, standardised.
 
-    It takes the features as they are, scaled by list, and M2 - k M6 below the best of the list for some k (what a cut saves less
-    what it loses for ever: the trade-offs that the slots of a beam follow), all of them standardised.
+    M2 - k M6 is what a cut saves less what it loses for ever: the trade-offs that the slots of a beam follow.
     """
 
     def __init__(self, columns: Sequence[str], hidden: Sequence[int] = (32, 32), seed: int = 0) -> None:
         """columns: names of the features, M2 and M6 among them."""
-        torch.nn.Module.__init__(self)
-        self.register_buffer("contrasts", torch.from_numpy(contrasts(columns)))
         inputs = 2 * len(columns) + len(TRADE_OFFS)
+        super().__init__(inputs, hidden)
+        self.register_buffer("contrasts", torch.from_numpy(contrasts(columns)))
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("spread", torch.ones(inputs))
-        self.add_layers(inputs, hidden)
         self.line = torch.nn.Linear(inputs, 1, bias=False)
         generator = torch.Generator().manual_seed(seed)
         for layer in (*self.layers, self.line):
             most = layer.in_features**-0.5
             for parameter in layer.parameters():
                 torch.nn.init.uniform_(parameter, -most, most, generator=generator)
-
-    def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-        """(L, n, 2F + TRADE_OFFS) what the features are turned into before they are standardised."""
-        saved = features @ self.contrasts
-        most = torch.where(present.unsqueeze(-1), saved, -torch.inf).amax(dim=1, keepdim=True)
-        return torch.cat([features, scaled(features, present, LEAST_RANGE), saved - most], dim=-1)
 
     def prepare(self, features: torch.Tensor, present: torch.Tensor) -> None:
         """Take mean and spread of the inputs."""
@@ -99,22 +102,23 @@ class RegretNetwork(Network):
         self.mean.copy_(mean)
         self.spread.copy_(torch.where(spread < SMALLEST_SPREAD, 1.0, spread))
 
-    def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
-        inputs = (self.inputs(features, present) - self.mean) / self.spread
-        scores: torch.Tensor = self.dense(inputs) + self.line(inputs).squeeze(-1)
-        return scores
+    def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, 2F + TRADE_OFFS) what the layers take: of mean 0 and spread 1 once the network is prepared."""
+        saved = features @ self.contrasts
+        most = torch.where(present.unsqueeze(-1), saved, -torch.inf).amax(dim=1, keepdim=True)
+        whole = torch.cat([features, scaled(features, present, LEAST_RANGE), saved - most], dim=-1)
+        return (whole - self.mean) / self.spread
 
     def inputs_in(self, graph: "Graph") -> str:
-        """The (n, inputs) value of a graph that the first layer takes."""
-        saved = graph.add("MatMul", INPUT, graph.constant(_array(self.contrasts)))
+        """The same in a graph."""
+        saved = graph.add("MatMul", INPUT, graph.constant(self.contrasts))
         below = graph.add("Sub", saved, graph.add("ReduceMax", saved, axes=[0], keepdims=1))
         inputs = graph.add("Concat", INPUT, graph.scaled(INPUT, LEAST_RANGE), below, axis=1)
-        centred = graph.add("Sub", inputs, graph.constant(_array(self.mean)))
-        return graph.add("Div", centred, graph.constant(_array(self.spread)))
+        centred = graph.add("Sub", inputs, graph.constant(self.mean))
+        return graph.add("Div", centred, graph.constant(self.spread))
 
 
-NETWORKS = {"urank": Network, "regret": RegretNetwork}
+NETWORKS = {"urank": PaperNetwork, "regret": RegretNetwork}
 
 
 def contrasts(columns: Sequence[str]) -> Singles:
@@ -160,16 +164,16 @@ class Graph:
         self._nodes.append(helper.make_node(operator, inputs, [name], **attributes))
         return name
 
-    def constant(self, array: NDArray[np.generic]) -> str:
+    def constant(self, tensor: torch.Tensor) -> str:
         """A tensor of numbers that stay; its name."""
         name = f"constant_{len(self._constants)}"
-        self._constants.append(numpy_helper.from_array(array, name))
+        self._constants.append(numpy_helper.from_array(tensor.detach().numpy(), name))
         return name
 
     def scaled(self, features: str, smallest_range: float) -> str:
         """(n, F) every column from 0 to 1 over its list."""
         low, high = (self.add(operator, features, axes=[0], keepdims=1) for operator in ("ReduceMin", "ReduceMax"))
-        smallest = self.constant(np.array(smallest_range, np.float32))
+        smallest = self.constant(torch.tensor(smallest_range))
         return self.add("Div", self.add("Sub", features, low), self.add("Add", self.add("Sub", high, low), smallest))
 
     def model(self, columns: Sequence[str], scores: str, metadata: Mapping[str, str]) -> bytes:
@@ -197,19 +201,14 @@ def export(networks: Sequence[Network], columns: Sequence[str], metadata: Mappin
     for number in range(len(networks[0].layers)):
         if number > 0:
             rows = graph.add("Relu", rows)
-        weight = np.stack([_array(network.layers[number].weight).T for network in networks])
-        bias = np.stack([_array(network.layers[number].bias)[np.newaxis] for network in networks])
+        weight = torch.stack([network.layers[number].weight.T for network in networks])
+        bias = torch.stack([network.layers[number].bias.unsqueeze(0) for network in networks])
         rows = graph.add("Add", graph.add("MatMul", rows, graph.constant(weight)), graph.constant(bias))
     given = graph.add("ReduceMean", rows, axes=[0], keepdims=0)
-    lines = [_array(network.line.weight).T for network in networks if isinstance(network, RegretNetwork)]
+    lines = [network.line.weight.T for network in networks if network.line is not None]
     if lines:
-        given = graph.add("Add", given, graph.add("MatMul", inputs, graph.constant(np.mean(lines, axis=0))))
-    return graph.model(columns, graph.add("Squeeze", given, graph.constant(np.array([1], np.int64))), metadata)
-
-
-def _array(tensor: torch.Tensor) -> Singles:
-    values: Singles = tensor.detach().numpy()
-    return values
+        given = graph.add("Add", given, graph.add("MatMul", inputs, graph.constant(torch.stack(lines).mean(dim=0))))
+    return graph.model(columns, graph.add("Squeeze", given, graph.constant(torch.tensor([1]))), metadata)
 
 
 def write(file: Path, content: bytes) -> None:

@@ -15,18 +15,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
-from mdp.learning.evaluate import NDCGS
 from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists
-from mdp.learning.ndcg import as_searched
+from mdp.learning.ndcg import NDCGS, Scores, as_searched
 from mdp.learning.sources import Side
 
 if TYPE_CHECKING:
-    from mdp.learning.ndcg import Scores
     from mdp.learning.networks import Network
     from mdp.learning.training import Epoch, Schedule
 
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
-MOST_NETWORKS = 12  # of an ensemble: its file stays below 200 kB
+MOST_NETWORKS = 12  # of an ensemble; with --loss regret its file stays below 200 kB
 LOSSES = {"urank": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
 OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has its own
 
@@ -39,6 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def train(arguments: Sequence[str] | None) -> None:
     """Train, write the ranker, say what it is worth on the lists that it never saw."""
     options = _options(arguments)
+    from mdp.learning.networks import export, scores, write
+
     columns = COLUMN_SETS[options.columns or LOSSES[options.loss]]
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
     judge = of_side(lists, Side.TEST, options.fold)
@@ -46,8 +46,6 @@ def train(arguments: Sequence[str] | None) -> None:
         lists = followed(lists)
     teach = of_some_models(of_side(lists, Side.TRAIN, options.fold), options.share)
     stop = of_side(lists, Side.VALIDATION, options.fold)
-    from mdp.learning.networks import export, scores, write
-
     networks = _trained(options, columns, (teach, stop))
     about = {
         "kind": options.loss,
@@ -122,7 +120,7 @@ def counts(lists: Sequence[RatedList]) -> str:
     return f"{records} records, {len(lists)} lists, {models} models"
 
 
-def judged(scores: "Scores", lists: Sequence[RatedList]) -> dict[str, float | int]:
+def judged(scores: Scores, lists: Sequence[RatedList]) -> dict[str, float | int]:
     """How many lists, and the means of NDCG over them with four digits."""
     sums = {name: sum(measure(scores(rated), rated) for rated in lists) for name, measure in NDCGS.items() if lists}
     return {"lists": len(lists), **{name: round(total / len(lists), 4) for name, total in sums.items()}}

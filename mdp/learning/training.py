@@ -42,8 +42,7 @@ SCHEDULES = {
 
 @dataclass(frozen=True)
 class Epoch:
-    """An epoch's number from 1, its mean training loss, its figures on the validation lists and what they measure, and the best
-    epoch so far."""
+    """An epoch's number from 1, mean training loss, figures on the validation lists and their names; the best epoch so far."""
 
     number: int
     loss: float

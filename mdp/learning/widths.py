@@ -17,6 +17,7 @@ from profiles.errors import LearningError
 
 NEEDED = ("mesh", "settings", "method", "width", "share", "core_s")
 CLASSIC = "classic"
+NOTHING_COMMON = "no model in it was searched with every ranker at every width, or none meets --least-removed"
 RESAMPLES = 10_000
 MORE = 0.01  # share of J by which a model must differ from a plain beam of the same width to count as worse or better
 HEADS = (
@@ -87,18 +88,14 @@ def _search(row: dict[str, str]) -> Search:
 def compare(searches: Sequence[Search], least_removed: float = 0.0) -> list[Comparison]:
     """A comparison for every method and its settings, in the order they come.
 
-    A comparison is left out if no model was searched with every ranker at all of its widths; LearningError if none is left.
+    A comparison is left out if no model was searched with every ranker at all of its widths.
 
     least_removed: only models of which the widest plain beam removes at least this share of the risky area; the choice depends on
     no learned ranker.
     """
     kinds = dict.fromkeys((search.method, search.settings) for search in searches)
     found = (_comparison(kind, [s for s in searches if (s.method, s.settings) == kind], least_removed) for kind in kinds)
-    known = [comparison for comparison in found if comparison.models]
-    if not known:
-        fewer = f", with {least_removed:g} of its risky area removed by the widest plain beam" if least_removed else ""
-        raise LearningError(f"no model was searched with every ranker at all widths{fewer}: there is nothing to compare")
-    return known
+    return [comparison for comparison in found if comparison.models]
 
 
 def _comparison(method: tuple[str, str], searches: Sequence[Search], least_removed: float) -> Comparison:

@@ -43,7 +43,7 @@ def order_beads(
     """The beads of one layer in printing order.
 
     tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
-    beside an edge of an interface, which no travel passes over; kind_mm_s: as for the speeds of a layer.
+    beside an edge of an interface, which no travel passes over; kind_mm_s: by number of the kind, replaces the process's.
     """
     speed_mm_s: Speed = partial(bead_speed_mm_s, process=process, kind_mm_s=kind_mm_s)
     support = Polygons() if support is None else support

@@ -17,7 +17,7 @@ from slicer.strokes.travels import may_wipe_over
 
 SHORTEST = 0.5  # line widths: the steps of skin lines are no shorter,
 SHORTEST_STROKE = 4.0  # line widths of a stroke whose steps are lengthened
-ASIDE, ASIDE_EXACT = 0.25, 0.15  # and lie no farther aside for that than this; exact: tops, whose gaps show, and bridges
+ASIDE, ASIDE_EXACT = 0.25, 0.15  # line widths that easing may move a line; exact: tops, whose gaps show, and bridges
 
 
 def timed(

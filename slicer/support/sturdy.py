@@ -16,7 +16,7 @@ from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, un
 from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
 
 SLENDER = 12.0  # largest height above a piece, in diameters of the piece; taller support sways under the nozzle
-LONG = 3.0  # distances between sparse lines: in a longer piece a zigzag has too many turns to hang between the walls
+LONG = 3.0  # distances between sparse lines; in a longer piece a zigzag would rest on the walls only at its turns, and sag
 TRIES = 5  # at most, of a distance over which a piece grows into the room beside it
 
 
@@ -152,7 +152,9 @@ def _has_lines(piece: Polygons, lying: Polygons, dense_above: Polygons, walls_mm
     """Whether lines are printed inside a piece; lying: its area under lines of the layer above."""
     x0, y0, x1, y1 = piece.bounds()
     long_mm = max(x1 - x0, y1 - y0) - 2.0 * walls_mm
-    if not cell_mm < long_mm <= LONG * cell_mm:
-        return bool(long_mm > cell_mm)
+    if long_mm <= cell_mm:
+        return False
+    if long_mm > LONG * cell_mm:
+        return True
     is_narrow = offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
     return not is_narrow or not (lying ^ dense_above).is_empty()

@@ -30,3 +30,18 @@ def test_a_summary_of_no_table_of_searches_ends_with_a_sentence(tmp_path: Path, 
             out.write_text(text)
         assert main(["--out", str(out), "--summary"]) == 1
         assert capsys.readouterr().err.startswith(f"error: table {out}: ")
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--widths", "a"), "'a': whole numbers between commas are allowed"),
+        (("--every", "0"), "--every is 0: 1 or more is allowed"),
+        (("--out", "nowhere/out.csv"), "table nowhere/out.csv: cannot be written (No such file or directory)"),
+    ],
+)
+def test_a_run_that_cannot_be_made_ends_with_a_sentence(
+    words: tuple[str, str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(tmp_path), "--out", str(tmp_path / "out.csv"), *words]) == 1
+    assert sentence in capsys.readouterr().err

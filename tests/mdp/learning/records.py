@@ -31,7 +31,7 @@ def drawn_list(seed: int, size: int) -> RatedList:
     rng = np.random.default_rng(seed)
     features = rng.random((size, len(PAPER_COLUMNS))).astype(np.float32)
     outcome = 1.0 - features[:, 1].astype(np.float64) + 0.5 * features[:, 5] + 0.05 * rng.random(size)
-    return RatedList(features, PAPER_COLUMNS, outcome, np.zeros(size, np.bool_), f"m{seed % 7}")
+    return RatedList(features, PAPER_COLUMNS, outcome, np.zeros(size, np.bool_), f"m{seed % 7}", "", "")
 
 
 def by_column(name: str) -> Scores:

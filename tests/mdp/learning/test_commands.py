@@ -49,7 +49,7 @@ def test_a_ranker_is_trained_and_judged_by_two_commands(
     rows = (str(ranker), "random", "M2", "M2 - lambda M6")
     assert all(f"| {name} |" in printed for name in rows)
     assert "| M6 |" in printed
-    assert "Candidates that were followed: " in printed
+    assert "Regret over the candidates that were followed: " in printed
     assert (tmp_path / "figure8-ranker.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -15,7 +15,7 @@ def cells(text: str, name: str) -> list[str]:
 
 def test_the_right_order_has_full_marks() -> None:
     text = table("All lists", {"right": lambda rated: -rated.outcome, "M2": trade_off(0.0)}, LISTS, NDCGS)
-    assert text.startswith("All lists: 40 of 7 models")
+    assert text.startswith("All lists: 40 lists of 7 models")
     assert cells(text, "right") == ["1.0000"] * 5 + ["1.0000 to 1.0000"]
     assert 0 < float(cells(text, "M2")[0]) < 1
 
@@ -47,4 +47,5 @@ def test_correlation_is_pearson_s_and_nothing_with_a_constant() -> None:
     assert matrix == pytest.approx(np.corrcoef(rows.T))
     for rated in LISTS:
         rated.features[:, 4] = 0.5
+    assert correlation(("M1",), LISTS).tolist() == [[pytest.approx(1)]]
     assert correlation(("M1", "M5"), LISTS)[0].tolist() == pytest.approx([1, 0])

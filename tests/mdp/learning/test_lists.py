@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdp.learning.lists import of_side, of_some_models, read_lists
+from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists, scale
 from mdp.learning.sources import FOLDS, Side, side
 from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
 from profiles.errors import LearningError
@@ -37,15 +37,19 @@ def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
 def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
     names = ("rim", *reversed(PAPER_COLUMNS))
     write_record(tmp_path / "a.0.x.npz", OUTCOME, features=np.tile(np.arange(7.0), (4, 1)), columns=np.array(names))
-    assert read_lists(tmp_path)[0].table(("M1", "M6", "rim"))[0].tolist() == [6, 1, 0]
+    write_record(tmp_path / "b.0.x.npz", OUTCOME, features=np.tile(np.arange(6.0), (4, 1)))
+    turned, straight = read_lists(tmp_path)
+    assert turned.table(("M1", "M6"))[0].tolist() == [6, 1]
+    assert straight.table(("M1", "M6"))[0].tolist() == [0, 5]
+    assert turned.columns == straight.columns == PAPER_COLUMNS
 
 
 def test_a_candidate_whose_node_nobody_expanded_is_censored(tmp_path: Path) -> None:
     child, expanded = np.array([1, -1, 2, 3]), np.array([True, True, False, True])
     write_record(tmp_path / "a.0.x.npz", OUTCOME, child=child, node_expanded=expanded)
     write_record(tmp_path / "b.0.x.npz", OUTCOME)
-    followed, whole = read_lists(tmp_path)
-    assert followed.censored.tolist() == [False, True, False]
+    partly, whole = read_lists(tmp_path)
+    assert partly.censored.tolist() == [False, True, False]
     assert not whole.censored.any()
 
 
@@ -134,3 +138,38 @@ def test_the_small_set_holds_lists_of_twenty_models_in_less_than_300_kb() -> Non
     assert len(lists) >= 70
     assert {entry.model for entry in read_lists(folder, terms=("ours",))} == {"bracket", "figure", "lattice", "tree"}
     assert sum(file.stat().st_size for file in folder.iterdir()) < 300_000
+
+
+def listed(*outcome: float, censored: tuple[int, ...] = ()) -> RatedList:
+    features = np.arange(6.0 * len(outcome), dtype=np.float32).reshape(-1, 6)
+    return RatedList(features, PAPER_COLUMNS, np.array(outcome), np.isin(np.arange(len(outcome)), censored), "a", "a", "a.0.x")
+
+
+def test_the_five_least_outcomes_are_rated_and_the_rest_are_not() -> None:
+    assert listed(0.9, 0.1, 0.5, 0.2, 0.4, 0.3, 0.6).ratings.tolist() == [0, 5, 1, 4, 2, 3, 0]
+
+
+def test_a_short_list_has_no_zero_and_equal_outcomes_keep_their_order() -> None:
+    assert listed(0.2, 0.1, 0.2).ratings.tolist() == [4, 5, 3]
+
+
+def test_candidates_that_nobody_followed_leave_the_list_unless_they_are_its_best() -> None:
+    (shortened,) = followed([listed(0.4, 0.2, 0.3, 0.2, censored=(1, 2))])
+    assert shortened.outcome.tolist() == [0.4, 0.2, 0.2]
+    assert shortened.features[:, 0].tolist() == [0, 6, 18]
+    assert shortened.ratings.tolist() == [3, 5, 4]
+
+
+def test_regrets_are_shares_of_the_least_outcome_or_of_a_twentieth_of_the_risky_area() -> None:
+    assert listed(0.3, 0.2).regrets.tolist() == pytest.approx([0.5, 0])
+    assert listed(0.0, 0.01).regrets.tolist() == pytest.approx([0, 0.2])
+
+
+def test_a_list_of_one_candidate_teaches_nothing() -> None:
+    assert listed(0.0, 0.0).teaches
+    assert not listed(0.0).teaches
+
+
+def test_features_are_scaled_to_the_range_of_their_list_and_a_constant_one_becomes_zero() -> None:
+    scaled = scale(np.array([[1, 7], [3, 7], [2, 7]], np.float32))
+    assert np.allclose(scaled, [[0, 0], [1, 0], [0.5, 0]])

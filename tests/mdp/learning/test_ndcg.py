@@ -14,7 +14,9 @@ RATINGS = np.array([0, 5, 1, 4, 2, 3], np.int32)
 
 
 def listed(outcome: Floats) -> RatedList:
-    return RatedList(np.zeros((len(outcome), 6), np.float32), PAPER_COLUMNS, outcome, np.zeros(len(outcome), np.bool_), "m")
+    return RatedList(
+        np.zeros((len(outcome), 6), np.float32), PAPER_COLUMNS, outcome, np.zeros(len(outcome), np.bool_), "m", "", ""
+    )
 
 
 def test_the_right_order_has_an_ndcg_of_one_and_the_reverse_what_its_last_places_give() -> None:

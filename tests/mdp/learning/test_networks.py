@@ -11,7 +11,7 @@ onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not inst
 from mdp.learning.command import COLUMN_SETS
 from mdp.learning.lists import RatedList, followed, read_lists, scale
 from mdp.learning.ndcg import regret
-from mdp.learning.networks import Network, RegretNetwork, export, scaled, scores, write
+from mdp.learning.networks import PaperNetwork, RegretNetwork, export, scaled, scores, write
 from mdp.learning.objective import OBJECTIVES, Padded
 from mdp.learning.training import SCHEDULES, Epoch, train
 from mdp.mesh import Floats
@@ -34,7 +34,7 @@ def planted(seed: int, size: int = 20) -> RatedList:
     features = (rng.random(len(COLUMNS)) + rng.random((size, len(COLUMNS)))).astype(np.float32)
     wasted = features[:, COLUMNS.index("wasted")].astype(np.float64)
     outcome: Floats = 3.0 - features[:, 1] + 2.0 * wasted
-    return RatedList(features, COLUMNS, outcome, np.zeros(size, np.bool_), f"m{seed % 7}")
+    return RatedList(features, COLUMNS, outcome, np.zeros(size, np.bool_), f"m{seed % 7}", "", "")
 
 
 def side_by_side(*lists: RatedList) -> Padded:
@@ -48,7 +48,7 @@ def small(seed: int = 0) -> RegretNetwork:
 
 
 def test_the_network_is_the_paper_s() -> None:
-    network = Network(PAPER_COLUMNS)
+    network = PaperNetwork(PAPER_COLUMNS)
     assert sum(parameter.numel() for parameter in network.parameters()) == 10_901
     assert all(not layer.bias.any() for layer in network.layers)
     assert float(network.layers[1].weight.detach().abs().max()) == pytest.approx((6 / 200) ** 0.5, rel=1e-2)
@@ -61,7 +61,7 @@ def test_features_are_scaled_over_the_candidates_that_are_there() -> None:
 
 
 def test_a_list_is_scored_alike_alone_and_in_a_batch() -> None:
-    network, lists = Network(PAPER_COLUMNS), [drawn_list(1, 9), drawn_list(2, 4)]
+    network, lists = PaperNetwork(PAPER_COLUMNS), [drawn_list(1, 9), drawn_list(2, 4)]
     padded = OBJECTIVES["urank"].pad(lists, PAPER_COLUMNS)
     with torch.no_grad():
         batch = network(padded.features, padded.present).numpy()
@@ -82,7 +82,7 @@ def test_a_candidate_that_a_step_does_not_see_changes_no_score() -> None:
 def test_inputs_have_mean_0_and_spread_1_over_the_training_lists() -> None:
     network = small()
     lists = side_by_side(*(planted(number) for number in range(10)))
-    inputs = (network.inputs(lists.features, lists.present)[lists.present] - network.mean) / network.spread
+    inputs = network.inputs(lists.features, lists.present)[lists.present]
     assert inputs.mean(dim=0).abs().max() < 1e-4
     assert torch.allclose(inputs.std(dim=0, correction=0), torch.ones(inputs.shape[1]), atol=1e-3)
 
@@ -134,7 +134,7 @@ def test_the_file_of_the_largest_ensemble_is_below_200_kb() -> None:
 
 @pytest.mark.parametrize("size", [1, 2, 3, 50])
 def test_the_graph_scores_as_the_network_does(size: int) -> None:
-    network = Network(PAPER_COLUMNS, seed=3)
+    network = PaperNetwork(PAPER_COLUMNS, seed=3)
     session = onnxruntime.InferenceSession(export([network], PAPER_COLUMNS, METADATA))
     for seed in range(20):
         rated = drawn_list(seed, size)
@@ -144,7 +144,7 @@ def test_the_graph_scores_as_the_network_does(size: int) -> None:
 
 
 def test_a_feature_that_is_the_same_for_all_candidates_changes_nothing() -> None:
-    session = onnxruntime.InferenceSession(export([Network(PAPER_COLUMNS)], PAPER_COLUMNS, METADATA))
+    session = onnxruntime.InferenceSession(export([PaperNetwork(PAPER_COLUMNS)], PAPER_COLUMNS, METADATA))
     quarter = drawn_list(1, 10).features
     quarter[:, 2] = 0.25
     three_quarters = quarter.copy()
@@ -154,7 +154,7 @@ def test_a_feature_that_is_the_same_for_all_candidates_changes_nothing() -> None
 
 def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     file = tmp_path / "ranker.onnx"
-    write(file, export([Network(PAPER_COLUMNS)], PAPER_COLUMNS, METADATA))
+    write(file, export([PaperNetwork(PAPER_COLUMNS)], PAPER_COLUMNS, METADATA))
     model = onnx.load(file)
     assert {entry.key: entry.value for entry in model.metadata_props} == {"features": "M1,M2,M3,M4,M5,M6", **METADATA}
     assert 43_000 < file.stat().st_size < 46_000

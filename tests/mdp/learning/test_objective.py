@@ -15,12 +15,12 @@ def rows(*lists: list[float]) -> torch.Tensor:
     return torch.nn.utils.rnn.pad_sequence([torch.tensor(values, dtype=torch.float64) for values in lists], batch_first=True)
 
 
-def test_the_loss_of_two_candidates_is_the_better_one_s_log_likelihood_times_its_gain() -> None:
+def test_urank_s_loss_of_two_candidates_is_the_better_one_s_log_likelihood_times_its_gain() -> None:
     loss = urank_loss(rows([2.0, 1.0]), rows([5, 4]), torch.ones(1, 2, dtype=torch.bool))
     assert float(loss) == pytest.approx(31 * -log(e / (e + 1)))
 
 
-def test_the_loss_of_an_untrained_full_list_is_known() -> None:
+def test_urank_s_loss_of_an_untrained_full_list_is_known() -> None:
     ratings = rows([5, 4, 3, 2, 1, *[0] * 45])
     loss = urank_loss(torch.zeros(1, 50), ratings, torch.ones(1, 50, dtype=torch.bool))
     assert float(loss) == pytest.approx((31 * log(50) + 15 * log(49) + 7 * log(48) + 3 * log(47) + log(46)) / 5)
@@ -55,7 +55,7 @@ def test_the_published_scores_have_the_known_loss_and_equal_ones_a_higher_one() 
     assert float(urank_loss(torch.zeros_like(published), ratings, present).mean()) == pytest.approx(37.70, abs=5e-3)
 
 
-def test_the_loss_is_the_expected_regret_in_percent() -> None:
+def test_our_loss_is_the_expected_regret_in_percent() -> None:
     given = rows([np.log(3.0), 0.0])
     loss = regret_loss(given, rows([0.0, 0.04]), torch.ones(1, 2, dtype=torch.bool))
     entropy = -(0.75 * np.log(0.75) + 0.25 * np.log(0.25))
@@ -66,6 +66,13 @@ def test_regret_is_measured_against_the_best_that_a_step_sees() -> None:
     present = torch.tensor([[False, True, True]])
     far = regret_loss(rows([0.0, 50.0, 0.0]), rows([0.0, 0.1, 0.3]), present)
     assert far.tolist() == pytest.approx([0.0], abs=1e-3)
+
+
+def test_padding_does_not_change_our_loss() -> None:
+    given, regrets = rows([0.5, 0.2, 0.9], [0.1, 0.4]), rows([0.0, 0.1, 0.3], [0.2, 0.0])
+    present = torch.tensor([[True, True, True], [True, True, False]])
+    alone = regret_loss(given[1:, :2], regrets[1:, :2], present[1:, :2])
+    assert regret_loss(given, regrets, present)[1].tolist() == pytest.approx(float(alone))
 
 
 def test_a_step_sees_a_part_of_each_list_and_of_short_ones_all() -> None:

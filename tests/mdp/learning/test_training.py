@@ -4,7 +4,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from mdp.learning.networks import Network
+from mdp.learning.networks import PaperNetwork
 from mdp.learning.training import Epoch, Schedule, train
 from mdp.ranking.features import PAPER_COLUMNS
 from profiles.errors import LearningError
@@ -16,12 +16,12 @@ LISTS = ([drawn_list(seed, 12) for seed in range(40)], [drawn_list(seed, 12) for
 SHORT = Schedule(epochs=6, batch=8, rate=3e-3)
 
 
-def weights(network: Network) -> list[list[float]]:
+def weights(network: PaperNetwork) -> list[list[float]]:
     return [array.detach().ravel().tolist() for array in network.parameters()]
 
 
-def small() -> Network:
-    return Network(PAPER_COLUMNS, (8,))
+def small() -> PaperNetwork:
+    return PaperNetwork(PAPER_COLUMNS, (8,))
 
 
 def test_the_loss_falls_and_the_order_gets_better() -> None:
