@@ -20,21 +20,24 @@ FLAGS = [
     *("--disable-extensions", "--disable-dev-shm-usage", "--remote-debugging-pipe"),
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),  # WebGL2 without a graphics card
 ]
+PLAIN = ("--disable-gpu-compositing",)  # what is around the picture is put together by the processor, at a third of the time
 PATIENCE_S = 150.0  # on a busy machine its start alone has taken 50 s
+OWN_WORDS = "GPU stall due to ReadPixels"  # what it says of itself where it is started with PLAIN
 NAVIGATED = "Inspected target navigated or closed"  # the browser's answer when its page is left during a query
 
 
 class Browser:
     """One Chromium with one page; a context: leaving it ends the process and removes its profile folder.
 
+    density: pixels for each CSS pixel; half of one draws a quarter of the picture, and places and sizes of the page stay.
     complaints: what the console and the page complained of; requests: every address asked for since the last `open`.
     """
 
-    def __init__(self, size: tuple[int, int] = (1280, 800), flags: tuple[str, ...] = ()) -> None:
+    def __init__(self, size: tuple[int, int] = (1280, 800), flags: tuple[str, ...] = (), density: float = 1.0) -> None:
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self._folder = tempfile.TemporaryDirectory(prefix="browser", ignore_cleanup_errors=True)
-        self._count, self._read, self._session = 0, b"", ""
+        self._count, self._read, self._session, self._density = 0, b"", "", density
         to_child, self._out = _pipe()
         self._in, from_child = _pipe()
         command = [str(CHROMIUM), *FLAGS, *flags, f"--user-data-dir={self._folder.name}", f"--window-size={size[0]},{size[1]}"]
@@ -156,7 +159,8 @@ class Browser:
 
     def resize(self, width: int, height: int, mobile: bool = False) -> None:
         """Another size of the window, in CSS pixels."""
-        self._send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
+        given = {"width": width, "height": height, "deviceScaleFactor": self._density, "mobile": mobile}
+        self._send("Emulation.setDeviceMetricsOverride", **given)
 
     def prefer(self, scheme: str) -> None:
         """What the system asks for: dark or light."""
@@ -218,7 +222,7 @@ class Browser:
                 self.complaints.append(json.dumps(given["exceptionDetails"])[:800])
             case "Runtime.consoleAPICalled" if given["type"] in ("error", "warning", "assert"):
                 self.complaints.append(str([value.get("value") for value in given["args"]]))
-            case "Log.entryAdded" if given["entry"]["level"] in ("error", "warning"):
+            case "Log.entryAdded" if given["entry"]["level"] in ("error", "warning") and OWN_WORDS not in given["entry"]["text"]:
                 self.complaints.append(given["entry"]["text"])
 
 

@@ -4,17 +4,23 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.browser import CHROMIUM, PLAIN, Browser
 from tests.machine.workbench import QUICK, Running, workbench
 
 WINDOW = (900, 560)  # a small picture: without a graphics card the processor draws it
+DENSITY = 0.5  # pixels for each CSS pixel, for the same reason
+
+
+def small_browser(*flags: str) -> Browser:
+    """A browser that has little to draw."""
+    return Browser(WINDOW, (*PLAIN, *flags), DENSITY)
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     if CHROMIUM is None:
         pytest.skip("Chromium is not installed: the page is not tried in a browser")
-    with Browser(WINDOW) as running:
+    with small_browser() as running:
         yield running
 
 

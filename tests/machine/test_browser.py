@@ -1,7 +1,6 @@
 """The page in a real browser: what is read out, what is drawn, what hands, keys and a hostile name do to it."""
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -22,10 +21,10 @@ from mdp.plane import Plane
 from profiles.profile import load
 from tests.machine import hand
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.conftest import WINDOW, small_browser
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
-WINDOW = (900, 560)  # a small picture: without a graphics card the processor draws it
 HOSTILE = "</title></script><img src=x onerror=hit=1><script>hit=1</script>.gcode"
 FOREIGN = """G28
 G1 Z0.3 F600
@@ -67,12 +66,6 @@ REDS = f"""{PICTURE}.then(async (address) => {{
   for (let k = 0; k < seen.length; k += 4) if (seen[k] > 40 && seen[k] > 3 * seen[k + 1] && seen[k] > 3 * seen[k + 2]) count++;
   return count;
 }})"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with Browser() as running:
-        yield running
 
 
 @cache
@@ -438,7 +431,7 @@ def test_the_report_holds_every_part_and_is_printed_with_the_picture(page: Brows
 
 def test_without_webgl_the_report_is_shown_and_a_sentence_says_why(tmp_path: Path) -> None:
     profile, printed = program()
-    with Browser(flags=("--disable-3d-apis",)) as blind:
+    with small_browser("--disable-3d-apis") as blind:
         opened(blind, tmp_path, print_page("post and arm", printed, profile))
         assert "no WebGL2" in text(blind, "notice")
         assert blind.value("document.getElementById('report').offsetHeight") > 100

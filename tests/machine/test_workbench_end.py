@@ -24,7 +24,7 @@ def test_what_the_page_prints_the_command_line_prints_from_its_plan(tmp_path: Pa
     kitten = KITTEN.is_file()
     model, given = Path("kitten.off" if kitten else "figure.ply"), (*QUICK, "--set", f"process.scale={0.3 if kitten else 0.6}")
     shutil.copy(KITTEN if kitten else FIGURE, model)
-    with workbench(*given) as bench, Browser((900, 560)) as browser:
+    with workbench(*given) as bench, small_browser() as browser:
         browser.open(bench.address)
         browser.wait(f"document.documentElement.dataset.line === 'open' && {IDLE}")
         choose(browser, model.name, model.read_bytes())

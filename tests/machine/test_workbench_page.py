@@ -9,7 +9,7 @@ from machine.app.cli import main
 from mdp.mesh import Mesh
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.conftest import WINDOW
+from tests.machine.conftest import small_browser
 from tests.machine.firefox import Firefox
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import ball, tee
@@ -330,7 +330,7 @@ def test_a_page_without_a_workbench_says_so_and_above_all_that_a_stop_has_not_ar
 
 
 def test_without_webgl_the_numbers_and_the_front_are_there(bench: Running) -> None:
-    with Browser(WINDOW, flags=("--disable-3d-apis",)) as blind:
+    with small_browser("--disable-3d-apis") as blind:
         open_model(blind, bench, "tee.stl", stl(tee()))
         assert blind.value("document.documentElement.dataset.state") == "failed"
         assert area(blind) > 0.0
