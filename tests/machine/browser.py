@@ -38,6 +38,7 @@ class Browser:
         self.requests: list[str] = []
         self._folder = tempfile.TemporaryDirectory(prefix="browser", ignore_cleanup_errors=True)
         self._count, self._read, self._session, self._density = 0, b"", "", density
+        self._plain = set(PLAIN) <= set(flags)
         to_child, self._out = _pipe()
         self._in, from_child = _pipe()
         command = [str(CHROMIUM), *FLAGS, *flags, f"--user-data-dir={self._folder.name}", f"--window-size={size[0]},{size[1]}"]
@@ -213,6 +214,10 @@ class Browser:
         answer: dict[str, Any] = json.loads(message)
         return answer
 
+    def _is_own(self, text: str) -> bool:
+        """Whether a warning comes of how this browser was started."""
+        return self._plain and OWN_WORDS in text
+
     def _note(self, event: dict[str, Any]) -> None:
         given = event.get("params", {})
         match event.get("method"):
@@ -222,7 +227,7 @@ class Browser:
                 self.complaints.append(json.dumps(given["exceptionDetails"])[:800])
             case "Runtime.consoleAPICalled" if given["type"] in ("error", "warning", "assert"):
                 self.complaints.append(str([value.get("value") for value in given["args"]]))
-            case "Log.entryAdded" if given["entry"]["level"] in ("error", "warning") and OWN_WORDS not in given["entry"]["text"]:
+            case "Log.entryAdded" if given["entry"]["level"] in ("error", "warning") and not self._is_own(given["entry"]["text"]):
                 self.complaints.append(given["entry"]["text"])
 
 
