@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
-from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.browser import CHROMIUM
+from tests.machine.conftest import small_browser
 from tests.machine.prints import commands_sent
 from tests.machine.test_workbench_page import IDLE, choose, find_as_it_lies, saved
 from tests.machine.workbench import QUICK, workbench
