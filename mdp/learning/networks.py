@@ -1,8 +1,9 @@
-"""Networks: those that are trained, in torch and as ONNX files: raw features in, scores out, all preparation in the graph.
+"""Networks: trained in torch, exported as ONNX files that take raw features, prepare them in the graph and give scores.
 
 The graph is written node by node, so what a search runs is what stands here, and torch's exporter is not needed.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -21,19 +22,17 @@ from profiles.files import SHARED, write_whole
 
 OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of the last years
 TRADE_OFFS = (1.0, 4.0, 16.0)  # of M6 against M2
-LEAST_RANGE = 1e-4  # features that differ less over a list are hardly told apart: a share of 1e-4 is no reason
-SMALLEST_SPREAD = 1e-6  # an input that spreads less over all lists is the same everywhere
+LEAST_RANGE = 1e-4  # added to a feature's range: a share of 1e-4 of the model is no difference to go by
+SMALLEST_SPREAD = 1e-6  # inputs with a smaller standard deviation count as constant
 
 
-class Network(torch.nn.Module):
-    """Dense layers with ReLU between them, and a line beside them where there is one; those below prepare the inputs."""
-
-    line: torch.nn.Linear | None
+class Network(torch.nn.Module, ABC):
+    """Dense layers with ReLU between them, and a linear term beside them where there is one; subclasses prepare the inputs."""
 
     def __init__(self, inputs: int, hidden: Sequence[int]) -> None:
         super().__init__()
         self.layers = torch.nn.ModuleList(torch.nn.Linear(*pair) for pair in pairwise((inputs, *hidden, 1)))
-        self.line = None
+        self.line: torch.nn.Linear | None = None
 
     def prepare(self, features: torch.Tensor, present: torch.Tensor) -> None:
         """Set what depends on the training lists; nothing by default."""
@@ -46,13 +45,13 @@ class Network(torch.nn.Module):
         scores: torch.Tensor = self.layers[-1](rows)
         return (scores if self.line is None else scores + self.line(inputs)).squeeze(-1)
 
+    @abstractmethod
     def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
         """(L, n, inputs) what the layers take."""
-        raise NotImplementedError
 
+    @abstractmethod
     def inputs_in(self, graph: "Graph") -> str:
         """The (n, inputs) value of a graph that the layers take."""
-        raise NotImplementedError
 
 
 class PaperNetwork(Network):

@@ -323,7 +323,7 @@ def test_a_page_without_a_workbench_says_so_and_above_all_that_a_stop_has_not_ar
     browser.value("$('emergency').click()")
     counting = "WebSocket = class extends WebSocket { constructor(at) { super(at); tries++; } }"
     browser.value(f"window.tries = 0; {counting}")
-    browser.wait("tries >= 3")  # each time the line is told to be lost
+    browser.wait("tries >= 3")  # each attempt reports the line as lost
     assert browser.value("$('stop-words').checkVisibility() && $('stop-words').textContent").startswith(
         "THE STOP HAS NOT ARRIVED"
     )

@@ -132,8 +132,8 @@ def test_a_campaign_that_is_started_again_runs_what_is_missing(tmp_path: Path, m
 
 @pytest.mark.slow
 def test_faults_planted_into_a_print_of_one_part_are_found_where_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = ("a layer missing", "no fans", "a speed of 0", "a part shifted by 0.5 mm")
-    monkeypatch.setattr("tools.campaign_planted.FAULTS", [*(f for f in FAULTS if f.name in told), *FAULTS[::6]])
+    named = ("a layer missing", "no fans", "a speed of 0", "a part shifted by 0.5 mm")
+    monkeypatch.setattr("tools.campaign_planted.FAULTS", [*(f for f in FAULTS if f.name in named), *FAULTS[::6]])
     record = plant_all(Run("forms", "voids-006", "voids-006"), Limits())
     assert record is not None
     results = record["results"]
