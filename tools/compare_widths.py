@@ -212,7 +212,13 @@ def read(path: Path) -> list[Row]:
     kinds: dict[str, Callable[[str], Any]] = get_type_hints(Row)
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.DictReader(file))
+            reader = csv.DictReader(file)
+            absent = [
+                field.name for field in fields(Row) if field.name != "ranker" and field.name not in (reader.fieldnames or ())
+            ]
+            lines = list(reader)
+        if absent and lines:
+            raise LearningError(f"table {path}: has no column {', '.join(absent)}; this command did not write it")
         return [Row(**{key: kinds[key](value) for key, value in line.items() if key in kinds}) for line in lines]
     except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
         raise LearningError(f"table {path}: cannot be read ({error})") from None

@@ -5,6 +5,7 @@ as a share of what printing straight up leaves risky; where seams and stairs cos
 """
 
 import csv
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -61,15 +62,12 @@ class Comparison:
 
 
 def read_searches(table: Path) -> list[Search]:
-    """The searches that did not fail, of models with a risky face; LearningError for a file that is no such table.
-
-    A table without the column `ranker` is of the classic one.
-    """
+    """The searches that did not fail, of models with a risky face; LearningError for a file that is no such table."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
+            missing = [name for name in NEEDED if name not in (reader.fieldnames or ())]
             rows = list(reader)
-        missing = [name for name in NEEDED if name not in (reader.fieldnames or ())]
         if missing:
             raise LearningError(f"table {table}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
         return [_search(row) for row in rows if not row.get("error") and float(row.get("risky_mm2") or 1.0) > 0.0]
@@ -78,6 +76,8 @@ def read_searches(table: Path) -> list[Search]:
 
 
 def _search(row: dict[str, str]) -> Search:
+    if None in row or None in row.values():
+        raise ValueError(f"the line of {row['mesh']} has not as many values as there are columns")
     numbers = int(row["width"]), float(row["share"]), float(row["core_s"])
     if not all(map(isfinite, numbers)):
         raise ValueError(f"{row['mesh']}, width {row['width']}: share is {row['share']}, core_s {row['core_s']}")
@@ -101,7 +101,8 @@ def compare(searches: Sequence[Search], least_removed: float = 0.0) -> list[Comp
 def _comparison(method: tuple[str, str], searches: Sequence[Search], least_removed: float) -> Comparison:
     known = {(search.ranker, search.width, search.mesh): search for search in searches}
     if len(known) < len(searches):
-        raise LearningError("a model was searched twice at one width by rankers of one name: give their files different names")
+        (ranker, width, mesh), _ = Counter((search.ranker, search.width, search.mesh) for search in searches).most_common(1)[0]
+        raise LearningError(f"{mesh} was searched twice with {ranker} at width {width}: rankers need files of different names")
     kinds = sorted({(search.ranker, search.width) for search in searches}, key=lambda kind: (kind[0] != CLASSIC, *kind))
     models = [mesh for mesh in sorted({search.mesh for search in searches}) if all((*kind, mesh) in known for kind in kinds)]
     widest = max((width for ranker, width in kinds if ranker == CLASSIC), default=None)

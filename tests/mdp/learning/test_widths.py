@@ -90,3 +90,11 @@ def test_a_file_that_is_no_table_of_searches_is_refused(tmp_path: Path) -> None:
             read_searches(file)
     file.write_text(f"{HEAD}\n")
     assert not read_searches(file)
+    file.write_text("")
+    with pytest.raises(LearningError, match="has no column mesh, settings"):
+        read_searches(file)
+
+
+def test_a_model_that_one_ranker_searched_twice_is_named() -> None:
+    with pytest.raises(LearningError, match="a was searched twice with learned at width 2"):
+        compare([search("a", "learned", 2, 0.5), search("a", "learned", 1, 0.5), search("a", "learned", 2, 0.4)])
