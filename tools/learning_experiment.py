@@ -47,7 +47,13 @@ def main() -> None:
 
 
 def _run(*arguments: str) -> None:
-    subprocess.run([sys.executable, *arguments], cwd=ROOT, check=True)
+    """Run a command that says itself what is wrong, and end as it does."""
+    try:
+        ended = subprocess.run([sys.executable, *arguments], cwd=ROOT).returncode
+    except KeyboardInterrupt:
+        sys.exit(130)
+    if ended:
+        sys.exit(ended)
 
 
 def _collect(options: argparse.Namespace) -> None:

@@ -75,7 +75,7 @@ def fit_tuned_trees(objective: str) -> Fit:
 
         settings = {**TUNED, "objective": objective, "eval_metric": f"ndcg@{FITTED_AT}"}
         train, stop = (_rows(lists, columns, _scaled_and_raw) for lists in (training, validation))
-        stopping = xgboost.callback.EarlyStopping(TUNED_PATIENCE, save_best=True)
+        stopping = xgboost.callback.EarlyStopping(rounds=TUNED_PATIENCE, save_best=True)
         booster = xgboost.train(
             settings, train, num_boost_round=TUNED_ROUNDS, evals=[(stop, "validation")], callbacks=[stopping], verbose_eval=False
         )

@@ -35,7 +35,7 @@ def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str
         sys.stderr.write(f"error: {error}\n")
         return 1
     except ModuleNotFoundError as error:
-        sys.stderr.write(f"error: {error.name} is not installed: pip install 'tiltprint[train]'\n")
+        sys.stderr.write(f"error: {error.name} is not installed; in a clone: pip install -e '.[train]'\n")
         return 1
     except KeyboardInterrupt:
         sys.stderr.write(f"interrupted; {interrupted}\n")

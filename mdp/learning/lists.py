@@ -85,12 +85,12 @@ def read_lists(
     Raises LearningError for a folder without records of each of the terms, and for a record of another version, without one of
     the columns, of a model that the manifest does not know, or with a feature that is no finite number.
     """
-    files: list[Path] = []
-    for pattern in [f"*.{name}.npz" for name in dict.fromkeys(terms)] or ["*.npz"]:
-        some = list(folder.glob(pattern))
+    known, files = list(folder.glob("*.npz")), set[Path]()
+    for ending in [f".{name}.npz" for name in terms] or [".npz"]:
+        some = [file for file in known if file.name.endswith(ending)]
         if not some:
-            raise LearningError(f"folder {folder}: holds no record ({pattern}); python -m mdp.learning.collect makes them")
-        files += some
+            raise LearningError(f"folder {folder}: holds no record (*{ending}); python -m mdp.learning.collect makes them")
+        files.update(some)
     sources = None if manifest is None else read_sources(manifest)
     lists: list[RatedList] = []
     for file in sorted(files):

@@ -18,6 +18,7 @@ from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, 
 from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists
 from mdp.learning.ndcg import NDCGS, Scores, as_searched
 from mdp.learning.sources import Side
+from profiles.errors import LearningError
 
 if TYPE_CHECKING:
     from mdp.learning.networks import Network
@@ -51,6 +52,7 @@ def train(arguments: Sequence[str] | None) -> None:
         "kind": options.loss,
         "data_set": f"{options.folder.resolve().name}: {counts(teach)}",
         "commit": commit(),
+        "split": f"fold {options.fold}, share {options.share:g}, seed {options.seed}",
         "figures": json.dumps(judged(as_searched(scores(networks, columns)), [rated for rated in judge if rated.teaches])),
     }
     write(options.output, export(networks, columns, about))
@@ -93,16 +95,12 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, metavar="N")
     parser.add_argument("--share", type=float, default=1.0, metavar="S", help="share of the training models that is used")
     options = parser.parse_args(arguments)
-    for name, least, most in (
-        ("epochs", 1, 1e6),
-        ("patience", 1, 1e6),
-        ("batch", 1, 1e5),
-        ("rate", 0.0, 10.0),
-        ("seed", 0, 1e9),
-        ("share", 0.01, 1.0),
-    ):
+    for name, most in {"epochs": 1e6, "patience": 1e6, "batch": 1e5, "ensemble": MOST_NETWORKS}.items():
+        check_range(options, name, 1, most)
+    for name, least, most in (("rate", 1e-9, 10.0), ("seed", 0, 1e9), ("share", 0.01, 1.0)):
         check_range(options, name, least, most)
-    check_range(options, "ensemble", 1, MOST_NETWORKS)
+    if options.output.is_dir() or not options.output.parent.is_dir():
+        raise LearningError(f"ranker {options.output}: cannot be written; a file in a folder that exists is needed")
     return options
 
 

@@ -60,7 +60,7 @@ def train(
 ) -> Figures:
     """Train a network in place on the named features of lists for training and for validation; the best figures.
 
-    Lists with a single rating are left out. Raises LearningError if no others remain.
+    Lists of one candidate are left out. Raises LearningError if no others remain.
     """
     torch.set_num_threads(1)
     training, validation = ([rated for rated in side if rated.teaches] for side in lists)

@@ -10,7 +10,7 @@ from profiles.errors import LearningError
     ("wrong", "code", "sentence"),
     [
         (LearningError("record a: is torn"), 1, "error: record a: is torn\n"),
-        (ModuleNotFoundError("no", name="torch"), 1, "error: torch is not installed: pip install 'tiltprint[train]'\n"),
+        (ModuleNotFoundError("no", name="torch"), 1, "error: torch is not installed; in a clone: pip install -e '.[train]'\n"),
         (KeyboardInterrupt(), 130, "interrupted; begin anew\n"),
     ],
 )

@@ -105,5 +105,7 @@ def test_a_folder_without_records_and_an_unknown_baseline_are_told(
     _needs(*EXTRA)
     assert train.main([str(tmp_path), "-o", str(tmp_path / "a.onnx")]) == 1
     assert "holds no record" in capsys.readouterr().err
+    assert train.main([str(records), "-o", str(tmp_path / "nowhere" / "a.onnx")]) == 1
+    assert "cannot be written; a file in a folder that exists is needed" in capsys.readouterr().err
     assert evaluate.main([str(records), "--without", "luck"]) == 1
     assert "--without luck: is no baseline" in capsys.readouterr().err

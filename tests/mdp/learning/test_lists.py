@@ -32,6 +32,8 @@ def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
     assert [entry.model for entry in read_lists(tmp_path, terms=("paper",))] == ["a", "b"]
     with pytest.raises(LearningError, match=r"holds no record \(\*\.yours\.npz\)"):
         read_lists(tmp_path, terms=("paper", "yours"))
+    with pytest.raises(LearningError, match=r"holds no record \(\*\.\*\*\.npz\)"):
+        read_lists(tmp_path, terms=("**",))
 
 
 def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
