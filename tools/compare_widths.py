@@ -94,6 +94,8 @@ def _main(arguments: Sequence[str] | None) -> None:
     options = parser.parse_args(arguments)
     check_range(options, "least_removed", 0.0, 1.0)
     check_range(options, "every", 1)
+    check_range(options, "faces", 4)
+    check_range(options, "limit", 1)
     if not options.summary:
         if options.folder is None or not options.folder.is_dir():
             parser.error(f"FOLDER is {options.folder}: a folder of npz files is needed")
@@ -119,7 +121,7 @@ def _search_models(options: argparse.Namespace) -> None:
             writer.writeheader()
         for path in _models(options):
             kinds = product(options.methods.split(","), options.widths, options.rankers.split(","))
-            wanted = [(path.stem, " ".join(settings), *kind) for kind in kinds]
+            wanted = list(dict.fromkeys((path.stem, " ".join(settings), *kind) for kind in kinds))
             for row in rows(path, [key for key in wanted if key not in done], options.limit, options.faces):
                 writer.writerow(asdict(row))
                 file.flush()

@@ -26,7 +26,7 @@ RANKERS = {  # and how each is trained
     "regret": ("--loss", "regret", "--ensemble", "6", "--columns", "paper"),
     "regret_cheap": ("--loss", "regret", "--ensemble", "6"),
 }
-SEARCHES = ("--methods", "published", "--paper-terms", "--faces", "2500")
+SEARCHES = ("--methods", "published", "--paper-terms", "--faces", "2500", "--set", "search.time_limit_s=120")
 
 
 def main() -> None:

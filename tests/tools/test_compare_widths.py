@@ -15,7 +15,7 @@ def test_a_run_writes_one_line_a_search_and_goes_on_where_it_stopped(tmp_path: P
     main([*words, "1"])
     once = out.read_text()
     capsys.readouterr()
-    main([*words, "1,2"])
+    main([*words, "1,2,2"])
     assert "2 of 4 searches failed\n- open, best, width 1: MeshError" in capsys.readouterr().out
     assert out.read_text().startswith(once)
     assert [(row.mesh, row.width, row.error[:9]) for row in read(out)] == [
@@ -43,6 +43,7 @@ def test_a_summary_of_no_table_of_searches_ends_with_a_sentence(tmp_path: Path, 
     [
         (("--widths", "a"), "'a': whole numbers between commas are allowed"),
         (("--every", "0"), "--every is 0: 1 or more is allowed"),
+        (("--faces", "0"), "--faces is 0: 4 or more is allowed"),
         (("--out", "nowhere/out.csv"), "table nowhere/out.csv: cannot be written (No such file or directory)"),
     ],
 )
