@@ -19,8 +19,7 @@ from slicer.geometry.polygons import Polygons, offset, offset_round, union
 from slicer.heights import Heights
 from slicer.paths import ON_PLATE_MM, Layer
 from slicer.strokes.order import order_beads
-from slicer.strokes.speed import first_layer_speeds, rising_fan
-from slicer.strokes.timed import layer_of, timed
+from slicer.strokes.speed import first_layer_speeds, layer_of, rising_fan, timed
 from slicer.support.beads import beads_around, support_beads
 from slicer.support.support import Supports
 

@@ -1,8 +1,8 @@
 """Slicing: the parts of a decomposition become layers of paths, each in its own frame.
 
 Each value is made from the one before: a part's sections (slicer.sectioning), what of them overhangs (slicer.overhangs), the
-support that this needs (slicer.support.support; for all parts together slicer.support.handed_down), the shells of every
-layer and its beads (slicer.shells), and these in order, with speed and flow (slicer.strokes).
+support that this needs (slicer.support), the shells of every layer and its beads (slicer.shells), and these in order, with speed
+and flow (slicer.strokes).
 
 First the support of all parts is planned together, for what one part's support stands on may be printed with another. From
 then on a part's paths depend on nothing but the plan and the profile, so the result is the same bit for bit however many
@@ -22,7 +22,6 @@ from mdp.decomposition import Part
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Floats
 from profiles.errors import SliceError
-from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
 from slicer.fill.ends import CARRYING, Plastic, cut_anchors, hold_ends, plastic_of
@@ -38,9 +37,8 @@ from slicer.shells import FEWEST_LAYERS, Shells, build_shells, interface_mm3, la
 from slicer.strokes.order import order_beads
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import plan_seams, rear_of, seam_limits
-from slicer.strokes.speed import first_layer_speeds, kinds_apart, rising_fan
-from slicer.strokes.strokes import Strokes, split, split_overhangs, split_places
-from slicer.strokes.timed import layer_of, timed
+from slicer.strokes.speed import first_layer_speeds, kinds_apart, layer_of, rising_fan, timed
+from slicer.strokes.strokes import Strokes, split, split_overhangs
 from slicer.strokes.vase import vase_layers
 from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, explain, own_supports
@@ -196,9 +194,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         turns = vase_layers(sections, supports.areas, usual, tip)
         layers += turns
         bare, last = [*range(usual + len(turns), count)], count
-    _check_not_empty(sections, layers)
-    if sections.on_platform and process.walls:
-        _check_on_plate(sections.part, layers, process)
+    _check_printed(sections, layers)
     too_thin = [i for i in bare if i < last]
     layers = [*raft, *layers]
     return SlicedPart(
@@ -230,20 +226,18 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     elif index < process.interface_layers:
         fan = process.interface_fan if index else process.interface_first_layer_fan
         add_c = process.interface_temperature_add_c
-    at = {"z_mm": float(heights.tip_mm[index]), "height_mm": float(heights.height_mm[index])}
-    return layer_of(strokes, speeds, profile, **at, flow=flow, fan=fan, add_c=add_c, skin=skin)
+    z_mm, height_mm = float(heights.tip_mm[index]), float(heights.height_mm[index])
+    return layer_of(strokes, speeds, profile, z_mm=z_mm, height_mm=height_mm, flow=flow, fan=fan, add_c=add_c, skin=skin)
 
 
 def order_layer(
     beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons
 ) -> tuple[Strokes, Floats, float]:
-    """The beads of a layer in order, with their (k,) speeds and the flow of all of them.
-
-    tip: where the layer below ends; skin: its outer walls beside the edges of interfaces.
-    """
+    """The beads of a layer in order, with their (k,) speeds and the flow of all of them. tip: where the layer below ends; skin:
+    its outer walls beside the edges of interfaces."""
     sections, own, height_mm = shells.sections, shells.layers[index].process, float(shells.sections.heights.height_mm[index])
-    profile, process, on_platform, outline = sections.profile, sections.process, sections.on_platform, sections.outlines[index]
-    if index == 0 and not on_platform:
+    profile, process, outline = sections.profile, sections.process, sections.outlines[index]
+    if index == 0 and not sections.on_platform:
         beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
     first_flow, kind_mm_s = (1.0, None) if index else _first_layer(sections)
     strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin, kind_mm_s)
@@ -251,13 +245,17 @@ def order_layer(
     if below is not None and own.fuzzy_skin != "none":
         below = offset(below, own.fuzzy_skin_thickness_mm)  # rough walls lie on rough walls
     strokes = split_overhangs(strokes, outline, below, own, shells.supports.right_under(index))
-    if index == 0 and not on_platform and process.interlock == "grooves":
-        strokes = fill_grooves(strokes, sections.grooves, process, height_mm)
+    if index == 0 and not sections.grooves.is_empty():
+        strokes, within = split(strokes, sections.grooves, strokes.is_of(*SKINS), process.line_width_mm)
+        richer = 1.0 + process.interlock_mm / height_mm  # by what the grooves hold
+        strokes = replace(strokes, flow=np.where(within, strokes.flow * richer, strokes.flow))
     places = sections.speed_places if index else []  # first layers have speeds of their own
     of_places = [place.over(process) for place in places]
-    if places:
-        areas = [place.areas[index] for place in places]
-        strokes = split_places(strokes, areas, kinds_apart([process, *of_places]), process.line_width_mm)
+    kinds = kinds_apart([process, *of_places])
+    for number, place in enumerate(places, start=1):
+        if kinds and not place.areas[index].is_empty():
+            strokes, within = split(strokes, place.areas[index], strokes.is_of(*kinds), process.line_width_mm)
+            strokes = replace(strokes, place=np.where(within, number, strokes.place).astype(np.int16))
     flow = profile.material.flow * first_flow
     return *timed(strokes, profile, height_mm, kind_mm_s, flow, of_places), flow
 
@@ -302,16 +300,8 @@ def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
     return inside
 
 
-def fill_grooves(strokes: Strokes, area: Polygons, process: Process, height_mm: float) -> Strokes:
-    """The first layer's strokes of a part on plastic, richer over the area of its grooves by what they hold."""
-    if area.is_empty():
-        return strokes
-    richer = 1.0 + process.interlock_mm / height_mm
-    strokes, within = split(strokes, area, strokes.is_of(*SKINS), process.line_width_mm)
-    return replace(strokes, flow=np.where(within, strokes.flow * richer, strokes.flow))
-
-
-def _check_not_empty(sections: Sections, layers: Sequence[Layer]) -> None:
+def _check_printed(sections: Sections, layers: Sequence[Layer]) -> None:
+    """Raises SliceError for a part that gives no bead at all, or would begin in air over the plate."""
     part, process = sections.part, sections.process
     if all(layer.is_of(Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE).all() for layer in layers):
         low, high = sections.mesh.bounds_mm
@@ -326,11 +316,8 @@ def _check_not_empty(sections: Sections, layers: Sequence[Layer]) -> None:
             f"than half of process.line_width_mm ({0.5 * process.line_width_mm:g} mm is the least): "
             "a larger process.scale or a finer nozzle prints it"
         )
-
-
-def _check_on_plate(part: Part, layers: Sequence[Layer], process: Process) -> None:
     first = next(layer for layer in layers if not layer.is_of(Kind.SKIRT).all())
-    if first.z_mm - first.height_mm > ON_PLATE_MM:
+    if sections.on_platform and process.walls and first.z_mm - first.height_mm > ON_PLATE_MM:
         support = "" if process.support == "auto" else ", or process.support = auto"
         raise SliceError(
             f"part {part.index} would begin in air, {first.z_mm - first.height_mm:.2f} mm above the plate: what lies below is "

@@ -1,45 +1,60 @@
 """Estimate: print time and filament of parts from a few of their layers, sliced as for a print.
 
-Sections and overhangs are those of the print, support grows in thick layers, and each layer has a rough length of lines. The
-layers are divided into runs of about equal rough time. Two neighbouring layers of each run are sliced by the slicer's own code
-and timed with the machine's acceleration; the whole run differs from its rough figures by the same factor. Seams lie where the
-layer alone would have them. The estimate is for choosing between decompositions; the dry run has the exact figures.
+Sections and overhangs are those of the print. Support grows in thick layers by the rules of the real ones: what hangs in any of
+the layers that a thick one stands for hangs in it, so small places that hang are not lost between two sections, and what carries
+itself is known from the real layers. Each layer has a rough length of lines, from sums over the mesh and areas of support.
+
+The layers are divided into runs of about equal rough time. Two neighbouring layers of each run are sliced by the slicer's own
+code and timed with the machine's acceleration; the whole run differs from its rough figures by the same factor. Seams lie where
+the layer alone would have them. The estimate is for choosing between decompositions; the dry run has the exact figures.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, replace
+from math import pi, sqrt
 
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.mesh import Floats, Indices
+from mdp.kernels.arrays import floats, table
+from mdp.kernels.kernel import kernel, no_nrt
+from mdp.kernels.sorting import rank
+from mdp.mesh import Floats, Indices, Ints
+from mdp.overhang import Mask
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import INTERFACE_WIDTH, spacing_mm
-from slicer.estimate.duration import strokes_s
-from slicer.estimate.hanging import rough_supports, support_lengths_mm
-from slicer.estimate.rough import choose_layers, rough_lengths_mm
-from slicer.geometry.polygons import Polygons
+from slicer.estimate.timing import TINY, Speeds, line_s, move_times, speeds_of
+from slicer.geometry.polygons import Polygons, edges, union
 from slicer.geometry.polyline import lengths_mm
-from slicer.overhangs import Overhang, find_overhangs
+from slicer.heights import Heights, shell_layers
+from slicer.modifiers import combined
+from slicer.overhangs import LEAST_MM2, Overhang, find_overhangs
 from slicer.paths import bead_area_mm2
 from slicer.raft import raft_layers
-from slicer.sectioning import section_parts
+from slicer.sectioning import Sections, section_parts
 from slicer.shells import Shells, build_shells, lay_beads
 from slicer.slice import order_layer
 from slicer.strokes.order import SUPPORTS
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import NO_LIMITS, rear_of
-from slicer.support.support import Supports
+from slicer.strokes.speed import stroke_accelerations
+from slicer.strokes.strokes import Strokes
+from slicer.strokes.travels import STANDING_MM
+from slicer.support.handed_down import plan_supports, up_to
+from slicer.support.support import Supports, own_supports, wanted_places
 
 SAMPLES = 12  # pairs of neighbouring layers of a print that are sliced: they miss 2 % (rms of 80 prints), 8 pairs 3 %
 FEWEST = 8  # pairs of a part
 RUN = 15  # layers a pair stands for, at least: with more of them a small print would take as long as slicing all of it
+STEP = 3  # layers that a thick one stands for: growing support from so few takes a third of the time
+FEW = 40  # layers up to the highest place that hangs whose support is grown as it is
 WAY_S = 0.3  # to a layer and to each of its outlines
 SLOWER = 1.4  # strokes with their accelerations and travels than their lengths at their speeds
-TINY_MM3 = 1e-6
+TINY_MM2, TINY_MM3 = 1e-9, 1e-6
 TURN_S = 2.0  # of the table before a part
+# A wipe turns in its middle by 45 deg, as over the small rings after which most are: mm along each axis for a mm of all of it.
+TURNED = 0.5 / sqrt(2.0)
 
 
 @dataclass(frozen=True)
@@ -50,9 +65,6 @@ class Estimate:
     filament_mm: float
     support_mm3: float
 
-    def __add__(self, other: "Estimate") -> "Estimate":
-        return Estimate(self.time_s + other.time_s, self.filament_mm + other.filament_mm, self.support_mm3 + other.support_mm3)
-
 
 def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
     """What printing one part, or several one after the other, takes.
@@ -60,18 +72,17 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
     The same on every machine. Raises SliceError where a part's mesh is not closed or it is too high to be meant.
     """
     several = (parts,) if isinstance(parts, Part) else tuple(parts)
-    total = Estimate(0.0, 0.0, 0.0)
-    sections = section_parts(several, profile)
+    total, sections = np.zeros(3), section_parts(several, profile)
     overhangs = [find_overhangs(layers) for layers in sections]
-    for supports, hanging in zip(rough_supports(sections, overhangs), overhangs, strict=True):
+    for supports, hanging in zip(_rough_supports(sections, overhangs), overhangs, strict=True):
         samples = min(SAMPLES // len(several), len(supports.areas) // RUN)
-        total += _estimate_part(supports, hanging, max(FEWEST, samples))
-    return total
+        total += _of_part(supports, hanging, max(FEWEST, samples))
+    return Estimate(*total.tolist())
 
 
-def _estimate_part(supports: Supports, overhangs: Sequence[Overhang], samples: int) -> Estimate:
-    """A part, the turn of the table before it and the wait for its heat."""
-    sections, profile, on_platform = supports.sections, supports.sections.profile, supports.sections.on_platform
+def _of_part(supports: Supports, overhangs: Sequence[Overhang], samples: int) -> Floats:
+    """(3,) seconds, mm of filament and mm3 of support of a part, and of the turn of the table and the wait for heat before it."""
+    sections, profile = supports.sections, supports.sections.profile
     process, filament_mm2 = profile.process, 0.25 * pi * profile.material.diameter_mm**2
     drawn_mm, held_mm = rough_lengths_mm(sections), support_lengths_mm(supports)
     bead_mm2 = spacing_mm(process.line_width_mm, process.layer_height_mm) * sections.heights.height_mm
@@ -81,34 +92,63 @@ def _estimate_part(supports: Supports, overhangs: Sequence[Overhang], samples: i
     real = _sliced_layers(build_shells(supports, overhangs, layers.tolist()), layers)
     own_mm3, support_mm3 = drawn_mm.sum(axis=1) * bead_mm2 + TINY_MM3, held_mm.sum(axis=1) * bead_mm2
     time_s = float(_weights(rough_s, layers, begins) @ real[:, 0])
-    own_mm3 = float(_weights(own_mm3, layers, begins) @ (real[:, 1] - real[:, 2]))
-    support_mm3 = _support_mm3(support_mm3, real[:, 2], layers, _weights(np.ones(len(rough_s)), layers, begins))
-    total = Estimate(time_s, (own_mm3 + support_mm3) / filament_mm2, support_mm3)
-    if on_platform:
-        return total + _purged(profile) + _raft(supports)
-    heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
-    return total + Estimate(TURN_S + heating_s, profile.material.prime_extra_mm, 0.0)
+    own = float(_weights(own_mm3, layers, begins) @ (real[:, 1] - real[:, 2]))
+    # Single layers may have no support, so the factor between rough and real figures is one for all layers over the first.
+    counts = _weights(np.ones(len(rough_s)), layers, begins)[1:]
+    known = float(counts @ support_mm3[layers[1:]])
+    factor = float(counts @ real[1:, 2]) / known if known > 0.0 else 1.0
+    support = float(real[0, 2] + factor * support_mm3[1:].sum())
+    total: Floats = np.array([time_s, (own + support) / filament_mm2, support])
+    if sections.on_platform:
+        total = total + _line_before(profile, filament_mm2) + _raft(supports, filament_mm2)
+    else:
+        heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
+        total = total + np.array([TURN_S + heating_s, profile.material.prime_extra_mm, 0.0])
+    return total
+
+
+def _rough_s(drawn_mm: Floats, outlines: Indices, process: Process) -> Floats:
+    """(n,) seconds of layers with (n, 5) mm of walls, skin, infill, support and dense support, and with (n,) outlines."""
+    kinds = ("inner_wall", "skin", "infill", "support", "support_interface")
+    speeds = np.array([getattr(process, f"{kind}_speed_mm_s") for kind in kinds])
+    least_s = np.minimum(process.least_layer_time_s, drawn_mm.sum(axis=1) / process.least_speed_mm_s)
+    rough_s: Floats = WAY_S * (1 + outlines) + np.maximum(SLOWER * drawn_mm @ (1.0 / speeds), least_s)
+    return rough_s
+
+
+def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
+    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, then runs of equal weight.
+
+    The difference of a layer's weight from that of the next one counts, too, so that runs are short where weights vary and begin
+    at large jumps. A run's samples are the two neighbours in its middle, whose lines have turned directions.
+    """
+    count = len(weight)
+    done = np.cumsum(weight[1:] + np.abs(np.diff(weight[1:], append=weight[-1:])))
+    cuts = np.searchsorted(done, done[-1] * np.arange(1, samples) / samples) + 2 if count > 1 else np.zeros(0, np.int64)
+    begins = np.unique(np.concatenate([[0, 1], cuts]))
+    begins = begins[begins < count]
+    ends, whole = np.append(begins[1:], count), np.concatenate([[0.0], np.cumsum(weight)])
+    middle = 0.5 * (whole[begins] + whole[ends])
+    upper = np.minimum(np.searchsorted(whole, middle, side="right") - 1, ends - 1)
+    return np.union1d(upper, np.maximum(upper - 1, begins)), begins
 
 
 def _sliced_layers(shells: Shells, layers: Indices) -> Floats:
     """(n, 3) seconds, mm3 and mm3 of support of each of some layers."""
-    sections, figures = shells.sections, []
+    sections, figures = shells.sections, np.zeros((len(layers), 3))
     rear = tip = rear_of(sections.mesh.bounds_mm)
-    for layer in layers.tolist():
+    for row, layer in zip(figures, layers.tolist(), strict=True):
         own, auxiliary = lay_beads(shells, layer)
-        beads, _ = place_seams(
-            [*own, *auxiliary], sections.process, Surroundings(rear, NO_SEAMS, tip, NO_LIMITS, layer, NO_SEAMS)
-        )
+        around = Surroundings(rear, NO_SEAMS, tip, NO_LIMITS, layer)
+        beads, _ = place_seams([*own, *auxiliary], sections.process, around)
         strokes, speeds, flow = order_layer([*beads, *shells.layers[layer].ending], shells, layer, tip, Polygons())
-        if not len(strokes):
-            figures.append((0.0, 0.0, 0.0))
-            continue
-        height_mm, first = float(sections.heights.height_mm[layer]), layer == 0 and sections.on_platform
-        mm3 = strokes.lengths_mm * bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
-        time_s = strokes_s(strokes, speeds, tip, sections.profile, first)
-        figures.append((time_s, float(mm3.sum()), float(mm3[strokes.is_of(*SUPPORTS)].sum())))
-        tip = strokes.points[-1, :2]
-    return np.array(figures)
+        if len(strokes):
+            height_mm, first = float(sections.heights.height_mm[layer]), layer == 0 and sections.on_platform
+            mm3 = strokes.lengths_mm * bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
+            time_s = strokes_s(strokes, speeds, tip, sections.profile, first)
+            row[:] = time_s, mm3.sum(), mm3[strokes.is_of(*SUPPORTS)].sum()
+            tip = strokes.points[-1, :2]
+    return figures
 
 
 def _weights(rough: Floats, layers: Indices, begins: Indices) -> Floats:
@@ -118,40 +158,234 @@ def _weights(rough: Floats, layers: Indices, begins: Indices) -> Floats:
     return weights
 
 
-def _support_mm3(rough: Floats, real: Floats, layers: Indices, counts: Floats) -> float:
-    """Support of all layers, mm3, from what the sampled ones have, each weighted by its count.
-
-    Single layers may have none, so the factor between rough and real figures is one for all layers over the first.
-    """
-    known = float(counts[1:] @ rough[layers[1:]])
-    factor = float(counts[1:] @ real[1:]) / known if known > 0.0 else 1.0
-    return float(real[0] + factor * rough[1:].sum())
-
-
-def _purged(profile: Profile) -> Estimate:
-    """The line before a print."""
-    process, material, length_mm = profile.process, profile.material, profile.machine.purge_mm
-    mm3 = length_mm * bead_area_mm2(INTERFACE_WIDTH * process.line_width_mm, process.first_layer_height_mm) * material.flow
-    return Estimate(length_mm / process.first_layer_speed_mm_s, mm3 / (0.25 * pi * material.diameter_mm**2), 0.0)
+def _line_before(profile: Profile, filament_mm2: float) -> Floats:
+    """(3,) figures of the line before a print."""
+    process, length_mm = profile.process, profile.machine.purge_mm
+    bead_mm2 = bead_area_mm2(INTERFACE_WIDTH * process.line_width_mm, process.first_layer_height_mm)
+    return np.array(
+        [length_mm / process.first_layer_speed_mm_s, length_mm * bead_mm2 * profile.material.flow / filament_mm2, 0.0]
+    )
 
 
-def _raft(supports: Supports) -> Estimate:
-    """The raft under a part, if it has one; all of it counts as support."""
-    layers, profile = raft_layers(supports), supports.sections.profile
+def _raft(supports: Supports, filament_mm2: float) -> Floats:
+    """(3,) figures of the raft under a part, if it has one; all of it counts as support."""
+    layers = raft_layers(supports)
     mm3 = float(sum(layer.volumes_mm3.sum() for layer in layers))
     time_s = float(sum((lengths_mm(layer.points, layer.starts) / layer.speed_mm_s).sum() for layer in layers))
-    return Estimate(SLOWER * time_s + WAY_S * len(layers), mm3 / (0.25 * pi * profile.material.diameter_mm**2), mm3)
+    return np.array([SLOWER * time_s + WAY_S * len(layers), mm3 / filament_mm2, mm3])
 
 
-def _rough_s(drawn_mm: Floats, outlines: Indices, process: Process) -> Floats:
-    """(n,) seconds of layers with (n, 5) mm of walls, skin, infill, support and dense support, and with (n,) outlines."""
-    speeds = (
-        process.inner_wall_speed_mm_s,
-        process.skin_speed_mm_s,
-        process.infill_speed_mm_s,
-        process.support_speed_mm_s,
-        process.support_interface_speed_mm_s,
+def _rough_supports(sections: Sequence[Sections], overhangs: Sequence[Sequence[Overhang]]) -> list[Supports]:
+    """The support of all parts of a print, in print order: of every layer that of the thick one it belongs to."""
+    wanted = [wanted_places(*pair) for pair in zip(sections, overhangs, strict=True)]
+    tops = [max((k + 1 for k, area in enumerate(places) if not area.is_empty()), default=0) for places in wanted]
+    thick = []
+    for k, (layers, hanging) in enumerate(zip(sections, overhangs, strict=True)):
+        top = len(layers.outlines) if any(tops[k + 1 :]) else tops[k]  # a later part's support may be printed with this one
+        thick.append(own_supports(layers, hanging) if top < FEW else _grown(layers, wanted[k]))
+    return [_of_layers(*pair) for pair in zip(sections, plan_supports(thick), strict=True)]
+
+
+def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
+    """The support that a part has of its own, in thick layers; the first layer stands for itself."""
+    process, heights = sections.process, sections.heights
+    begins = np.array([0, *range(1, len(heights.tip_mm), STEP)])
+    ends = np.append(begins[1:], len(heights.tip_mm))
+    middles = (begins + ends - 1) // 2
+    # Hanging places lie anywhere in a thick layer, and support ends below it: the gaps are lost in that.
+    coarse = {
+        "support": "auto",  # the wanted places are chosen already
+        "support_interface_layers": -(-process.support_interface_layers // STEP),
+        "support_bottom_interface_layers": -(-process.support_bottom_interface_layers // STEP),
+        "support_gap_mm": 0.0,
+        "support_bottom_gap_mm": 0.0,
+    }
+
+    def of_middles(places: Sequence[Polygons]) -> list[Polygons]:
+        return [places[k] for k in middles.tolist()] if places else []
+
+    thick = replace(
+        sections,
+        profile=sections.profile.model_copy(update={"process": process.model_copy(update=coarse)}),
+        heights=Heights(heights.tip_mm[ends - 1], heights.tip_mm[ends - 1] - heights.bottom_mm[begins], heights.cut_mm[middles]),
+        outlines=of_middles(sections.outlines),
+        own=of_middles(sections.own),
+        ungrooved=of_middles(sections.ungrooved),
+        beside=of_middles(sections.beside),
+        above=(),
+        standing=of_middles(sections.standing),
+        no_support=of_middles(sections.no_support),
+        enforced=of_middles(sections.enforced),
+        places=(),
     )
-    least_s = np.minimum(process.least_layer_time_s, drawn_mm.sum(axis=1) / process.least_speed_mm_s)
-    rough_s: Floats = WAY_S * (1 + outlines) + np.maximum(SLOWER * drawn_mm @ (1.0 / np.array(speeds)), least_s)
-    return rough_s
+    hanging = [Overhang(union([area for area in wanted[a:b] if not area.is_empty()])) for a, b in zip(begins, ends, strict=True)]
+    return own_supports(thick, hanging)
+
+
+def _of_layers(sections: Sections, thick: Supports) -> Supports:
+    """The support of real layers from that of thick ones."""
+    tips_mm = thick.sections.heights.tip_mm
+    standing = [float(tips_mm[k]) for k, area in enumerate(thick.areas) if not area.is_empty()]
+    sections = up_to(sections, max(standing, default=0.0))
+    which = np.searchsorted(tips_mm, sections.heights.cut_mm).tolist()
+    areas, dense, hollow = ([[*places, Polygons()][k] for k in which] for places in (thick.areas, thick.dense, thick.hollow))
+    nothing = [Polygons()] * len(which)
+    return Supports(sections, areas, dense, hollow, nothing, nothing, nothing)
+
+
+def support_lengths_mm(supports: Supports) -> Floats:
+    """(n, 2) sparse and dense lines of the support of every layer of a part."""
+    sections, process = supports.sections, supports.sections.support_process
+    several = zip(supports.areas, supports.dense, supports.hollow, strict=True)
+    extents = [(whole.area(), dense.area(), (whole - hollow).area()) for whole, dense, hollow in several]
+    area, close, filled = np.array(extents).T
+    around = np.array([np.hypot(*(sides[:, 2:] - sides[:, :2]).T).sum() for sides in map(edges, supports.areas)])
+    spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
+    walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
+    if sections.on_platform:
+        density[0] = process.support_foot_density
+    inside = np.maximum(area - walls_mm * spacing, 0.0)
+    dense = np.minimum(close, inside)
+    sparse = (inside - dense) * filled / np.maximum(area, LEAST_MM2)
+    lengths_mm = np.column_stack([walls_mm + sparse * density / spacing, dense * process.support_interface_density / spacing])
+    if sections.on_raft:
+        lengths_mm[0] = 0.0  # what lies beside the first layer there is the raft's
+    return lengths_mm
+
+
+def rough_lengths_mm(sections: Sections) -> Floats:
+    """(n, 3) walls, skin and sparse infill of every layer of a part."""
+    mesh, process = sections.mesh, sections.process
+    (top, bottom), width = shell_layers(process), process.line_width_mm
+    area, around, over, under = _measure(mesh.vertices, mesh.faces, sections.heights.cut_mm)
+    if not sections.on_platform:
+        under[0] = 0.0
+    seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
+    bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]
+    spacing = spacing_mm(width, process.layer_height_mm)
+    walls, density = (_by_places(sections, key, float(getattr(process, key))) for key in ("walls", "infill_density"))
+    inside = np.maximum(area - walls * spacing * around, 0.0)
+    skin = np.where(inside < process.solid_below_mm2, inside, inside * np.minimum(bare / np.maximum(area, TINY_MM2), 1.0))
+    return np.column_stack([(area - inside) / spacing, skin / spacing, (inside - skin) * density / spacing])
+
+
+def _by_places(sections: Sections, key: str, usual: float) -> Floats:
+    """(n,) the mean over every layer of a value of the process that some places may have otherwise."""
+    values = np.full(len(sections.own), usual)
+    for place in combined(sections.places, [key]):
+        for layer, (area, section) in enumerate(zip(place.areas, sections.own, strict=True)):
+            if not area.is_empty() and not section.is_empty():
+                values[layer] += (section ^ area).area() / section.area() * (place.settings[key] - values[layer])
+    return values
+
+
+@kernel
+def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """(n,) area and outline of the sections, and the surface seen from above and from below that belongs to each layer."""
+    n = len(cuts)
+    area, around, over, under = floats(n, 0.0), floats(n, 0.0), floats(n, 0.0), floats(n, 0.0)
+    ends = floats(4, 0.0)
+    for f in range(len(faces)):
+        z0, z1, z2 = vertices[faces[f, 0], 2], vertices[faces[f, 1], 2], vertices[faces[f, 2], 2]
+        first, last = rank(cuts, min(z0, z1, z2), True), rank(cuts, max(z0, z1, z2), True) - 1
+        ax, ay = vertices[faces[f, 1], 0] - vertices[faces[f, 0], 0], vertices[faces[f, 1], 1] - vertices[faces[f, 0], 1]
+        bx, by = vertices[faces[f, 2], 0] - vertices[faces[f, 0], 0], vertices[faces[f, 2], 1] - vertices[faces[f, 0], 1]
+        shadow = 0.5 * (ax * by - ay * bx)
+        low, high = min(first, n - 1), max(min(last, n - 1), min(first, n - 1))
+        for layer in range(low, high + 1):
+            if shadow > 0.0:
+                over[max(first - 1, 0) if last < first else layer] += shadow / (high - low + 1)
+            else:
+                under[layer] -= shadow / (high - low + 1)
+        for layer in range(first, last + 1):
+            z = cuts[layer]
+            for k in range(3):
+                tail, head = faces[f, k], faces[f, (k + 1) % 3]
+                tz, hz = vertices[tail, 2], vertices[head, 2]
+                if (tz < z) != (hz < z):
+                    share = (z - hz) / (tz - hz)
+                    at = 0 if hz < z else 2  # the outline comes over the edge that goes down and leaves over the one that goes up
+                    ends[at] = vertices[head, 0] + share * (vertices[tail, 0] - vertices[head, 0])
+                    ends[at + 1] = vertices[head, 1] + share * (vertices[tail, 1] - vertices[head, 1])
+            area[layer] += 0.5 * (ends[0] * ends[3] - ends[1] * ends[2])
+            around[layer] += sqrt((ends[2] - ends[0]) ** 2 + (ends[3] - ends[1]) ** 2)
+    return area, around, over, under
+
+
+def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
+    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions.
+
+    tip: (2,) where the layer below ends.
+    """
+    machine, process, material, speeds = profile.machine, profile.process, profile.material, speeds_of(profile)
+    places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
+    bounds = speeds_mm_s, stroke_accelerations(profile, first_layer)[strokes.kind]
+    pulls = material.retract_mm > 0.0
+    wipe_mm = material.wipe_mm if pulls else 0.0
+    moves = _moves(places, tip, bounds, strokes.retract, speeds, (process.lift_mm, wipe_mm, material.retract_mm))
+    speed_mm_s, most_mm_s2, stands = np.ascontiguousarray(moves[:, 6:].T)
+    moving_s = move_times(moves[:, :6], speed_mm_s, stands > 0.0, machine, most_mm_s2).sum()
+    rise_s = line_s(process.layer_height_mm, speeds.lift_mm_s, machine.z.acceleration_mm_s2)
+    # The filament moves alone where a retraction ends, and where it begins without a wipe.
+    alone_mm = [material.retract_mm + material.retract_prime_extra_mm, *([] if wipe_mm > 0.0 else [material.retract_mm])]
+    ramp = machine.extruder_acceleration_mm_s2
+    standing_s = sum(line_s(length_mm, speeds.filament_mm_s, ramp) for length_mm in alone_mm) if pulls else 0.0
+    return float(moving_s + rise_s + int(strokes.retract.sum()) * standing_s)
+
+
+@kernel
+def _moves(
+    places: tuple[Floats, Indices, Floats, Indices],
+    tip: Floats,
+    bounds: tuple[Floats, Floats],
+    retract: Mask,
+    paces: Speeds,
+    far_mm: tuple[float, float, float],
+) -> Floats:
+    """(n, 9) straight moves of strokes one after the other with the travels to them: steps of X Y Z tilt turn E, speed, greatest
+    acceleration, and 1 where the machine stands still before. A travel that retracts wipes and lifts, and ends at a stand, where
+    the filament is primed. far_mm: of a lift, a wipe and the filament pulled back meanwhile."""
+    points, starts, approach, approach_starts = places
+    speeds, most = bounds
+    lift_mm, wipe_mm, pulled_mm = far_mm
+    wipe_mm_s = min(paces.travel_mm_s, wipe_mm * paces.filament_mm_s / max(pulled_mm, TINY))
+    moves, n = table(len(points) + len(approach) + 4 * len(speeds) + 1, 9), 0
+    x, y = tip[0], tip[1]
+    for k in range(len(speeds)):
+        first, stands = starts[k], retract[k] and wipe_mm <= 0.0
+        if retract[k]:
+            if n > 0:
+                begun = starts[k - 1]
+                apart = sqrt((x - points[begun, 0]) ** 2 + (y - points[begun, 1]) ** 2)
+                wipe = wipe_mm if apart <= points[begun, 2] else -wipe_mm  # on along a ring, back along a line
+                ux, uy, uz = moves[n - 1, 0], moves[n - 1, 1], moves[n - 1, 2]
+                length = sqrt(ux**2 + uy**2 + uz**2)
+                ux, uy, aside = ux / length, uy / length, TURNED * wipe
+                n = _add(moves, n, (0.5 * wipe * ux, 0.5 * wipe * uy, 0.0), wipe_mm_s, np.inf, False)
+                n = _add(moves, n, (aside * (ux - uy), aside * (ux + uy), 0.0), wipe_mm_s, np.inf, False)
+            n = _add(moves, n, (0.0, 0.0, lift_mm), paces.lift_mm_s, np.inf, stands)
+        for i in range(approach_starts[k], approach_starts[k + 1] + 1):
+            if i < approach_starts[k + 1]:
+                x1, y1 = approach[i, 0], approach[i, 1]
+            else:
+                x1, y1 = points[first, 0], points[first, 1]
+            stands = stands and i == approach_starts[k] and lift_mm <= STANDING_MM
+            n = _add(moves, n, (x1 - x, y1 - y, 0.0), paces.travel_mm_s, paces.acceleration_mm_s2, stands)
+            x, y = x1, y1
+        if retract[k]:
+            n = _add(moves, n, (0.0, 0.0, -lift_mm), paces.lift_mm_s, np.inf, False)
+        for i in range(first + 1, starts[k + 1]):
+            step = (points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1], 0.0)
+            n = _add(moves, n, step, speeds[k], most[k], retract[k] and i == first + 1)
+        x, y = points[starts[k + 1] - 1, 0], points[starts[k + 1] - 1, 1]
+    return moves[:n]
+
+
+@no_nrt
+def _add(moves: Floats, n: int, step: tuple[float, float, float], speed: float, most_mm_s2: float, stands: bool) -> int:
+    """Appends a move as row n; returns the new n."""
+    if sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2) <= STANDING_MM:
+        return n
+    moves[n, 0], moves[n, 1], moves[n, 2] = step
+    moves[n, 6], moves[n, 7], moves[n, 8] = speed, most_mm_s2, stands
+    return n + 1

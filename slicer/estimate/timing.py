@@ -33,8 +33,7 @@ class Speeds(NamedTuple):
 
 class Blocks(NamedTuple):
     """Moves as a planner takes them, (m,) each: direction (m, 6) of X Y Z tilt turn E, length, cruise speed, acceleration, by
-    what F measures it, and whether all before it must be over.
-    """
+    what F measures it, and whether all before it must be over."""
 
     direction: Floats
     length: Floats
@@ -114,9 +113,8 @@ def blocks_of(
 ) -> tuple[Blocks, NDArray[np.bool_]]:
     """The blocks of the moves that move anything, and (n,) which they are."""
     length, measure = lengths(deltas)
-    cruise, acceleration = _allowed(
-        np.ascontiguousarray(deltas), length, speed, axis_speeds(machine), axis_accelerations(machine)
-    )
+    limits = axis_speeds(machine), axis_accelerations(machine)
+    cruise, acceleration = _allowed(np.ascontiguousarray(deltas), length, speed, *limits)
     if most_mm_s2 is not None:
         acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
     moving = measure < 3

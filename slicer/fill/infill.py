@@ -20,16 +20,7 @@ from profiles.process import Process
 from profiles.settings.infill import Infill
 from slicer.bead import Bead, infill_cell_mm, spacing_mm, with_line_width
 from slicer.fill.lightning import clip_chains, lightning_lines
-from slicer.fill.lines import (
-    Box,
-    LinePattern,
-    Lines,
-    anchor_lines,
-    clip_pattern,
-    concentric_lines,
-    grid_numbers,
-    parallel_lines,
-)
+from slicer.fill.lines import Box, LinePattern, Lines, anchor_lines, clip_pattern, concentric_lines, grid_numbers, parallel_lines
 from slicer.geometry.clip import merge_pieces, runs_within
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, close_loop, closing, contours, offset, opening, strips, strips_beside, union

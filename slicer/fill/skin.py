@@ -159,12 +159,7 @@ def _even(spacing: float, edges: tuple[float, float]) -> Draw:
 
 
 def monotonic_lines(
-    pieces: Pieces,
-    border: EdgeIndex,
-    angle_deg: float,
-    spacing_mm: float,
-    most_mm: float,
-    solid_mm: tuple[float, float] = OPEN,
+    pieces: Pieces, border: EdgeIndex, angle_deg: float, spacing_mm: float, most_mm: float, solid_mm: tuple[float, float] = OPEN
 ) -> list[Floats]:
     """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart.
 

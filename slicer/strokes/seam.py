@@ -8,7 +8,6 @@ its inner walls (its lead).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,12 +18,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import start_at
 from slicer.geometry.polyline import Segment, nearest_share
 from slicer.paths import Kind
-from slicer.strokes.seam_plan import (
-    NO_LIMITS,
-    SeamLimits,
-    corner_strength,
-    is_clear,
-)
+from slicer.strokes.seam_plan import NO_LIMITS, SeamLimits, corner_strength, is_clear
 from slicer.strokes.strokes import RINGS
 
 REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
@@ -37,6 +31,9 @@ KEPT = 0.25  # from this strength on a planned corner is kept to, however far th
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
 FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
 NO_SEAMS = np.zeros((0, 2))
+Target = tuple[
+    float, float, float, float
+]  # where a seam is drawn to, and the distance, mm, that inner and outer corners are worth
 SAMPLE_MM = 2.0  # straight sides are tried at this distance, too
 OFF_WALL = 0.7  # of its length a lead has to reach inside: so far beside its middle the outer wall is out of the tip's way
 
@@ -73,7 +70,9 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
                 loop = np.ascontiguousarray(bead.points)
                 lead_mm = 0.0
                 if kind is Kind.INNER_WALL:
-                    loop, _ = _start_at_best(loop, _beside(loop, known), NO_LIMITS)
+                    distance, *nearest = _nearest(loop, known, np.inf)
+                    x, y = nearest if distance < np.inf else loop[0].tolist()
+                    loop, _ = _start_at_best(loop, (x, y, *NO_CORNER), NO_LIMITS)
                 else:
                     loop, free = _start_at_best(loop, _target(loop, process, around), around.limits)
                     lead_mm = 0.0 if free else bead.width_mm
@@ -83,40 +82,25 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
     return out, np.array(list(seams.values())).reshape(-1, 2)
 
 
-class _Target(NamedTuple):
-    """Where a seam is drawn to, and the distance, mm, that an inner or outer corner is worth."""
-
-    x: float
-    y: float
-    inner_mm: float
-    outer_mm: float
-
-
-def _beside(loop: Floats, outer: Floats) -> _Target:
-    """Where an inner wall's seam is drawn to: the nearest of the (k, 2) seams of outer walls."""
-    distance, x, y = _nearest(loop, outer, np.inf)
-    return _Target(x, y, *NO_CORNER) if distance < np.inf else _Target(float(loop[0, 0]), float(loop[0, 1]), *NO_CORNER)
-
-
-def _target(loop: Floats, process: Process, around: Surroundings) -> _Target:
+def _target(loop: Floats, process: Process, around: Surroundings) -> Target:
     """Where an outer wall's seam is drawn to."""
     rear = float(around.rear[0]), float(around.rear[1])
     if process.seam == "rear":
-        return _Target(*rear, *NO_CORNER)
+        return (*rear, *NO_CORNER)
     if process.seam == "nearest":
-        return _Target(float(around.tip[0]), float(around.tip[1]), *NO_CORNER)
+        return (float(around.tip[0]), float(around.tip[1]), *NO_CORNER)
     if process.seam == "random":
-        return _Target(*_point_at(loop, (GOLDEN * (around.layer + 1)) % 1.0), *NO_CORNER)
+        return (*_point_at(loop, (GOLDEN * (around.layer + 1)) % 1.0), *NO_CORNER)
     distance, x, y = _nearest(loop, around.before, REACH_MM)
     planned, px, py = _nearest(loop, around.planned, REACH_MM)
     if planned < np.inf:
-        beside = _Target(px, py, *PLANNED)
+        beside = (px, py, *PLANNED)
         if distance == np.inf or np.hypot(px - x, py - y) >= FOLLOW_MM or _in_corner(loop, beside):
             return beside
-        return _Target(x + FOLLOW * (px - x), y + FOLLOW * (py - y), *PLANNED)
+        return (x + FOLLOW * (px - x), y + FOLLOW * (py - y), *PLANNED)
     if distance == np.inf:
-        return _Target(*rear, *ANYWHERE)
-    return _Target(x, y, *(ANYWHERE if process.seam == "corner" else NEARBY))
+        return (*rear, *ANYWHERE)
+    return (x, y, *(ANYWHERE if process.seam == "corner" else NEARBY))
 
 
 @kernel
@@ -180,7 +164,7 @@ def _side(loop: Floats, i: int) -> Segment:
     return Segment(loop[i, 0], loop[i, 1], loop[after, 0], loop[after, 1])
 
 
-def _start_at_best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[Floats, bool]:
+def _start_at_best(loop: Floats, target: Target, interfaces: SeamLimits) -> tuple[Floats, bool]:
     """The loop (n, 2) begun at its place of least cost, and whether that is clear of interface edges."""
     at, share, free = _best(loop, target, interfaces)
     if share > 0.0:
@@ -190,10 +174,10 @@ def _start_at_best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tup
 
 
 @kernel
-def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, float, bool]:
+def _best(loop: Floats, target: Target, interfaces: SeamLimits) -> tuple[int, float, bool]:
     """The place of least cost as (side, share of it), and whether it keeps clear of interface edges."""
-    n = len(loop)
-    distance, at, share = _project(loop, target.x, target.y)
+    n, (x, y, inner_mm, outer_mm) = len(loop), target
+    distance, at, share = _project(loop, x, y)
     if share >= 1.0 - 1e-6:
         at, share = (at + 1) % n, 0.0
     elif share <= 1e-6:
@@ -201,7 +185,7 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
     side = _side(loop, at)
     free = is_clear(interfaces, side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0))
     least = distance + (0.0 if free else FORBIDDEN)
-    if target.inner_mm == 0.0 and target.outer_mm == 0.0 and free:
+    if inner_mm == 0.0 and outer_mm == 0.0 and free:
         return at, share, free
     for i in range(n):
         side = _side(loop, i)
@@ -209,10 +193,10 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
         count = 1 if free and len(interfaces.edges) == 0 else int(np.hypot(dx, dy) / SAMPLE_MM) + 1
         for s in range(count):
             cx, cy = side.x0 + s / count * dx, side.y0 + s / count * dy
-            cost = np.hypot(cx - target.x, cy - target.y) + 1e-6 * cx
-            if s == 0 and target.inner_mm > 0.0:
+            cost = np.hypot(cx - x, cy - y) + 1e-6 * cx
+            if s == 0 and inner_mm > 0.0:
                 strength = corner_strength(loop, i)
-                cost -= strength * target.inner_mm if strength > 0.0 else -strength * target.outer_mm
+                cost -= strength * inner_mm if strength > 0.0 else -strength * outer_mm
             if cost < least:
                 clear = is_clear(interfaces, cx, cy)
                 if clear or not free:
@@ -223,7 +207,7 @@ def _best(loop: Floats, target: _Target, interfaces: SeamLimits) -> tuple[int, f
 
 
 @kernel
-def _in_corner(loop: Floats, target: _Target) -> bool:
+def _in_corner(loop: Floats, target: Target) -> bool:
     """Whether the place of least cost is a corner that is sharp enough to be kept to."""
     at, share, _ = _best(loop, target, NO_LIMITS)
     return share == 0.0 and abs(corner_strength(loop, at)) > KEPT
@@ -231,8 +215,7 @@ def _in_corner(loop: Floats, target: _Target) -> bool:
 
 def begin_with_room(loop: Floats, lead_mm: float) -> Floats:
     """The loop, begun at the place nearest to its beginning from which a lead leaves its outer wall; the one with most room where
-    there is none: in a sharp corner the way inside runs along the wall.
-    """
+    there is none: in a sharp corner the way inside runs along the wall."""
     deepest, most = loop, _depth_mm(loop, lead_mm)
     if most >= OFF_WALL * lead_mm:
         return loop
@@ -259,19 +242,14 @@ def _depth_mm(loop: Floats, lead_mm: float) -> float:
 
 def lead_in(loop: Floats, lead_mm: float) -> Floats:
     """(2,) from the loop's beginning to where a lead inside begins, as far as there is room."""
-    way = _inward(loop)
-    lead: Floats = way * min(lead_mm, 0.5 * _room_mm(loop, way))
-    return lead
-
-
-def _inward(loop: Floats) -> Floats:
-    """Unit vector to the left of the loop at its beginning, where the solid is."""
     steps = np.array([loop[0] - loop[-1], loop[1] - loop[0]])
     steps /= np.maximum(np.hypot(*steps.T), 1e-12)[:, None]
     along = steps.sum(axis=0)
     length = float(np.hypot(*along))
     along = along / length if length > 1e-6 else steps[1]
-    return np.array([-along[1], along[0]])
+    way = np.array([-along[1], along[0]])  # to the left, where the solid is
+    lead: Floats = way * min(lead_mm, 0.5 * _room_mm(loop, way))
+    return lead
 
 
 def _room_mm(loop: Floats, way: Floats) -> float:

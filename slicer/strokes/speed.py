@@ -1,10 +1,12 @@
-"""Speed: how fast each kind of bead is laid and how hard it is accelerated, and how layers are cooled.
+"""Speed: how fast each kind of bead is laid and how hard it is accelerated, and how layers are cooled; with speeds and fan the
+strokes of a layer become the table that is printed.
 
 A layer that would be done too soon is slowed down so that it has time to set; the fan follows the time of the layer, and is set
 for itself on bridges and overhangs.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,9 +16,11 @@ from profiles.material import Material
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead
-from slicer.geometry.polyline import length_mm
-from slicer.paths import KINDS, Kind, bead_area_mm2
-from slicer.strokes.strokes import RINGS, Strokes
+from slicer.geometry.polygons import Polygons
+from slicer.geometry.polyline import length_mm, lengthen_steps, mark_corners
+from slicer.paths import KINDS, SKINS, Kind, Layer, bead_area_mm2
+from slicer.strokes.strokes import RINGS, Strokes, in_pieces
+from slicer.strokes.travels import may_wipe_over
 
 KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
 BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
@@ -39,16 +43,35 @@ INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
 LEAST_STEP_GAIN_S = 0.1  # nor is one between a slower and a faster one, which saves less: a step on the way from one to the other
+SHORTEST = 0.5  # line widths: the steps of skin lines are no shorter,
+SHORTEST_STROKE = 4.0  # line widths of a stroke whose steps are lengthened
+ASIDE, ASIDE_EXACT = 0.25, 0.15  # line widths that easing may move a line; exact: tops, whose gaps show, and bridges
 FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
 
 
+def timed(
+    strokes: Strokes, profile: Profile, height_mm: float, kind_mm_s: Floats | None, flow: float, of_places: Sequence[Process] = ()
+) -> tuple[Strokes, Floats]:
+    """The strokes, in pieces of one width and simplified, with their (k,) speeds; parameters as in speeds_mm_s."""
+    strokes = in_pieces(strokes, height_mm)
+    speeds = speeds_mm_s(strokes, profile, height_mm, kind_mm_s, flow, of_places)
+    corners = mark_corners(strokes.points, strokes.starts, profile.process.resolution_mm)
+    eased = _without_short_steps(strokes.with_points(strokes.points, corners))
+    return eased, np.minimum(speeds, melting_speeds_mm_s(eased, profile, height_mm, flow))
+
+
+def _without_short_steps(strokes: Strokes) -> Strokes:
+    """The strokes, those of skins without short steps where that moves them little; the plastic of each stays the same."""
+    # A shorter stroke is nothing but its two ends, which lie where the layer below holds them.
+    eases = strokes.is_of(*SKINS) & (strokes.lengths_mm > SHORTEST_STROKE * strokes.width_mm)
+    width_mm = np.where(eases, strokes.width_mm, 0.0)
+    aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN, Kind.BRIDGE), ASIDE_EXACT, ASIDE)
+    eased = strokes.with_points(*lengthen_steps(strokes.points, strokes.starts, SHORTEST * width_mm, aside_mm))
+    return replace(eased, flow=strokes.flow * strokes.lengths_mm / np.maximum(eased.lengths_mm, 1e-9))
+
+
 def speeds_mm_s(
-    strokes: Strokes,
-    profile: Profile,
-    height_mm: float,
-    kind_mm_s: Floats | None,
-    flow: float,
-    of_places: Sequence[Process] = (),
+    strokes: Strokes, profile: Profile, height_mm: float, kind_mm_s: Floats | None, flow: float, of_places: Sequence[Process] = ()
 ) -> Floats:
     """(k,) speeds of a layer's strokes; kind_mm_s, by number of the kind, replaces the process's speeds, flow multiplies every
     stroke's flow. of_places: the processes of the places in which other settings hold; none where kind_mm_s holds.
@@ -203,34 +226,59 @@ def first_layer_speeds(process: Process) -> Floats:
 def stroke_accelerations(profile: Profile, first_layer: bool) -> Floats:
     """(number of kinds,) mm/s2; inf where the process sets none, which leaves the firmware's own in force."""
     process = profile.process
-    if not sets_acceleration(process):
-        return np.full(len(KINDS), np.inf)
-    usual = process.acceleration_mm_s2 or axes_mm_s2(profile)
+    usual = process.acceleration_mm_s2 or _axes_mm_s2(profile)
     if first_layer:
         return np.full(len(KINDS), process.first_layer_acceleration_mm_s2 or usual)
-    infill = process.infill_acceleration_mm_s2 or usual
-    hanging = process.bridge_acceleration_mm_s2 or usual
-    others = {
-        Kind.OUTER_WALL: process.outer_wall_acceleration_mm_s2 or usual,
-        Kind.INFILL: infill,
-        Kind.SUPPORT: infill,
-        Kind.SUPPORT_INTERFACE: infill,
-        Kind.BRIDGE: hanging,
-        Kind.OVERHANG: hanging,
-    }
+    infill, hanging = process.infill_acceleration_mm_s2 or usual, process.bridge_acceleration_mm_s2 or usual
+    others = {Kind.OUTER_WALL: process.outer_wall_acceleration_mm_s2 or usual} | dict.fromkeys(HANGING, hanging)
+    others |= dict.fromkeys((Kind.INFILL, Kind.SUPPORT, Kind.SUPPORT_INTERFACE), infill)
     return np.array([others.get(kind, usual) for kind in KINDS])
 
 
 def travel_mm_s2(profile: Profile) -> float:
     """mm/s2 of travels; inf as for strokes."""
-    return (profile.process.travel_acceleration_mm_s2 or axes_mm_s2(profile)) if sets_acceleration(profile.process) else np.inf
+    return profile.process.travel_acceleration_mm_s2 or _axes_mm_s2(profile)
 
 
-def sets_acceleration(process: Process) -> bool:
-    """Whether the process sets any acceleration."""
-    return any(getattr(process, key) is not None for key in KEYS)
+def _axes_mm_s2(profile: Profile) -> float:
+    """mm/s2 that both X and Y allow; inf where the process sets no acceleration."""
+    process, machine = profile.process, profile.machine
+    unset = all(getattr(process, key) is None for key in KEYS)
+    return np.inf if unset else min(machine.x.acceleration_mm_s2, machine.y.acceleration_mm_s2)
 
 
-def axes_mm_s2(profile: Profile) -> float:
-    """mm/s2 that both X and Y allow."""
-    return min(profile.machine.x.acceleration_mm_s2, profile.machine.y.acceleration_mm_s2)
+def layer_of(
+    strokes: Strokes,
+    speeds: Floats,
+    profile: Profile,
+    *,
+    z_mm: float,
+    height_mm: float,
+    flow: float,
+    fan: float,
+    add_c: float = 0.0,
+    skin: Polygons | None = None,
+) -> Layer:
+    """The layer of some strokes. flow: factor on that of all; fan: on the part fan; add_c: how much hotter it is printed; skin:
+    outer walls beside the edges of interfaces."""
+    process, material = profile.process, profile.material
+    time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)  # at least: accelerations are left out
+    layer_fan = fan * fan_share(material, process, time_s)
+    return Layer(
+        z_mm=z_mm,
+        height_mm=height_mm,
+        fan=layer_fan,
+        nozzle_add_c=add_c,
+        points=np.ascontiguousarray(strokes.points[:, :2]),
+        starts=strokes.starts,
+        kind=strokes.kind,
+        width_mm=strokes.width_mm,
+        speed_mm_s=speeds,
+        flow=strokes.flow * flow,
+        own_fan=own_fans(strokes, material, fan, layer_fan),
+        retract=strokes.retract,
+        wiped=may_wipe_over(strokes, Polygons() if skin is None else skin, material.wipe_mm),
+        below_mm=np.zeros((len(strokes), 2)),
+        approach=strokes.approach,
+        approach_starts=strokes.approach_starts,
+    )

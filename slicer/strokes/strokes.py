@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, longs, table
-from mdp.kernels.kernel import helper, kernel
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from profiles.process import Process
@@ -24,6 +24,7 @@ from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 COLUMNS = ("kind", "width_mm", "flow", "overhang", "over_infill", "small", "varies", "retract", "place")
+# Of pieces: points (n, 3), (k + 1,) where each begins, (k,) the stroke of each and whether it lies within an area.
 Buffers = tuple[Floats, Indices, Indices, Mask]
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
 ON_SUPPORT = 5  # overhang of a wall that lies over dense support
@@ -82,6 +83,10 @@ class Strokes:
     def is_of(self, *kinds: Kind) -> Mask:
         """(k,) which strokes are of some kinds."""
         return is_of(self.kind, kinds)
+
+    def with_points(self, points: Floats, kept: Mask) -> "Strokes":
+        """The strokes with those of (n, 3) points that are kept; the first and last one of every stroke are."""
+        return replace(self, points=points[kept], starts=np.append(0, np.cumsum(kept))[self.starts])
 
     def refined(self, points: Floats, starts: Indices, source: Indices) -> "Strokes":
         """The strokes with other points; source: (j,) the stroke that each of the new ones is a piece of, in the same order.
@@ -167,10 +172,7 @@ def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float, wi
 
 @kernel
 def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, shortest_mm: tuple[float, float], out: Buffers) -> int:
-    """Fills in the pieces and returns how many there are, -1 where there is no room for them.
-
-    out: points (n, 3), (k + 1,) where each piece begins, (k,) the stroke of each and whether it lies within the area.
-    """
+    """Fills in the pieces and returns how many there are, -1 where there is no room for them."""
     out_points, begins, source, is_within = out
     room = len(out_points)
     cut, within = table(room, 3), flags(room)
@@ -189,10 +191,7 @@ def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, short
         if n + (b - a if whole else 2 * size) > room or count + max(size, 1) >= room:
             return -1
         if whole:
-            for i in range(a, b):
-                for axis in range(3):
-                    out_points[n, axis] = points[i, axis]
-                n += 1
+            n = _append(out_points, n, points, a, b)
             source[count], is_within[count], begins[count + 1] = k, size > 1 and within[0], n
             count += 1
             continue
@@ -200,21 +199,27 @@ def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, short
         for i in range(size - 1):
             if i + 2 < size and within[i + 1] == within[begin]:
                 continue
-            for at in range(begin, i + 2):
-                for axis in range(3):
-                    out_points[n, axis] = cut[at, axis]
-                n += 1
+            n = _append(out_points, n, cut, begin, i + 2)
             source[count], is_within[count], begins[count + 1] = k, within[begin], n
             count, begin = count + 1, i + 1
     return count
+
+
+@no_nrt
+def _append(out: Floats, n: int, points: Floats, first: int, end: int) -> int:
+    """Appends the points first .. end - 1 from row n on; returns the new n."""
+    for i in range(first, end):
+        for axis in range(3):
+            out[n, axis] = points[i, axis]
+        n += 1
+    return n
 
 
 @helper
 def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, float]) -> None:
     """Runs of steps shorter than that take after their neighbours, those within last so that none is overlooked for a gap.
 
-    shortest_mm: of runs outside and within; points: of which `size` count; within: of as many steps less one. A line that is a
-    single run has no neighbours.
+    shortest_mm: of runs outside and within; within: of the steps between the first `size` points. A single run has no neighbours.
     """
     for inner in range(2):
         a = 0
@@ -264,15 +269,6 @@ def split_overhangs(
     return strokes
 
 
-def split_places(strokes: Strokes, areas: Sequence[Polygons], kinds: Sequence[Kind], shortest_mm: float) -> Strokes:
-    """The strokes of a layer, those of some kinds split where they enter and leave the places in which other settings hold."""
-    for number, area in enumerate(areas, start=1):
-        if kinds and not area.is_empty():
-            strokes, within = split(strokes, area, strokes.is_of(*kinds), shortest_mm)
-            strokes = replace(strokes, place=np.where(within, number, strokes.place).astype(np.int16))
-    return strokes
-
-
 def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
     """The strokes in the same order, those of varying width in pieces whose widths are the means of their stretches.
 
@@ -297,10 +293,7 @@ def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats, room:
     for k in range(len(starts) - 1):
         a, b = starts[k], starts[k + 1]
         if not varies[k]:
-            for i in range(a, b):
-                for axis in range(3):
-                    out[n, axis] = points[i, axis]
-                n += 1
+            n = _append(out, n, points, a, b)
             source[count], widths[count], begins[count + 1] = k, width_mm[k], n
             count += 1
             continue
@@ -315,10 +308,7 @@ def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats, room:
                 step = max(np.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1]), 1e-9)
                 total, weights = total + 0.5 * (line[i + 1, 2] + line[i, 2]) * step, weights + step
                 least = min(least, line[i + 1, 2])
-            for i in range(begin, end + 1):
-                for axis in range(3):
-                    out[n, axis] = line[i, axis]
-                n += 1
+            n = _append(out, n, line, begin, end + 1)
             source[count], widths[count], begins[count + 1] = k, min(total / weights, least + MOST_OVER_MM), n
             count, begin = count + 1, end
     return out[:n].copy(), begins[: count + 1].copy(), source[:count].copy(), widths[:count].copy()

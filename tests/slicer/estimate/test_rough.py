@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import spacing_mm
-from slicer.estimate.hanging import support_lengths_mm
-from slicer.estimate.rough import choose_layers, rough_lengths_mm
+from slicer.estimate.estimate import choose_layers, rough_lengths_mm, support_lengths_mm
 from slicer.overhangs import find_overhangs
 from slicer.sectioning import section_part
 from slicer.support.support import own_supports

@@ -7,8 +7,8 @@ from profiles.profile import load
 from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, bead_area_mm2
+from slicer.strokes.speed import timed
 from slicer.strokes.strokes import in_pieces, split, strokes_of
-from slicer.strokes.timed import timed
 from tests.slicer.hand import rows_of
 
 
