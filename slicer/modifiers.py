@@ -15,7 +15,7 @@ from mdp.cut import convex_hull
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.topology.cross_section import cross_sections
-from mdp.zone import MeshVolume, Modifier, Volume
+from mdp.zone import MeshVolume, Volume
 from profiles.errors import SliceError
 from profiles.part_settings import process_of_part
 from profiles.process import Process
@@ -46,10 +46,16 @@ def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -
     process's own.
     """
     places = []
+    (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
+    window = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
     for own, modifiers in groupby(part.modifiers, key=lambda modifier: modifier.process):
         settings = process_of_part(process, own).model_dump(include=set(own))
-        _check(process, settings)
-        places.append(Place(settings, _areas(part, [*modifiers], mesh, cuts_mm)))
+        if process.spiral_vase:
+            raise SliceError("process.spiral_vase is one wall all the way up: a [[modifier]] of the plan changes nothing in it")
+        if process.walls == 0 and "walls" in settings:
+            raise SliceError("process.walls is 0: a [[modifier]] of the plan can only change the walls of a part that has some")
+        sections = [volume_sections(part, modifier.volume, cuts_mm) for modifier in modifiers]
+        places.append(Place(settings, [union(layer) ^ window for layer in zip(*sections, strict=True)]))
     return [place for place in places if any(not area.is_empty() for area in place.areas)]
 
 
@@ -84,21 +90,6 @@ def _with_place(found: Sequence[Place], new: Place) -> list[Place]:
             areas = [union([a, b]) for a, b in zip(merged[same].areas, piece.areas, strict=True)]
             merged[same] = Place(piece.settings, areas)
     return [place for place in merged if any(not area.is_empty() for area in place.areas)]
-
-
-def _check(process: Process, settings: Mapping[str, Any]) -> None:
-    if process.spiral_vase:
-        raise SliceError("process.spiral_vase is one wall all the way up: a [[modifier]] of the plan changes nothing in it")
-    if process.walls == 0 and "walls" in settings:
-        raise SliceError("process.walls is 0: a [[modifier]] of the plan can only change the walls of a part that has some")
-
-
-def _areas(part: Part, modifiers: Sequence[Modifier], mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
-    """The sections of volumes in each layer, near the part."""
-    (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
-    window = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
-    sections = [volume_sections(part, modifier.volume, cuts_mm) for modifier in modifiers]
-    return [union(layer) ^ window for layer in zip(*sections, strict=True)]
 
 
 def volume_sections(part: Part, volume: Volume, cuts_mm: Floats) -> list[Polygons]:
@@ -149,14 +140,18 @@ class WallCounts:
         return within - offset(fewer, short_mm)
 
 
-def wall_counts(section: Polygons, layer: int, walls: int, more: int, places: Sequence[Place]) -> WallCounts:
-    """The number of walls in each area of a layer's section: the process's, or that of places, combined by that key; more: walls
-    that are added to every number."""
-    usual, others = walls + more, list[tuple[Polygons, int]]()
-    for place in places:
-        count, area_mm2 = place.settings["walls"] + more, (section ^ place.areas[layer]).area()
-        if section.area() - area_mm2 < LEAST_MM2:
-            return WallCounts(count)
-        if area_mm2 >= LEAST_MM2 and count != usual:
-            others.append((place.areas[layer], count))
-    return WallCounts(usual, others)
+def wall_counts(sections: Sequence[Polygons], walls: Sequence[int], usual: int, places: Sequence[Place]) -> list[WallCounts]:
+    """How many walls every layer has, and in which areas another number, those of places. walls: of each layer; where it has more
+    than usual, places have as many more; where it has fewer, it has them everywhere."""
+    several, counts = combined(places, ["walls"]), []
+    for layer, (section, own) in enumerate(zip(sections, walls, strict=True)):
+        others, everywhere = list[tuple[Polygons, int]](), own
+        for place in several if own >= usual else ():
+            count, area_mm2 = place.settings["walls"] + own - usual, (section ^ place.areas[layer]).area()
+            if section.area() - area_mm2 < LEAST_MM2:
+                others, everywhere = [], count
+                break
+            if area_mm2 >= LEAST_MM2 and count != own:
+                others.append((place.areas[layer], count))
+        counts.append(WallCounts(everywhere, others))
+    return counts

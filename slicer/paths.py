@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from math import pi
+from math import isnan, pi
 from typing import TypeVar
 
 import numpy as np
@@ -49,10 +49,10 @@ def bead_area_mm2(width_mm: Width, height_mm: float) -> Width:
 class Path:
     """One continuous bead, a row of a Layer.
 
-    points: (n, 2) mm, n >= 2; a closed path repeats its first point at the end. flow: factor on the bead's volume.
-    approach: (k, 2) mm, points that the travel to the first point passes, k >= 0. retract: pull the filament back
-    during that travel. fan: part fan 0..1 where it differs from the layer's. below_mm: how far below the layer's z the path
-    begins and ends; it climbs evenly between. wiped: whether the tip may go over it again while the filament is pulled back.
+    points: (n, 2) mm, n >= 2; a closed path repeats its first point. flow: factor on the bead's volume. approach: (k, 2) mm that
+    the travel to the first point passes. retract: pull the filament back during that travel. fan: part fan 0..1 where it differs
+    from the layer's. below_mm: how far below the layer's z the path begins and ends; it climbs evenly between. wiped: whether the
+    tip may go over it again while the filament is pulled back.
     """
 
     kind: Kind
@@ -126,23 +126,12 @@ class Layer:
     @property
     def paths(self) -> tuple[Path, ...]:
         """The rows one by one."""
-        return tuple(self.path(k) for k in range(len(self)))
-
-    def path(self, k: int) -> Path:
-        """Row k."""
-        own = float(self.own_fan[k])
-        begin_mm, end_mm = self.below_mm[k].tolist()
-        return Path(
-            kind=KINDS[self.kind[k]],
-            points=self.points[self.starts[k] : self.starts[k + 1]],
-            width_mm=float(self.width_mm[k]),
-            speed_mm_s=float(self.speed_mm_s[k]),
-            flow=float(self.flow[k]),
-            approach=self.approach[self.approach_starts[k] : self.approach_starts[k + 1]],
-            retract=bool(self.retract[k]),
-            fan=None if np.isnan(own) else own,
-            below_mm=(begin_mm, end_mm),
-            wiped=bool(self.wiped[k]),
+        points, approaches = np.split(self.points, self.starts[1:-1]), np.split(self.approach, self.approach_starts[1:-1])
+        numbers = (self.kind, self.width_mm, self.speed_mm_s, self.flow, self.own_fan, self.below_mm, self.retract, self.wiped)
+        rows = zip(*(column.tolist() for column in numbers), points, approaches, strict=True) if len(self) else ()
+        return tuple(
+            Path(KINDS[kind], way, width, speed, flow, passed, pulls, None if isnan(fan) else fan, (begin, end), wiped)
+            for kind, width, speed, flow, fan, (begin, end), pulls, wiped, way, passed in rows
         )
 
     @property

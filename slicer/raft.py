@@ -51,40 +51,31 @@ def raft_layers(supports: Supports) -> list[Layer]:
     sections = supports.sections
     if not sections.on_raft:
         return []
-    heights, areas = raft_heights(sections.profile), raft_areas(supports)
-    layers: list[Layer] = []
-    for k, area in enumerate(areas):
-        process = _process_of_layer(sections.process, k)
-        beads = _raft_beads(area, sections.process.raft_layers - 1 - k, process, float(heights.height_mm[k]), first=k == 0)
+    process, heights, layers = sections.process, raft_heights(sections.profile), list[Layer]()
+    for k, area in enumerate(_raft_areas(supports)):
+        own, height_mm = process, float(heights.height_mm[k])
+        if k == 0:  # which has a skirt at most around it
+            bare = {"brim_mm": 0.0, "small_base_brim_mm": 0.0, "support_foot_density": process.raft_first_layer_density}
+            own = first_layer_process(process).model_copy(update=bare)
+        beads = _raft_beads(area, process.raft_layers - 1 - k, own, height_mm, first=k == 0)
         if k == 0:
-            beads += beads_around(sections, area, area, process, float(heights.height_mm[0]))
+            beads += beads_around(sections, area, area, own, height_mm)
         layers.append(_layer(beads, area, sections.profile, heights[k : k + 1], layers))
     return layers + _support_on_raft(supports, layers)
 
 
-def raft_areas(supports: Supports) -> list[Polygons]:
+def _raft_areas(supports: Supports) -> list[Polygons]:
     """Area that each layer of the raft covers: the base, outlines so low that they would sag onto the plate, and a margin."""
-    sections = supports.sections
-    process, bottom_mm = sections.process, sections.heights.bottom_mm
-    low = sections.outlines[: int(np.searchsorted(bottom_mm, ON_PLATE_MM))]
+    sections, process = supports.sections, supports.sections.process
+    low = sections.outlines[: int(np.searchsorted(sections.heights.bottom_mm, ON_PLATE_MM))]
     stands, plate = union([*low, supports.areas[0]]), offset(sections.plate, -0.5 * process.line_width_mm)
     first, others = (offset_round(stands, far_mm) ^ plate for far_mm in (reach_mm(process), process.raft_expansion_mm))
     return [first, *[others] * process.raft_layers][: process.raft_layers]
 
 
-def _process_of_layer(process: Process, layer: int) -> Process:
-    """The settings of a layer of the raft, which has a skirt at most around it."""
-    if layer:
-        return process
-    bare = {"brim_mm": 0.0, "small_base_brim_mm": 0.0, "support_foot_density": process.raft_first_layer_density}
-    return first_layer_process(process).model_copy(update=bare)
-
-
 def _raft_beads(area: Polygons, below_top: int, process: Process, height_mm: float, *, first: bool) -> list[Bead]:
-    """Beads of one layer. Dense layers cross each other and the layer below them; sparse layers stack line on line.
-
-    below_top: the number of raft layers above this one.
-    """
+    """Beads of one layer, the number of raft layers below the top one. Dense layers cross each other and the layer below them;
+    sparse layers stack line on line."""
     dense = (process.raft_layers + 1) // 2
     quarter_turns = dense + 1 if first else min(below_top, dense)
     is_dense = below_top < dense and not first
@@ -120,5 +111,5 @@ def _layer(beads: list[Bead], area: Polygons, profile: Profile, height: Heights,
     height_mm, flow = float(height.height_mm[0]), material.flow * (1.0 if number else process.first_layer_flow)
     strokes, speeds = timed(strokes, profile, height_mm, kind_mm_s, flow)
     add_c = 0.0 if number else material.first_layer_nozzle_c - material.nozzle_c
-    at = {"z_mm": float(height.tip_mm[0]), "height_mm": height_mm}
-    return layer_of(strokes, speeds, profile, **at, flow=flow, fan=rising_fan(material, number), add_c=add_c)
+    z_mm, fan = float(height.tip_mm[0]), rising_fan(material, number)
+    return layer_of(strokes, speeds, profile, z_mm=z_mm, height_mm=height_mm, flow=flow, fan=fan, add_c=add_c)

@@ -18,7 +18,6 @@ from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Marked, Zone, touched
-from profiles.machine import Table
 from profiles.part_settings import SPEEDS_OF_A_PLACE
 from profiles.process import Process
 from profiles.profile import Profile
@@ -161,11 +160,13 @@ def section_part(
     heights = part_heights(part, later, profile)
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
-    outlines, too_thin = _printable(mesh, cuts_mm, profile)
+    whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
+    outlines = [without_hairs(section, process, profile.machine.head.nozzle_mm) for section in whole]
+    too_thin = frozenset(i for i, outline in enumerate(outlines) if outline.is_empty() and not whole[i].is_empty())
     if on_platform and not pedestal:
-        outlines = _with_base(outlines, mesh, cuts_mm, process)
+        outlines = lay_on_plate(outlines, mesh, cuts_mm, process)
     places = modified_places(part, mesh, process, cuts_mm)
-    beside, above, beneath = _model_around(part, earlier, later, heights, process, places)
+    beside, above, beneath, standing = _model_around(part, earlier, later, heights, process, places)
     outlines = compensate(outlines, part, later, beside, cuts_mm, process)
     pins = plan_pins((*earlier, part, *later), of_print) if pins is None else pins
     ungrooved = cut_out(outlines, pin_holes(part, later, pins, of_print), cuts_mm)
@@ -177,7 +178,7 @@ def section_part(
         width_mm = first_layer_process(process).line_width_mm
         first = compensate_elephant_foot(own[0], process.elephant_foot_mm, width_mm)
         ungrooved, own = [first, *ungrooved[1:]], [first, *own[1:]]
-    below = plastic_below(part, earlier, outlines[0])
+    below, table = plastic_below(part, earlier, outlines[0]), profile.machine.table
     return Sections(
         part=part,
         earlier=earlier,
@@ -190,10 +191,10 @@ def section_part(
         ungrooved=ungrooved,
         beside=beside,
         plastic_below=below,
-        plate=plate_outline(profile.machine.table),
+        plate=Polygons.circle(table.radius_mm, 180) if table.size_mm is None else Polygons.square(table.size_mm, True),
         above=above,
         beneath=beneath,
-        standing=_standing_beside(part, earlier, cuts_mm, process),
+        standing=standing,
         joints=joints(part, later, outlines[0], below),
         pins=pins.get(part.index, np.zeros((0, 3))),
         grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),
@@ -206,21 +207,6 @@ def section_part(
     )
 
 
-def _with_base(outlines: list[Polygons], mesh: Mesh, cuts_mm: Floats, process: Process) -> list[Polygons]:
-    """The outlines; the lowest layer also holds the area where the mesh touches the plate."""
-    base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
-    lowest = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM))
-    return lay_on_plate(outlines, lowest, base, process.line_width_mm)
-
-
-def _printable(mesh: Mesh, cuts_mm: Floats, profile: Profile) -> tuple[list[Polygons], frozenset[int]]:
-    """The sections of a mesh without hairs, and the layers that hold something, but nothing that gets a line."""
-    process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
-    whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
-    outlines = [without_hairs(section, process, process.layer_height_mm, nozzle_mm) for section in whole]
-    return outlines, frozenset(i for i, outline in enumerate(outlines) if outline.is_empty() and not whole[i].is_empty())
-
-
 def vase_profile(profile: Profile) -> Profile:
     """The profile with which the bottom is sliced, and which knows of one wall and no inside above it."""
     if not profile.process.spiral_vase:
@@ -229,9 +215,9 @@ def vase_profile(profile: Profile) -> Profile:
     return profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
 
 
-def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_mm: float) -> Polygons:
+def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Polygons:
     """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
-    least_mm = FEATURE * least_width_mm(nozzle_mm, height_mm) + HAIR_MM
+    least_mm = FEATURE * least_width_mm(nozzle_mm, process.layer_height_mm) + HAIR_MM
     pieces, solid = [] if section.is_empty() else islands(section), list[Polygons]()
     for piece in pieces:
         around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
@@ -240,26 +226,28 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
     return section if len(solid) == len(pieces) else Polygons.compose(solid) if solid else Polygons()
 
 
-def lay_on_plate(outlines: Sequence[Polygons], lowest: int, base: Polygons, width_mm: float) -> list[Polygons]:
-    """The sections of a part on the platform, the lowest ones with all that stands there.
+def lay_on_plate(outlines: list[Polygons], mesh: Mesh, cuts_mm: Floats, process: Process) -> list[Polygons]:
+    """The sections of a part on the platform, the lowest ones with all that stands there: the section at PLATFORM_TOLERANCE_MM,
+    below which surfaces stand by the search's definition (mdp.overhang.standing).
 
-    base: the section at PLATFORM_TOLERANCE_MM, below which surfaces stand by the search's definition (mdp.overhang.standing), as
-    `lowest` layers do. Without it the rest of a base that is not quite level would lie in the second layer, in the air. What
-    reaches no farther than a ledge carries itself and stays as it is: fillets and chamfers keep their form.
+    Without it the rest of a base that is not quite level would lie in the second layer, in the air. What reaches no farther than
+    a ledge carries itself and stays as it is: fillets and chamfers keep their form.
     """
-    ledge_mm = NARROW * width_mm
+    base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
+    width_mm, ledge_mm = process.line_width_mm, NARROW * process.line_width_mm
     wide = opening(base - offset(outlines[0], ledge_mm), 0.5 * width_mm)
     if wide.is_empty():
-        return list(outlines)
-    laid = offset(wide, ledge_mm + 0.5 * width_mm) ^ base
+        return outlines
+    lowest, laid = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM)), offset(wide, ledge_mm + 0.5 * width_mm) ^ base
     return [*(outline + laid for outline in outlines[:lowest]), *outlines[lowest:]]
 
 
 def _model_around(
     part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process, places: Sequence[Place]
-) -> tuple[list[Polygons], list[Polygons], list[Polygons]]:
-    """What later parts have of a part's layers and of those over them, and what the model has of those under its base plane, the
-    nearest first: as many layers as its shells reach."""
+) -> tuple[list[Polygons], list[Polygons], list[Polygons], Sequence[Polygons]]:
+    """What later parts have of a part's layers and of those over them, what the model has of those under its base plane, the
+    nearest first, as many layers as its shells reach, and what earlier parts have of the layers of a limb, as far as its support
+    reaches; () without support."""
     (top, bottom), step = most_shell_layers(process, places), process.layer_height_mm
     over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
     far_mm = max(step * max(top, bottom, process.interface_top_layers), reach_mm(process))
@@ -268,15 +256,10 @@ def _model_around(
     deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
     known = bool(earlier) and not part.on_platform
     under = sections_of([*before, *after], part, deep)[::-1] if known else []
-    beneath = [closing(model, CLOSING_MM) for model in under]
-    return others[:count], others[count:], beneath
-
-
-def _standing_beside(part: Part, earlier: Sequence[Part], cuts_mm: Floats, process: Process) -> Sequence[Polygons]:
-    """The sections of earlier parts in the layers of a limb, as far as its support reaches; () without support."""
-    if part.base.limbs_mm is None or not earlier or process.support == "none":
-        return ()
-    return sections_of(near_parts(part, earlier, AROUND_MM + process.support_distance_mm), part, cuts_mm)
+    standing: Sequence[Polygons] = ()
+    if part.base.limbs_mm is not None and earlier and process.support != "none":
+        standing = sections_of(near_parts(part, earlier, AROUND_MM + process.support_distance_mm), part, heights.cut_mm)
+    return others[:count], others[count:], [closing(model, CLOSING_MM) for model in under], standing
 
 
 def reach_mm(process: Process) -> float:
@@ -333,8 +316,6 @@ def _resized(whole: Polygons, process: Process) -> Polygons:
 
 def compensate_elephant_foot(outline: Polygons, elephant_foot_mm: float, width_mm: float) -> Polygons:
     """The outline less what the first layer is squeezed out by; places that would shrink below a line keep their width."""
-    if elephant_foot_mm <= 0.0:
-        return outline
     deep = elephant_foot_mm + 0.5 * width_mm
     narrow = outline - offset(offset(outline, -deep), deep + 0.01)
     return offset(outline, -elephant_foot_mm) + narrow
@@ -350,13 +331,6 @@ def _without_pedestal(
         foot = outlines[-1]
     above = [o ^ foot if cut < sunk_mm else o for o, cut in zip(outlines[layers:], cuts_mm[layers:].tolist(), strict=True)]
     return [*([Polygons()] * layers), *above]
-
-
-def plate_outline(table: Table) -> Polygons:
-    """The plate's outline in the frame of a part that is printed with the table level."""
-    if table.size_mm is not None:
-        return Polygons.square(table.size_mm, True)
-    return Polygons.circle(table.radius_mm, 180)
 
 
 def no_seam_segments(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Floats]:
@@ -422,7 +396,8 @@ def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> lis
     for k in range(len(cuts_mm)):
         pieces = [areas[k] for areas in sections]
         if k in named:
-            pieces.append(offset(Polygons([_upward(face) for face in named[k]]), RIM_MM))
+            shadows = [face if area_mm2(face) > 0.0 else face[::-1] for face in named[k]]
+            pieces.append(offset(Polygons(shadows), RIM_MM))
         layers.append(union(pieces))
     return layers
 
@@ -439,9 +414,3 @@ def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[
         for layer in range(a, b + 1):
             faces.setdefault(layer, []).append(corner)
     return faces
-
-
-def _upward(face: Floats) -> Floats:
-    """The shadow (3, 2) of a face, counter-clockwise."""
-    (ax, ay), (bx, by) = face[1] - face[0], face[2] - face[0]
-    return face if ax * by - ay * bx > 0.0 else face[::-1]

@@ -46,7 +46,7 @@ from slicer.geometry.polygons import (
 )
 from slicer.geometry.polyline import length_mm
 from slicer.interface.interface import limb_planes, plane_in_frame_of
-from slicer.modifiers import LEAST_MM2, WallCounts, combined, wall_counts
+from slicer.modifiers import LEAST_MM2, WallCounts, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import Sections
@@ -106,55 +106,35 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     layers: those that are asked for, all where None; of the others there is what these need, or nothing.
     """
     sections = supports.sections
-    process = sections.process
-    processes = layer_processes(sections)
-    lying = sections.own if sections.pedestal_layers else sections.outlines
-    processes = strengthen_overhangs(processes, lying, sections.plastic_below)
-    model = model_sections(sections)
-    counts, count = _wall_counts(sections, processes), len(processes)
+    process, places, processes = sections.process, sections.places, layer_processes(sections)
+    model, count = model_sections(sections), len(processes)
+    counts = wall_counts(sections.own, [own.walls for own in processes], process.walls, places)
     # What holds a layer is planned from the top where branches do.
-    runs = [range(count)] if layers is None or has_lightning(process, sections.places) else _with_those_below(layers)
+    runs = [range(count)] if layers is None or has_lightning(process, places) else _with_those_below(layers)
     needed = [layer for run in runs for layer in run]
     deep = max(sections.shell_layers[0], 1)
     above = {layer for run in runs for layer in range(run.start, min(run.stop + deep, count))}  # walls there make infill solid
     walled = _walled(sections, model, processes, counts, sorted(above))
+    insides = [walls.inside for walls, _, _ in walled]
     covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
-    filled = regions([walls.inside for walls, _, _ in walled], covers, not sections.on_platform, process, runs, sections.places)
-    ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, sections.places)
+    filled = regions(insides, covers, not sections.on_platform, process, runs, places)
+    ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, places)
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     sparse = [region.sparse for region in filled]
-    fillings = plan_fillings(sparse, sections.own, process, sections.places, sections.heights.height_mm)
-    leaning = leaning_walls(sparse, sections.own, [walls.inside for walls, _, _ in walled], runs, process.line_width_mm)
+    fillings = plan_fillings(sparse, sections.own, process, places, sections.heights.height_mm)
+    leaning = leaning_walls(sparse, sections.own, insides, runs, process.line_width_mm)
     filled, drawn = anchor_skins(filled, leaning, processes, fillings, sections.heights)
-    ranked = [
-        own if of.all == [own.walls] else own.model_copy(update={"walls": max(of.all)})
-        for own, of in zip(processes, counts, strict=True)
-    ]
-    return Shells(
-        supports,
-        [
-            Shell(own, walls, ending, region, over, spans, smooth, drawn.get(layer))
-            for layer, (own, (walls, ending, _), region, over, spans, smooth) in enumerate(
-                zip(ranked, walled, filled, leaning, bridges, ironed, strict=True)
-            )
-        ],
-        fillings,
-    )
+    shells = []
+    for k, (own, of, (walled_by, ending, _)) in enumerate(zip(processes, counts, walled, strict=True)):
+        most = own if of.all == [own.walls] else own.model_copy(update={"walls": max(of.all)})
+        shells.append(Shell(most, walled_by, ending, filled[k], leaning[k], bridges[k], ironed[k], drawn.get(k)))
+    return Shells(supports, shells, fillings)
 
 
 def _with_those_below(layers: Sequence[int]) -> list[range]:
     """Runs of layers that hold some layers and each one's lower neighbour, whose infill tells of bridges."""
     needed = np.unique([layer for k in layers for layer in (max(k - 1, 0), k)])
     return [range(int(run[0]), int(run[-1]) + 1) for run in np.split(needed, np.flatnonzero(np.diff(needed) > 1) + 1)]
-
-
-def _wall_counts(sections: Sections, processes: Sequence[Process]) -> list[WallCounts]:
-    """The number of walls of every layer, by its own settings."""
-    usual, places = sections.process.walls, combined(sections.places, ["walls"])
-    return [
-        wall_counts(section, layer, usual, own.walls - usual, places if own.walls >= usual else ())
-        for layer, (section, own) in enumerate(zip(sections.own, processes, strict=True))
-    ]
 
 
 def _walled(
@@ -175,15 +155,9 @@ def _walled(
 
     def contours_of(place: int) -> Contours:
         layer = needed[place]
+        own, more = processes[layer], max(processes[layer].walls - process.walls, 0)
         walls, ending, inside = cut_walls(
-            sections.own[layer],
-            model[layer],
-            processes[layer],
-            counts[layer],
-            height_mm=heights_mm[layer],
-            nozzle_mm=nozzle_mm,
-            more=max(processes[layer].walls - process.walls, 0),
-            above=above[layer],
+            sections.own[layer], model[layer], own, counts[layer], heights_mm[layer], nozzle_mm, more, above[layer]
         )
         areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
         return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
@@ -196,28 +170,18 @@ def _walled(
 
 def layer_processes(sections: Sections) -> list[Process]:
     """The settings of every layer: the first has widths of its own, but for one on a raft, and on plastic more walls, if it has
-    any."""
-    process, first = sections.process, sections.process
+    any; where any of a layer overhangs it has overhang_extra_walls more."""
+    process, lying = sections.process, sections.own if sections.pedestal_layers else sections.outlines
+    processes = [process] * len(lying)
     if not sections.on_raft:
-        first = first_layer_process(process) if sections.on_platform else interface_process(process)
-    return [first if i == 0 else process for i in range(len(sections.outlines))]
-
-
-def strengthen_overhangs(
-    processes: Sequence[Process], sections: Sequence[Polygons], first_below: Polygons | None
-) -> list[Process]:
-    """The process of every layer, with overhang_extra_walls more walls where any of them overhangs.
-
-    first_below: plastic under the first layer; None: the platform.
-    """
-    if all(process.overhang_extra_walls == 0 for process in processes):
-        return list(processes)
-    stronger = []
-    for process, section, below in zip(processes, sections, [first_below, *sections[:-1]], strict=True):
-        width, extra = process.line_width_mm, process.overhang_extra_walls if process.walls else 0
-        hangs = below is not None and hanging_area(section, below, process.overhang_share, width).area() >= width**2
-        stronger.append(process.model_copy(update={"walls": process.walls + extra}) if hangs and extra else process)
-    return stronger
+        processes[0] = first_layer_process(process) if sections.on_platform else interface_process(process)
+    if process.overhang_extra_walls:
+        for k, (own, below) in enumerate(zip(processes, [sections.plastic_below, *lying[:-1]], strict=True)):
+            width = own.line_width_mm
+            hangs = below is not None and hanging_area(lying[k], below, own.overhang_share, width).area() >= width**2
+            if hangs and own.walls:
+                processes[k] = own.model_copy(update={"walls": own.walls + own.overhang_extra_walls})
+    return processes
 
 
 def model_sections(sections: Sections) -> list[Polygons | None]:
@@ -247,11 +211,10 @@ def cut_walls(
     model: Polygons | None,
     process: Process,
     counts: WallCounts,
-    *,
     height_mm: float,
     nozzle_mm: float,
     more: int,
-    above: Polygons | None = None,
+    above: Polygons | None,
 ) -> tuple[Walls, tuple[Bead, ...], Polygons]:
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
@@ -283,10 +246,8 @@ def cut_walls(
     loops, ending = [*round_.loops, *((),) * (around - len(round_.loops))], []
     for level in range(around, len(enclosing[most].loops)):
         room = counts.where_more(level, within, short_mm)
-        runs = [
-            run for loop in enclosing[most].loops[level] for run in runs_within(close_loop(loop), room) if length_mm(run) > width
-        ]
-        beads = [Bead(Kind.INNER_WALL, run, width, wall_rank(level, ranked)) for run in runs]
+        runs = [run for loop in enclosing[most].loops[level] for run in runs_within(close_loop(loop), room)]
+        beads = [Bead(Kind.INNER_WALL, run, width, wall_rank(level, ranked)) for run in runs if length_mm(run) > width]
         loops.append(tuple(bead.points[:-1] for bead in beads if bead.closed))
         ending += [bead for bead in beads if not bead.closed]
     inside = round_.inside ^ inside
@@ -432,11 +393,8 @@ def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Be
 
 
 def interface_mm3(shells: Shells) -> dict[int, float]:
-    """Plastic, mm3, that a part has more of than the uncut model in its place, by the part whose base plane is nearest.
-
-    Walls and skins on the faces of cuts where there would be sparse infill, and what the flow of its first layer on
-    plastic adds to the room that it has.
-    """
+    """Plastic, mm3, that a part has more of than the uncut model in its place, by the part whose base plane is nearest: walls and
+    skins on the faces of cuts in place of sparse infill, and what the flow of its first layer on plastic adds to its room."""
     sections, regions = shells.sections, [shell.region for shell in shells.layers]
     part, process, heights = sections.part, sections.process, sections.heights
     planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}

@@ -123,9 +123,9 @@ def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floa
 
 def _closed(layer: Layer, turn: Floats) -> Layer:
     """The last turn with one more at its end, level and running out."""
-    last = layer.path(len(layer) - 1)
+    *_, last = paths = layer.paths
     level = Path(last.kind, turn, last.width_mm, last.speed_mm_s, last.flow, NO_APPROACH, False)
-    paths = (*layer.paths, *_pieces(level, np.linspace(1.0, 0.0, PIECES + 1), 0.0))
+    paths = (*paths, *_pieces(level, np.linspace(1.0, 0.0, PIECES + 1), 0.0))
     return Layer.of(layer.z_mm, layer.height_mm, paths, layer.fan)
 
 
