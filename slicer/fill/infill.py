@@ -19,7 +19,7 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.settings.infill import Infill
 from slicer.bead import Bead, infill_cell_mm, spacing_mm, with_line_width
-from slicer.fill.lightning import clip_chains, lightning_lines
+from slicer.fill.lightning import lightning_lines
 from slicer.fill.lines import Box, LinePattern, Lines, anchor_lines, clip_pattern, concentric_lines, grid_numbers, parallel_lines
 from slicer.geometry.clip import merge_pieces, runs_within
 from slicer.geometry.edge_index import index_edges
@@ -216,13 +216,13 @@ def infill_beads(
         apart_mm = spacing / density
         lines = concentric_lines(offset(inner, -0.5 * (apart_mm - spacing)), apart_mm)
     elif process.infill_pattern == "lightning":
-        lines = clip_chains(lightning, inner, width)
+        lines = [run for branch in lightning for run in runs_within(branch, inner)]
     else:
         border = index_edges(inner)
         families = pattern_lines(process, layer, z_mm, spacing, density)
         pieces = merge_pieces([clip_pattern(border, angle_deg, draw) for angle_deg, draw in families])
         anchor_mm = process.infill_anchor_mm
-        lines = anchor_lines(pieces, border, process.infill_joint_mm, anchor_mm, width)
+        lines, _ = anchor_lines(pieces, border, (process.infill_joint_mm, anchor_mm, width))
     return [Bead(Kind.INFILL, line, width, RANK, anchor_mm=anchor_mm) for line in lines if length_mm(line) > width]
 
 

@@ -7,17 +7,15 @@ left; so each layer prints over the one below (Tricard et al., "Ribbed Support V
 
 from collections.abc import Sequence
 from math import radians, tan
-from typing import NamedTuple
 
 import numpy as np
 
 from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices
-from slicer.geometry.clip import cut_line
 from slicer.geometry.edge_index import EdgeIndex, Grid, crossings, depths, index_edges, lie_within, nearest, within
 from slicer.geometry.polygons import Polygons, contours
-from slicer.geometry.polyline import Segment, length_mm
+from slicer.geometry.polyline import Segment
 
 LEAN_DEG = 40.0  # from the vertical, by which a tip may go beyond the layer below
 STEP = 0.5  # cells between the nodes of a branch, and between the places that want one
@@ -25,14 +23,9 @@ NEAR = 0.5  # cells within which a branch or a wall holds a place
 ON_WALL_MM = 1e-3  # a node so near to the wall stands on it
 
 
-class Trees(NamedTuple):
-    """The trees of a layer: nodes (n, 2), and the number of each node's parent, which comes before it; -1: it is a root."""
-
-    nodes: Floats
-    parent: Indices
-
-
-NO_TREES = Trees(np.zeros((0, 2)), np.zeros(0, np.int64))
+# The trees of a layer: nodes (n, 2), and the number of each node's parent, which comes before it; -1: it is a root.
+Trees = tuple[Floats, Indices]
+NO_TREES = np.zeros((0, 2)), np.zeros(0, np.int64)
 
 
 def lightning_lines(
@@ -50,16 +43,6 @@ def lightning_lines(
         trees = _lower(trees, insides[layer], _wanting(over, cell_mm), (lean_mm, cell_mm))
         lines.append(_chains(trees))
     return lines[::-1]
-
-
-def clip_chains(chains: Sequence[Floats], area: Polygons, least_mm: float) -> list[Floats]:
-    """The pieces of some lines inside an area that are longer than least_mm."""
-    pieces = []
-    for chain in chains:
-        points, inside = cut_line(chain, area)
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
-        pieces += [points[begin : end + 1] for begin, end in ends.reshape(-1, 2).tolist()]
-    return [piece for piece in pieces if length_mm(piece) > least_mm]
 
 
 def _wanting(over: Polygons, cell_mm: float) -> Floats:
@@ -91,23 +74,23 @@ def _lower(trees: Trees, inside: Polygons, wanting: Floats, sizes_mm: tuple[floa
 
     sizes_mm: by how much a tip may lean, and a cell.
     """
-    if inside.is_empty() or not len(trees.nodes) + len(wanting):
+    nodes, parent = trees
+    if inside.is_empty() or not len(nodes) + len(wanting):
         return NO_TREES
     border, (lean_mm, cell_mm) = index_edges(inside), sizes_mm
-    nodes, parent = _prune(*_straighten(trees, lean_mm), lean_mm)
+    nodes, parent = _prune(_straighten(nodes, parent, lean_mm), parent, lean_mm)
     if len(nodes):
         nodes, parent = _ground(nodes, parent, border, STEP * cell_mm)
     if len(wanting):
         deep_mm = depths(wanting, border)
         wanting = wanting[np.argsort(deep_mm, kind="stable")][np.sort(deep_mm) > NEAR * cell_mm]
         nodes, parent = _grow(nodes, parent, wanting, border, (NEAR * cell_mm, STEP * cell_mm))
-    return Trees(nodes, parent)
+    return nodes, parent
 
 
 @kernel
-def _straighten(trees: Trees, most: float) -> tuple[Floats, Indices]:
-    """The trees with every node that has one child moved towards the middle between its neighbours, by at most a length."""
-    nodes, parent = trees.nodes, trees.parent
+def _straighten(nodes: Floats, parent: Indices, most: float) -> Floats:
+    """The nodes, every one that has one child moved towards the middle between its neighbours, by at most a length."""
     n = len(nodes)
     children, child, moved = longs(n, 0), longs(n, 0), nodes.copy()
     for k in range(n):
@@ -122,7 +105,7 @@ def _straighten(trees: Trees, most: float) -> tuple[Floats, Indices]:
         share = min(1.0, most / max(np.hypot(x, y), 1e-12))
         moved[k, 0] += share * x
         moved[k, 1] += share * y
-    return moved, parent
+    return moved
 
 
 @kernel
@@ -150,23 +133,13 @@ def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indic
         keep[k] = True
         for axis in range(2):
             nodes[k, axis] += left / long * (nodes[p, axis] - nodes[k, axis])
-    return _kept(nodes, parent, keep)
-
-
-@helper
-def _kept(nodes: Floats, parent: Indices, keep: np.ndarray) -> tuple[Floats, Indices]:
-    """The nodes that are kept. The parent of a kept node must be kept, too."""
-    number, n = longs(len(nodes), -1), 0
-    for k in range(len(nodes)):
-        if keep[k]:
-            number[k] = n
-            n += 1
-    out, above = table(n, 2), longs(n, -1)
-    for k in range(len(nodes)):
-        if keep[k]:
-            out[number[k], 0], out[number[k], 1] = nodes[k, 0], nodes[k, 1]
-            above[number[k]] = number[parent[k]] if parent[k] >= 0 else -1
-    return out, above
+    number, left, out, above = longs(n, -1), 0, table(n, 2), longs(n, -1)
+    for k in range(n):
+        if keep[k]:  # and so is its parent
+            out[left, 0], out[left, 1] = nodes[k, 0], nodes[k, 1]
+            above[left] = number[parent[k]] if parent[k] >= 0 else -1
+            number[k], left = left, left + 1
+    return out[:left].copy(), above[:left].copy()
 
 
 @kernel

@@ -15,6 +15,7 @@ from mdp.kernels.arrays import flags, floats, longs
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Indices
+from mdp.topology.union_find import join, root, singletons
 from slicer.geometry.clip import NO_PIECES, Pieces, clip_lines, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
@@ -78,23 +79,17 @@ def horizontal_lines(heights: Floats, box: Box) -> Lines:
 def anchor_lines(
     pieces: Pieces,
     border: EdgeIndex,
-    most_mm: float,
-    hook_mm: float = 0.0,
-    apart_mm: float = 0.0,
+    limits_mm: tuple[float, float, float],
     solid_mm: tuple[float, float] = OPEN,
-) -> list[Floats]:
-    """Pieces as long lines (n, 2): joined where ends are at most most_mm apart along the border, else with hooks.
-
-    hook_mm: length of a hook, less where it would not keep apart_mm from the next end or hook; solid_mm: of straight pieces that
-    fill an area their distance, and how far inside the area they end.
-    """
-    return join_groups(pieces, border, np.zeros(len(pieces.ends), np.int64), (most_mm, hook_mm, apart_mm), solid_mm)[0]
-
-
-def join_groups(
-    pieces: Pieces, border: EdgeIndex, group: Indices, limits_mm: tuple[float, float, float], solid_mm: tuple[float, float]
+    group: Indices | None = None,
 ) -> tuple[list[Floats], Indices]:
-    """Lines and the group of each; only pieces of one group (k,) are joined. limits_mm: the lengths that anchor_lines has."""
+    """Pieces as long lines (n, 2), those of one group (k,) joined where ends are near along the border, else with hooks; and the
+    group of each line.
+
+    limits_mm: how near, the length of a hook, and how far it keeps from the next end or hook, for which it may be shorter.
+    solid_mm: of straight pieces that fill an area their distance, and how far inside the area they end.
+    """
+    group = np.zeros(len(pieces.ends), np.int64) if group is None else group
     if not len(pieces.ends):
         return [], group
     out = np.empty((len(pieces.points) + 3 * len(border.edges) + 8 * len(pieces.ends) + 8, 2))
@@ -119,9 +114,8 @@ def _lay_lines(
     along_border = _ways_along_border(pieces, border.edges, way)
     after, gap = _next_ends(along_border, pieces.ends, border, way)
     partner, sense = _join_ends(after, gap, group, most_mm)
-    runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, hook_mm, apart_mm))
+    runs = _runs(sense, after, gap, hook_mm, apart_mm)
     wedges = _wedges(pieces, border.edges, sense, after, gap, runs, solid_mm)
-    _follow_border(wedges, runs, partner, solid_mm[0])
     done = flags(len(pieces.ends))
     n = count = 0
     for seed in range(len(pieces.ends)):
@@ -214,57 +208,38 @@ def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> t
     partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
     for here in range(len(after)):
         ties[here] = np.rint(gap[here] / TIE_MM)
-    order, root = argsort(ties), longs(len(after) // 2, 0)
-    for k in range(len(root)):
-        root[k] = k
-    for here in order:
+    joined = singletons(len(after) // 2)
+    for here in argsort(ties):
         there = after[here]
         if gap[here] > most_mm:
             break
         if partner[here] >= 0 or partner[there] >= 0:
             continue
         a, b = here // 2, there // 2
-        if group[a] != group[b]:
-            continue
-        while root[a] != a:
-            root[a] = root[root[a]]
-            a = root[a]
-        while root[b] != b:
-            root[b] = root[root[b]]
-            b = root[b]
-        if a != b:
-            root[a] = b
+        if group[a] == group[b] and root(joined, a) != root(joined, b):
+            join(joined, a, b)
             partner[here], partner[there], sense[here], sense[there] = there, here, 1, -1
     return partner, sense
 
 
 @helper
-def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm: float) -> Floats:
-    """The length of each end's hook, negative for a way back along the border."""
-    hooks: Floats = floats(len(after), 0.0)
+def _runs(sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm: float) -> Floats:
+    """The length of each end's run along the border, to its partner or as a hook; negative: backward."""
+    runs: Floats = floats(len(after), 0.0)
     free, before = floats(len(after), 0.0), longs(len(after), 0)
     for here in range(len(after)):
         before[after[here]] = here
         free[here] = 0.0 if sense[here] == 1 else gap[here] - apart_mm
     for here in range(len(after)):
-        if partner[here] < 0:
-            back = before[here]
-            side = here if free[here] >= free[back] else back
-            length = min(hook_mm, free[side])
-            if length > apart_mm:
-                hooks[here] = length if side == here else -length
-                free[side] -= length + apart_mm
-    return hooks
-
-
-@helper
-def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Floats:
-    """The length of each end's run along the border, to its partner or as a hook; negative: backward."""
-    runs: Floats = floats(len(partner), 0.0)
-    for here in range(len(partner)):
-        runs[here] = hooks[here]
-        if partner[here] >= 0:
-            runs[here] = gap[here] if sense[here] > 0 else -gap[partner[here]]
+        back = before[here]
+        if sense[here] != 0:
+            runs[here] = gap[here] if sense[here] > 0 else -gap[back]
+            continue
+        side = here if free[here] >= free[back] else back
+        length = min(hook_mm, free[side])
+        if length > apart_mm:
+            runs[here] = length if side == here else -length
+            free[side] -= length + apart_mm
     return runs
 
 
@@ -279,12 +254,13 @@ def _wedges(
     the line gets a run along the border.
     """
     spacing, deep = solid_mm
-    wedges, before, slants = floats(len(sense), 0.0), longs(len(sense), 0), floats(len(sense), 0.0)
+    wedges, before = floats(len(sense), 0.0), longs(len(sense), 0)
+    slants, lengths = floats(len(sense), 0.0), floats(len(sense), 0.0)
     if spacing <= 0.0:
         return wedges
     for here in range(len(after)):
         before[after[here]] = here
-        slants[here] = _slant(pieces, edges, here)
+        slants[here], lengths[here] = _slant(pieces, edges, here)
     round_mm = np.sqrt(max(0.25 * spacing * spacing - deep * deep, 0.0))
     for here in range(len(sense)):
         sine = np.sqrt(max(1.0 - slants[here] * slants[here], 0.0))
@@ -295,7 +271,7 @@ def _wedges(
         beside, free = (after[here], gap[here]) if sharp > 0 else (before[here], gap[before[here]])
         faced = slants[beside] * sharp > 0.0 and sense[beside] != -sharp
         left = 0.0
-        if sense[here] != sharp and _piece_mm(pieces, here) > 3.0 * BEND * spacing:
+        if sense[here] != sharp and lengths[here] > 3.0 * BEND * spacing:
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
         beyond, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
         beyond_mm, alone = free - blunt_mm - round_mm, here % 2 == 1 or sense[here ^ 1] != 0
@@ -303,35 +279,25 @@ def _wedges(
         if sense[here] == 0 and corner and alone and beyond_mm > max(left, LEAST_RUN * spacing):
             runs[here] = -sharp * min(beyond_mm, MOST_WEDGE * spacing)
         elif left > LEAST_WEDGE * spacing:
-            wedges[here] = sharp * min(left, MOST_WEDGE * spacing)
+            wedge = sharp * min(left, MOST_WEDGE * spacing)
+            if sense[here] == 0 and abs(wedge) > spacing:  # an end that is left alone follows the border
+                runs[here] = wedge
+            else:
+                wedges[here] = wedge
     return wedges
 
 
 @helper
-def _follow_border(wedges: Floats, runs: Floats, partner: Indices, spacing_mm: float) -> None:
-    """Makes runs along the border of the wedges longer than a spacing at ends that are left alone."""
-    for end in range(len(wedges)):
-        if partner[end] < 0 and abs(wedges[end]) > spacing_mm:
-            runs[end], wedges[end] = wedges[end], 0.0
-
-
-@helper
-def _slant(pieces: Pieces, edges: Floats, end: int) -> float:
-    """Cosine of the angle between the border's way and a straight piece that begins at its end."""
+def _slant(pieces: Pieces, edges: Floats, end: int) -> tuple[float, float]:
+    """Cosine of the angle between the border's way and a straight piece that begins at its end, and the piece's length."""
     k, side = end // 2, end % 2
     first, last, e = pieces.starts[k], pieces.starts[k + 1] - 1, pieces.ends[k, side]
     near, far = (last, first) if side else (first, last)
     x, y = pieces.points[far, 0] - pieces.points[near, 0], pieces.points[far, 1] - pieces.points[near, 1]
     u, v = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
-    size = np.hypot(x, y) * np.hypot(u, v)
-    return float((x * u + y * v) / size) if size > 0.0 else 1.0
-
-
-@helper
-def _piece_mm(pieces: Pieces, end: int) -> float:
-    """Length of the straight piece of an end."""
-    first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
-    return float(np.hypot(pieces.points[last, 0] - pieces.points[first, 0], pieces.points[last, 1] - pieces.points[first, 1]))
+    length_mm = np.hypot(x, y)
+    size = length_mm * np.hypot(u, v)
+    return (x * u + y * v) / size if size > 0.0 else 1.0, length_mm
 
 
 @no_nrt

@@ -120,25 +120,18 @@ def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
 
     Running intersections of blocks from both sides (van Herk 1992): three booleans a layer, however many are common.
     """
-    if count <= 0 or not layers:
+    if count <= 0:
         return list(layers)
-    n = len(layers)
-    forward: list[Polygons] = []
+    n, forward, backward = len(layers), list(layers), list(layers)
     for i in range(n):
-        forward.append(layers[i] if i % count == 0 else forward[-1] ^ layers[i])
-    backward: list[Polygons] = list(layers)
+        if i % count:
+            forward[i] = forward[i - 1] ^ layers[i]
     for i in range(n - 2, -1, -1):
         if (i + 1) % count:
             backward[i] = layers[i] ^ backward[i + 1]
-    common = []
-    for i in range(n):
-        end = i + count - 1
-        if end >= n:
-            common.append(Polygons())
-        else:
-            same_block = i // count == end // count
-            common.append((forward[end] if i % count == 0 else backward[i]) if same_block else backward[i] ^ forward[end])
-    return common
+    ends = ((i, i + count - 1) for i in range(n - count + 1))
+    common = [backward[i] ^ forward[end] if i % count else forward[end] for i, end in ends]
+    return common + [Polygons()] * (n - len(common))
 
 
 def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:

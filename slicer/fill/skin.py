@@ -26,10 +26,9 @@ from slicer.fill.lines import (
     clip_pattern,
     concentric_lines,
     horizontal_lines,
-    join_groups,
 )
 from slicer.geometry.clip import Pieces, rotation_2d
-from slicer.geometry.edge_index import EdgeIndex, index_edges
+from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, offset
 from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
@@ -124,21 +123,24 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
         return concentric_lines(inner, solid.spacing_mm)
     border = index_edges(inner)
     pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm, (EDGE, EDGE)))
-    edges = _edges(pieces, solid)
+    edges = _edges(pieces, solid) if len(pieces.ends) else (EDGE, EDGE)
     if max(edges) > EDGE:
         pieces = clip_pattern(border, solid.angle_deg, _even(solid.spacing_mm, edges))
-    joint_mm = JOIN * solid.spacing_mm
-    if solid.pattern == "monotonic":
-        lines = monotonic_lines(pieces, border, solid.angle_deg, solid.spacing_mm, joint_mm, solid.border_mm)
-    else:
-        lines = anchor_lines(pieces, border, joint_mm, solid_mm=solid.border_mm)
+    if not len(pieces.ends):
+        return []
+    in_order = solid.pattern == "monotonic"
+    cell, before = _cells(pieces, solid.angle_deg, solid.spacing_mm) if in_order else (None, [])
+    lines, of = anchor_lines(pieces, border, (JOIN * solid.spacing_mm, 0.0, 0.0), solid.border_mm, cell)
+    if in_order and len(lines) > 1:
+        by_cell: list[list[Floats]] = [[] for _ in before]
+        for line, own in zip(lines, of.tolist(), strict=True):
+            by_cell[own].append(line)
+        lines = _order_lines(by_cell, before, rotation_2d(solid.angle_deg))
     return [line for line in lines if length_mm(line) > 0.5 * solid.width_mm]
 
 
 def _edges(pieces: Pieces, solid: SolidLines) -> tuple[float, float]:
     """Spacings that the lowest and the highest line should keep from the extreme points: more where they are dots in a corner."""
-    if not len(pieces.ends):
-        return EDGE, EDGE
     ends = pieces.points.reshape(-1, 2, 2) @ rotation_2d(solid.angle_deg)
     long, height = np.abs(ends[:, 1, 0] - ends[:, 0, 0]), ends[:, 0, 1]
     rows = height < height.min() + LEVEL * solid.spacing_mm, height > height.max() - LEVEL * solid.spacing_mm
@@ -156,25 +158,6 @@ def _even(spacing: float, edges: tuple[float, float]) -> Draw:
         return horizontal_lines(np.linspace(*ends, max(between, 0) + 1, dtype=np.float64), box)
 
     return draw
-
-
-def monotonic_lines(
-    pieces: Pieces, border: EdgeIndex, angle_deg: float, spacing_mm: float, most_mm: float, solid_mm: tuple[float, float] = OPEN
-) -> list[Floats]:
-    """Straight pieces as lines (n, 2) in printing order, joined along the border where ends are at most most_mm apart.
-
-    solid_mm: as anchor_lines.
-    """
-    if not len(pieces.ends):
-        return []
-    cell, before = _cells(pieces, angle_deg, spacing_mm)
-    lines, of = join_groups(pieces, border, cell, (most_mm, 0.0, 0.0), solid_mm)
-    if len(lines) < 2:
-        return lines
-    by_cell: list[list[Floats]] = [[] for _ in before]
-    for line, own in zip(lines, of.tolist(), strict=True):
-        by_cell[own].append(line)
-    return _order_lines(by_cell, before, rotation_2d(angle_deg))
 
 
 def _cells(pieces: Pieces, angle_deg: float, spacing_mm: float) -> tuple[Indices, list[set[int]]]:
@@ -227,17 +210,11 @@ def _order_lines(by_cell: Sequence[list[Floats]], before: Sequence[set[int]], tu
         cell = min(ready, key=lambda cell: float(np.hypot(*(rising[cell][0][0] - out[-1][-1])))) if out else ready[0]
         ready.remove(cell)
         for line in rising[cell]:
-            out.append(_nearer_end_first(line, out, turned))
+            single = abs(float((line[-1] - line[0]) @ turned[:, 1])) < SINGLE_MM  # which a path upward is not
+            turns = out and single and np.hypot(*(line[-1] - out[-1][-1])) < np.hypot(*(line[0] - out[-1][-1]))
+            out.append(line[::-1] if turns else line)
         for later in after[cell]:
             waits[later] -= 1
             if not waits[later]:
                 ready.append(later)
     return out
-
-
-def _nearer_end_first(line: Floats, out: Sequence[Floats], turned: Floats) -> Floats:
-    """A single line may be printed from either end; a path upward may not."""
-    if not out or abs(float((line[-1] - line[0]) @ turned[:, 1])) >= SINGLE_MM:
-        return line
-    tip = out[-1][-1]
-    return line[::-1] if np.hypot(*(line[-1] - tip)) < np.hypot(*(line[0] - tip)) else line
