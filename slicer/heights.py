@@ -193,24 +193,6 @@ def _spread(thick: list[float], rest: float, least: float, most: float) -> list[
     return [total / count] * count
 
 
-def _measure_slopes(mesh: Mesh, process: Process) -> tuple[Floats, float, Floats]:
-    """What the surface of a mesh in its part frame allows: steps of at most adaptive_cusp_mm, between least and most height.
-
-    (n,) the highest layer, mm, that may touch each of n bins from the base plane up, the height of a bin, and the rising heights
-    of level surfaces.
-    """
-    top = float(mesh.bounds_mm[1, 2])
-    bin_mm = max(BIN_SHARE * process.least_layer_height_mm, top / MOST_BINS)
-    leaning = np.abs(mesh.normals[:, 2])
-    level = leaning > FLAT
-    steepest = _worst(mesh.vertices[:, 2], mesh.faces[~level], leaning[~level], bin_mm, int(top / bin_mm) + 1)
-    allowed = process.adaptive_cusp_mm / np.maximum(steepest, 1e-9)
-    heights_mm = np.round(mesh.vertices[mesh.faces[level, 0], 2], 6)
-    levels, which = np.unique(heights_mm, return_inverse=True)
-    wide = np.bincount(which, mesh.areas_mm2[level], len(levels)) >= LEAST_LEVEL_MM2
-    return np.clip(allowed, process.least_layer_height_mm, process.most_layer_height_mm), bin_mm, levels[wide]
-
-
 @kernel
 def _worst(z: Floats, faces: Ints, leaning: Floats, bin_mm: float, bins: int) -> Floats:
     """(bins,) greatest |n_z| of the faces that reach into each bin."""
@@ -231,8 +213,16 @@ def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float
     where what is left under a level is less than two of the least, one layer takes all of it, or the level is passed over where
     that one would be too high. What is left so under the top is not taken.
     """
-    (most_mm, bin_mm, levels_mm), least_mm = _measure_slopes(mesh, process), process.least_layer_height_mm
-    stops = [level for level in levels_mm.tolist() if from_mm < level < top_mm - least_mm] + [top_mm]
+    least_mm, highest_mm = process.least_layer_height_mm, float(mesh.bounds_mm[1, 2])
+    leaning = np.abs(mesh.normals[:, 2])
+    level, bin_mm = leaning > FLAT, max(BIN_SHARE * least_mm, highest_mm / MOST_BINS)
+    steepest = _worst(mesh.vertices[:, 2], mesh.faces[~level], leaning[~level], bin_mm, int(highest_mm / bin_mm) + 1)
+    most_mm = np.clip(
+        process.adaptive_cusp_mm / np.maximum(steepest, 1e-9), least_mm, process.most_layer_height_mm
+    )  # in each bin
+    levels_mm, which = np.unique(np.round(mesh.vertices[mesh.faces[level, 0], 2], 6), return_inverse=True)
+    wide = np.bincount(which, mesh.areas_mm2[level], len(levels_mm)) >= LEAST_LEVEL_MM2
+    stops = [stop for stop in levels_mm[wide].tolist() if from_mm < stop < top_mm - least_mm] + [top_mm]
     thick: list[float] = []
     z = from_mm
     for stop in stops:

@@ -90,19 +90,14 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
             anchors = below + (outlines[i] - hanging)  # also slopes beside it that carry themselves
             overhang = _sort_islands(hanging, need, anchors, process, (level_mm, min(level_mm, arch_mm)))
         if not enforced.is_empty():
-            overhang = _enforced(overhang, enforced)
+            bridges = [replace(bridge, hanging=bridge.hanging - enforced) for bridge in overhang.bridges]
+            left = tuple(bridge for bridge in bridges if bridge.hanging.area() >= LEAST_MM2)
+            overhang = replace(overhang, hanging=overhang.hanging + enforced, bridges=left, ledges=overhang.ledges - enforced)
         if sections.no_support and not overhang.hanging.is_empty():
             wanted = overhang.hanging - sections.no_support[i]
             overhang = replace(overhang, hanging=wanted, unwanted=overhang.hanging - wanted)
         overhangs[i] = overhang
     return overhangs
-
-
-def _enforced(overhang: Overhang, places: Polygons) -> Overhang:
-    """The overhang with some places that are held up, whatever they would do without."""
-    bridges = [replace(bridge, hanging=bridge.hanging - places) for bridge in overhang.bridges]
-    left = tuple(bridge for bridge in bridges if bridge.hanging.area() >= LEAST_MM2)
-    return replace(overhang, hanging=overhang.hanging + places, bridges=left, ledges=overhang.ledges - places)
 
 
 def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons:

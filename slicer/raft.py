@@ -60,7 +60,7 @@ def raft_layers(supports: Supports) -> list[Layer]:
         beads = _raft_beads(area, process.raft_layers - 1 - k, own, height_mm, first=k == 0)
         if k == 0:
             beads += beads_around(sections, area, area, own, height_mm)
-        layers.append(_layer(beads, area, sections.profile, heights[k : k + 1], layers))
+        layers.append(_layer(beads, area, sections.profile, float(heights.tip_mm[k]), height_mm, layers))
     return layers + _support_on_raft(supports, layers)
 
 
@@ -92,24 +92,21 @@ def _support_on_raft(supports: Supports, below: Sequence[Layer]) -> list[Layer]:
     profile, process, tip_mm = sections.profile, sections.support_process, float(sections.heights.tip_mm[0])
     deep_mm = tip_mm + process.raft_contact_distance_mm
     count = ceil(deep_mm / min(process.highest_layer_mm, profile.machine.head.nozzle_mm) - 1e-9)
-    thick_mm = np.full(count, deep_mm / count)
-    tips_mm = tip_mm - thick_mm[0] * np.arange(count)[::-1]
-    heights = Heights(tips_mm, thick_mm, tips_mm - 0.5 * thick_mm)
-    layers: list[Layer] = []
-    for k in range(count):
-        beads = support_beads(area, supports.dense[0], Polygons(), process, float(thick_mm[k]), False)
-        layers.append(_layer(beads, area, profile, heights[k : k + 1], [*below, *layers]))
+    layers, height_mm = list[Layer](), deep_mm / count
+    for over in reversed(range(count)):
+        beads = support_beads(area, supports.dense[0], Polygons(), process, height_mm, False)
+        layers.append(_layer(beads, area, profile, tip_mm - height_mm * over, height_mm, [*below, *layers]))
     return layers
 
 
-def _layer(beads: list[Bead], area: Polygons, profile: Profile, height: Heights, below: Sequence[Layer]) -> Layer:
-    """The beads of a layer in order, with speeds and heat; height: its own."""
+def _layer(beads: list[Bead], area: Polygons, profile: Profile, z_mm: float, height_mm: float, below: Sequence[Layer]) -> Layer:
+    """The beads of a layer in order, with speeds and heat."""
     process, material, number = profile.process, profile.material, len(below)
     tip: Floats | None = below[-1].points[-1] if below and len(below[-1]) else None
     kind_mm_s = None if number else first_layer_speeds(process)
     strokes = order_beads(beads, Polygons(), process, tip, area, kind_mm_s=kind_mm_s)
-    height_mm, flow = float(height.height_mm[0]), material.flow * (1.0 if number else process.first_layer_flow)
+    flow = material.flow * (1.0 if number else process.first_layer_flow)
     strokes, speeds = timed(strokes, profile, height_mm, kind_mm_s, flow)
     add_c = 0.0 if number else material.first_layer_nozzle_c - material.nozzle_c
-    z_mm, fan = float(height.tip_mm[0]), rising_fan(material, number)
+    fan = rising_fan(material, number)
     return layer_of(strokes, speeds, profile, z_mm=z_mm, height_mm=height_mm, flow=flow, fan=fan, add_c=add_c)

@@ -57,7 +57,22 @@ def hold_ends(
         return list(beads)
     inside_mm = depths(np.concatenate([beads[k].points[[0, -1]] for k in skins]), index_edges(section_below)).reshape(-1, 2)
     loose = np.where(ends & (inside_mm > 0.0), CUT, np.where(ends & (inside_mm > -width_mm), EXTEND, HELD))
-    return _held_beads(beads, dict(zip(skins, loose.tolist(), strict=True)), below, index_edges(section), width_mm)
+    needs, outline = dict(zip(skins, loose.tolist(), strict=True)), index_edges(section)
+    out, cut = list[Bead](), False  # cut: the bead that the next one would follow is left out
+    for k, bead in enumerate(beads):
+        points, (first, last) = bead.points, needs.get(k, (HELD, HELD))
+        if first:
+            points = _held(points, below, outline, width_mm, first)
+        if last and len(points):
+            turned = np.ascontiguousarray(points[::-1])
+            held = _held(turned, below, outline, width_mm, last)
+            points = points if held is turned else held[::-1]
+        if points is not bead.points and length_mm(points) < width_mm:
+            cut = cut or not bead.follows
+            continue
+        out.append(bead if points is bead.points and not cut else replace(bead, points=points, follows=bead.follows and not cut))
+        cut = False
+    return out
 
 
 def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[Bead]:
@@ -77,28 +92,6 @@ def _cut_anchor(bead: Bead, layers: Sequence[Plastic]) -> Bead:
         way = min((way for way in ways if way >= 0.0), default=0.0)
         points = _from(points, way - HOLD * width_mm) if way > width_mm else points
     return bead if np.array_equal(points, bead.points) or length_mm(points) < width_mm else replace(bead, points=points)
-
-
-def _held_beads(
-    beads: Sequence[Bead], loose: dict[int, list[int]], plastic: Plastic, outline: EdgeIndex, width_mm: float
-) -> list[Bead]:
-    """The beads with their loose ends held; loose: by the number of a bead, what its beginning and its end need."""
-    out, cut = list[Bead](), False  # cut: the bead that the next one would follow is left out
-    for k, bead in enumerate(beads):
-        points = bead.points
-        first, last = loose.get(k, (HELD, HELD))
-        if first:
-            points = _held(points, plastic, outline, width_mm, first)
-        if last and len(points):
-            turned = np.ascontiguousarray(points[::-1])
-            held = _held(turned, plastic, outline, width_mm, last)
-            points = points if held is turned else held[::-1]
-        if points is not bead.points and length_mm(points) < width_mm:
-            cut = cut or not bead.follows
-            continue
-        out.append(bead if points is bead.points and not cut else replace(bead, points=points, follows=bead.follows and not cut))
-        cut = False
-    return out
 
 
 @kernel

@@ -73,7 +73,7 @@ def plan_fillings(
     fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
     areas: list[list[Polygons]] = [[] for _ in fillings]
     for layer, area in enumerate(sparse):
-        for part, mine in zip(divided(area, fillings, layer, process, _apart_mm(process)), areas, strict=True):
+        for part, mine in zip(divided(area, fillings, layer, process, apart=True), areas, strict=True):
             mine.append(part)
     planned = []
     for filling, mine in zip(fillings, areas, strict=True):
@@ -88,15 +88,11 @@ def plan_fillings(
     return planned
 
 
-def _apart_mm(process: Process) -> float:
-    """Between the areas of two infills, which both reach over their borders as into a wall."""
-    return 2.0 * process.infill_overlap * process.line_width_mm if process.walls else 0.0
-
-
-def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: Process, apart_mm: float = 0.0) -> list[Polygons]:
+def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: Process, *, apart: bool) -> list[Polygons]:
     """A layer's sparse area divided among the infills: a later one takes its place first, with the strips beside it that are too
-    narrow for lines of an earlier one."""
+    narrow for lines of an earlier one. apart: as far as both reach over their borders, as into a wall."""
     left, parts, width_mm = sparse, list[Polygons](), process.line_width_mm
+    apart_mm = 2.0 * process.infill_overlap * width_mm if apart and process.walls else 0.0
     for filling in reversed(fillings):
         if filling.place is None or left.is_empty():
             parts.append(left)
@@ -143,14 +139,13 @@ def filling_beads(
 
     leaning: where walls of the next layer begin to leave those of this one; a line beside these carries them.
     """
-    at = {"z_mm": float(heights.tip_mm[layer]), "height_mm": float(heights.height_mm[layer])}
-    width = process.line_width_mm
-    lines, sparse = _lines_under_walls(sparse, leaning, width, spacing_mm(width, at["height_mm"]))
+    width, z_mm, height_mm = process.line_width_mm, float(heights.tip_mm[layer]), float(heights.height_mm[layer])
+    lines, sparse = _lines_under_walls(sparse, leaning, width, spacing_mm(width, height_mm))
     beads = [Bead(Kind.INFILL, line, width, RANK) for line in lines]
-    for filling, area in zip(fillings, divided(sparse, fillings, layer, process, _apart_mm(process)), strict=True):
+    for filling, area in zip(fillings, divided(sparse, fillings, layer, process, apart=True), strict=True):
         branches = filling.lightning[layer] if filling.lightning else ()
         own = filling.process(process)
-        beads += infill_beads(area, own, density=filling.density, layer=layer, lightning=branches, **at)
+        beads += infill_beads(area, own, density=filling.density, layer=layer, z_mm=z_mm, height_mm=height_mm, lightning=branches)
     return beads
 
 
@@ -182,7 +177,7 @@ def _lines_under_walls(sparse: Polygons, leaning: Polygons, width_mm: float, spa
 def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int, lightning: bool = True) -> Polygons:
     """The part of a layer's sparse area whose lines are too far apart to carry skin without bridges; lightning: also where
     this is the pattern, whose branches come to the ends of skins."""
-    areas = zip(fillings, divided(sparse, fillings, layer, process), strict=True)
+    areas = zip(fillings, divided(sparse, fillings, layer, process, apart=False), strict=True)
     able = [(filling, area) for filling, area in areas if lightning or not filling.lightning]
     wide = [area for filling, area in able if filling.process(process).infill_density < DENSE]
     return wide[0] if len(wide) == 1 else union(wide)

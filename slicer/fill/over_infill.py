@@ -147,25 +147,19 @@ def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
                 here = x[at] if side == 0 else -x[at]
                 if kinds[at] == SKIN:
                     in_skin = not in_skin
-                    if in_skin:
-                        if lacking:  # the void between two skins
-                            out[n, 0] = rows[at]
-                            out[n, 1], out[n, 2] = (begun, here) if side == 0 else (-here, -begun)
-                            n += 1
-                        else:
-                            begun = here
-                        lacking = False
-                    elif in_void and here - held > holds:
-                        lacking, ended = True, here
-                    continue
-                if kinds[at] == VOID:
-                    in_void = not in_void
-                held = here
-                if lacking:
-                    lacking = False
-                    if here > ended:
-                        out[n, 0] = rows[at]
-                        out[n, 1], out[n, 2] = (begun, here) if side == 0 else (-here, -begun)
-                        n += 1
+                    if not in_skin:
+                        if in_void and here - held > holds:
+                            lacking, ended = True, here
+                        continue
+                    grows = lacking  # over the void between two skins
+                    begun = begun if lacking else here
+                else:
+                    in_void = in_void != (kinds[at] == VOID)
+                    held, grows = here, lacking and here > ended
+                lacking = False
+                if grows:
+                    out[n, 0] = rows[at]
+                    out[n, 1], out[n, 2] = (begun, here) if side == 0 else (-here, -begun)
+                    n += 1
         begin = end
     return out[:n]

@@ -68,9 +68,10 @@ def regions(
     will lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
     """
     found = [Region(*[Polygons()] * 5)] * len(insides)
-    ruled = combined(places, SOLID_KEYS)
-    if len({_solid_rule(own) for own in (process, *(place.over(process) for place in ruled))}) == 1:
-        ruled = []
+    ruled, rules = combined(places, SOLID_KEYS), set()
+    for own in (process, *(place.over(process) for place in ruled)):  # what decides which places become solid
+        rules.add((shell_layers(own), own.infill_density >= 1.0, own.infill_density > 0.0, own.solid_below_mm2))
+    ruled = ruled if len(rules) > 1 else []
     tops = most_shell_layers(process, places)[0] > 0
     for run in [range(len(insides))] if runs is None else runs:
         hollow = _hollow(run, cover, process)
@@ -91,12 +92,6 @@ def _hollow(run: range, cover: Cover, process: Process) -> list[Polygons]:
     below = _common(stacked[::-1], bottom)[::-1][bottom - 1 :] if bottom else inner
     sparse_areas = [sparse_area(*row, process) for row in zip(inner, above, below, strict=False)]
     return _without_footings(sparse_areas, cover.sections[run.start + 1 : end], inner[1:], process)[: len(run)]
-
-
-def _solid_rule(process: Process) -> tuple[object, ...]:
-    """The settings that decide which places become solid."""
-    density = process.infill_density
-    return shell_layers(process), density >= 1.0, density > 0.0, process.solid_below_mm2
 
 
 def _hollow_with(hollow: Sequence[Polygons], run: range, cover: Cover, place: Place, process: Process) -> list[Polygons]:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.directions.spread import spread_like_light
-from mdp.kernels.arrays import floats, longs, table
+from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices, Mesh, together
 from mdp.overhang import Mask
@@ -86,8 +86,7 @@ def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]
     (levels, samples), rear = light_samples(sections, outlines), rear_of(sections.mesh.bounds_mm)
     offered, costs = [], []
     for layer, loop in loops:
-        places, strength = _offered(loop)
-        clear = keeps_clear(places[:, :2], limits[layer])
+        places, strength, clear = _offered(loop, limits[layer])
         worth = np.where(strength > 0.0, INNER, OUTER) * np.abs(strength)
         seen = light_at(layer, places, sections.heights.cut_mm, levels, samples)
         costs.append(seen - worth + TO_REAR * np.hypot(*(places[:, :2] - rear).T) + FORBIDDEN * ~clear)
@@ -150,9 +149,9 @@ def _bodies(mesh: Mesh) -> Indices:
 
 
 @kernel
-def _offered(loop: Floats) -> tuple[Floats, Floats]:
+def _offered(loop: Floats, limits: SeamLimits) -> tuple[Floats, Floats, Mask]:
     """(n, 4) places spread over a loop, the corner of each stretch of it that has one, with the unit vectors out of the solid
-    there, and (n,) how much of a corner each is."""
+    there, (n,) how much of a corner each is, and (n,) whether it is clear of the limits."""
     n, total = len(loop), 0.0
     for i in range(n):
         total += np.hypot(loop[i, 0] - loop[i - 1, 0], loop[i, 1] - loop[i - 1, 1])
@@ -181,7 +180,10 @@ def _offered(loop: Floats) -> tuple[Floats, Floats]:
             places[stretch, 0], places[stretch, 1] = loop[i, 0], loop[i, 1]
             places[stretch, 2], places[stretch, 3] = x / length, y / length
         along += step
-    return places, strengths
+    clear = flags(count)
+    for k in range(count):
+        clear[k] = is_clear(limits, places[k, 0], places[k, 1])
+    return places, strengths, clear
 
 
 @helper
@@ -212,15 +214,6 @@ def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
         left -= step
         at += sense
     return loop[at % n, 0], loop[at % n, 1]
-
-
-@kernel
-def keeps_clear(places: Floats, limits: SeamLimits) -> Mask:
-    """(n,) whether (n, 2) places are clear of the limits."""
-    clear = np.ones(len(places), np.bool_)
-    for k in range(len(places)):
-        clear[k] = is_clear(limits, places[k, 0], places[k, 1])
-    return clear
 
 
 @helper

@@ -9,6 +9,7 @@ A detour follows the border of the area's inside from where the straight line le
 way round, and is then pulled taut. Every segment of it is tested against the border of the area's safe inside.
 """
 
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -71,26 +72,21 @@ def travels(
     return retracts, detours
 
 
+@dataclass(eq=False)
 class Combing:
-    """Where the tip may travel over an area of one layer, a section or its support, without a retraction."""
+    """Where the tip may travel over an area of one layer, a section or its support, without a retraction; barred: what of it no
+    travel passes."""
 
-    def __init__(self, area: Polygons, width_mm: float, barred: Polygons | None = None) -> None:
-        """barred: what of it no travel passes."""
-        self._area, self._width_mm, self._barred = area, width_mm, barred
+    area: Polygons
+    width_mm: float
+    barred: Polygons | None = None
+    tracks: dict[float, EdgeIndex] = field(default_factory=dict)  # what detours follow, by line widths inside the area
 
     @cached_property
     def safe(self) -> EdgeIndex:
         """The border that no travel without a retraction crosses."""
-        inside = offset(self._area, -SAFE * self._width_mm)
-        return index_edges(inside if self._barred is None else inside - self._barred)
-
-    @cached_property
-    def _behind(self) -> EdgeIndex:
-        return index_edges(offset(self._area, -BEHIND * self._width_mm))
-
-    @cached_property
-    def _among(self) -> EdgeIndex:
-        return index_edges(offset(self._area, -AMONG * self._width_mm))
+        inside = offset(self.area, -SAFE * self.width_mm)
+        return index_edges(inside if self.barred is None else inside - self.barred)
 
     def leaves(self, since: Floats, to: Floats) -> Mask:
         """(n, 2) by two whether the travels between these points leave the safe inside."""
@@ -100,9 +96,12 @@ class Combing:
         """Points (k, 2) between start and end of a path inside, at most most_mm longer than the straight line; or None."""
         straight = Segment(float(start[0]), float(start[1]), float(end[0]), float(end[1]))
         longest = float(np.hypot(*(end - start))) + most_mm
-        for track in (self._behind, self._among):
+        for widths in (BEHIND, AMONG):
+            if widths not in self.tracks:
+                self.tracks[widths] = index_edges(offset(self.area, -widths * self.width_mm))
+            track = self.tracks[widths]
             path = np.empty((len(track.edges) + 2 * len(track.begins) + 4, 2))
-            count = _comb(self.safe, track, straight, longest, 2.0 * self._width_mm, path)
+            count = _comb(self.safe, track, straight, longest, 2.0 * self.width_mm, path)
             if count > 1:
                 return path[1 : count - 1].copy()
         return None
