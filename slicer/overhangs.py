@@ -33,10 +33,8 @@ GAIN = 0.1  # share by which lines must sag less than in the directions tried be
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """hanging: what it spans; angle_deg: direction of its lines, 0 to 180.
-
-    longest_mm: the longest span; loose: share of the lines' length that is not held at both ends.
-    """
+    """hanging: what it spans; angle_deg: direction of its lines, 0 to 180. longest_mm: the longest span; loose: share of the
+    lines' length that is not held at both ends."""
 
     hanging: Polygons
     angle_deg: float
@@ -50,11 +48,8 @@ class Bridge:
 
 @dataclass(frozen=True, eq=False)
 class Overhang:
-    """The overhangs of one layer.
-
-    hanging: needs support; bridges: lines span them; ledges: carry themselves, though no line spans them; unwanted: would need
-    support, but a person wants none there.
-    """
+    """The overhangs of one layer. hanging: needs support; bridges: lines span them; ledges: carry themselves, though no line
+    spans them; unwanted: would need support, but a person wants none there."""
 
     hanging: Polygons = field(default_factory=Polygons)
     bridges: tuple[Bridge, ...] = ()
@@ -102,9 +97,7 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
 
 def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons:
     """The pieces of a layer that begin over nothing, however steep they are: a bell's rim that gets thick enough for a line.
-
-    beyond_mm2: how much of the layer lies beyond the one below, which such a piece does all.
-    """
+    beyond_mm2: how much of the layer lies beyond the one below, which such a piece does all."""
     small = [piece for piece in islands(outline) if piece.area() < beyond_mm2 + LEAST_MM2]
     return union([piece for piece in small if (piece ^ below).is_empty()])
 
@@ -112,10 +105,8 @@ def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons
 def _sort_islands(
     hanging: Polygons, need: Polygons, anchors: Polygons, process: Process, longest_mm: tuple[float, float]
 ) -> Overhang:
-    """Sorts the connected pieces of a hanging place.
-
-    need: what of it needs support by the search's definition; longest_mm: of bridges that do not, and of those that do.
-    """
+    """Sorts the connected pieces of a hanging place. need: what of it needs support by the search's definition; longest_mm: of
+    bridges that do not, and of those that do."""
     width_mm, places = process.line_width_mm, islands(hanging)
     if all(island.area() < LEAST * width_mm**2 for island in places):
         return Overhang(need)
@@ -204,10 +195,8 @@ def bridges_of_layers(
     sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons], layers: Sequence[int]
 ) -> list[tuple[Bridge, ...]]:
     """The bridges of some layers, in rising order: those that carry themselves, and what hangs over no support, as it best can.
-
     Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
-    supported: where each layer's support is.
-    """
+    supported: where each layer's support is."""
     process, heights, outlines = sections.process, sections.heights, sections.outlines
     width_mm = process.line_width_mm
     bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
@@ -233,10 +222,8 @@ def bridges_of_layers(
 
 def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> list[Bridge]:
     """Lines over one connected hanging place, each piece of it in the direction in which most of them are held at both ends.
-
     Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn. angle_deg: as
-    find_bridge.
-    """
+    find_bridge."""
     bridges: list[Bridge] = []
     left = [hanging]
     while left:

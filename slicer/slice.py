@@ -75,10 +75,8 @@ class SlicingProgress:
 def slice_parts(
     parts: Sequence[Part], profile: Profile, on_progress: Callable[[SlicingProgress], None] | None = None
 ) -> tuple[SlicedPart, ...]:
-    """Every part sliced; on_progress: called now and then.
-
-    Raises SliceError as slice_part does, for the first part in print order that has a reason.
-    """
+    """Every part sliced; on_progress: called now and then. Raises SliceError as slice_part does, for the first part in print
+    order that has a reason."""
     if not parts:
         return ()
     models = sum(part.on_platform for part in parts)
@@ -287,9 +285,8 @@ def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
 
 def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
     """The beads of a first layer on plastic, what fills its walls before them: outer walls are laid last, against beads that are
-    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up
-    for there, not where a wall has its seam.
-    """
+    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up for
+    there, not where a wall has its seam."""
     inside = [replace(bead, rank=BEFORE_WALLS) if FILL <= bead.rank <= LAST else bead for bead in beads]
     if any(bead.rank <= OUTSIDE for bead in inside):
         return inside

@@ -67,10 +67,8 @@ class Estimate:
 
 
 def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
-    """What printing one part, or several one after the other, takes.
-
-    The same on every machine. Raises SliceError where a part's mesh is not closed or it is too high to be meant.
-    """
+    """What printing one part, or several one after the other, takes. The same on every machine. Raises SliceError where a part's
+    mesh is not closed or it is too high to be meant."""
     several = (parts,) if isinstance(parts, Part) else tuple(parts)
     total, sections = np.zeros(3), section_parts(several, profile)
     overhangs = [find_overhangs(layers) for layers in sections]
@@ -117,11 +115,9 @@ def _rough_s(drawn_mm: Floats, outlines: Indices, process: Process) -> Floats:
 
 
 def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
-    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, then runs of equal weight.
-
-    The difference of a layer's weight from that of the next one counts, too, so that runs are short where weights vary and begin
-    at large jumps. A run's samples are the two neighbours in its middle, whose lines have turned directions.
-    """
+    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, then runs of equal weight. The
+    difference of a layer's weight from that of the next one counts, too, so that runs are short where weights vary and begin at
+    large jumps. A run's samples are the two neighbours in its middle, whose lines have turned directions."""
     count = len(weight)
     done = np.cumsum(weight[1:] + np.abs(np.diff(weight[1:], append=weight[-1:])))
     cuts = np.searchsorted(done, done[-1] * np.arange(1, samples) / samples) + 2 if count > 1 else np.zeros(0, np.int64)
@@ -313,10 +309,8 @@ def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Float
 
 
 def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
-    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions.
-
-    tip: (2,) where the layer below ends.
-    """
+    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions. tip:
+    (2,) where the layer below ends."""
     machine, process, material, speeds = profile.machine, profile.process, profile.material, speeds_of(profile)
     places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
     bounds = speeds_mm_s, stroke_accelerations(profile, first_layer)[strokes.kind]

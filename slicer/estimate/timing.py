@@ -83,10 +83,8 @@ def axis_accelerations(machine: Machine) -> Floats:
 
 
 def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
-    """What F measures for (n, 6) deltas of X Y Z tilt turn E, and by which measure (0 X Y Z, 1 rotary, 2 filament, 3 none).
-
-    The rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament.
-    """
+    """What F measures for (n, 6) deltas of X Y Z tilt turn E, and by which measure (0 X Y Z, 1 rotary, 2 filament, 3 none). The
+    rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament."""
     x, y, z, tilt, turn, filament = deltas.T
     ways: list[Floats] = [np.sqrt(x**2 + y**2 + z**2), np.hypot(tilt, turn), np.abs(filament)]
     moves = [way > TINY for way in ways]
@@ -96,11 +94,9 @@ def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
 def move_times(
     deltas: Floats, speed: Floats, stop: NDArray[np.bool_], machine: Machine, most_mm_s2: Floats | None = None
 ) -> Floats:
-    """(n,) seconds for (n, 6) deltas of X Y Z tilt turn E at (n,) speeds (mm/s or deg/s along what F measures).
-
-    stop: (n,) True where the machine stands still before the move. most_mm_s2: (n,) acceleration told for X Y Z. Axes that
-    would be too fast slow the move down.
-    """
+    """(n,) seconds for (n, 6) deltas of X Y Z tilt turn E at (n,) speeds (mm/s or deg/s along what F measures). stop: (n,) True
+    where the machine stands still before the move. most_mm_s2: (n,) acceleration told for X Y Z. Axes that would be too fast slow
+    the move down."""
     blocks, moving = blocks_of(deltas, speed, stop, machine, most_mm_s2)
     times = np.zeros(len(deltas))
     if moving.any():

@@ -44,10 +44,8 @@ def plastic_of(beads: Sequence[Bead]) -> Plastic | None:
 def hold_ends(
     beads: Sequence[Bead], below: Plastic | None, section: Polygons, section_below: Polygons, width_mm: float
 ) -> list[Bead]:
-    """The beads of a layer, whose skin strokes end on the plastic of the layer below where the model is there or near.
-
-    section, section_below: the model's sections in this layer and in the one below.
-    """
+    """The beads of a layer, whose skin strokes end on the plastic of the layer below where the model is there or near. section,
+    section_below: the model's sections in this layer and in the one below."""
     skins = [k for k, bead in enumerate(beads) if bead.kind in SKINS and not bead.closed]
     if not skins or below is None:
         return list(beads)
@@ -76,10 +74,8 @@ def hold_ends(
 
 
 def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[Bead]:
-    """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them.
-
-    An end that lies on nothing for longer than an anchor is part of the pattern, and stays.
-    """
+    """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them. An end
+    that lies on nothing for longer than an anchor is part of the pattern, and stays."""
     layers = [plastic for plastic in below if plastic is not None]
     return [_cut_anchor(bead, layers) if bead.anchor_mm > 0.0 and not bead.closed else bead for bead in beads]
 

@@ -84,11 +84,8 @@ def anchor_lines(
     group: Indices | None = None,
 ) -> tuple[list[Floats], Indices]:
     """Pieces as long lines (n, 2), those of one group (k,) joined where ends are near along the border, else with hooks; and the
-    group of each line.
-
-    limits_mm: how near, the length of a hook, and how far it keeps from the next end or hook, for which it may be shorter.
-    solid_mm: of straight pieces that fill an area their distance, and how far inside the area they end.
-    """
+    group of each line. limits_mm: how near, the length of a hook, and how far it keeps from the next end or hook, for which it
+    may be shorter. solid_mm: of straight pieces that fill an area their distance, and how far inside the area they end."""
     group = np.zeros(len(pieces.ends), np.int64) if group is None else group
     if not len(pieces.ends):
         return [], group
@@ -320,10 +317,8 @@ def _append_tip(out: Floats, n: int, since: tuple[int, float], length: float, bo
 
 @no_nrt
 def _append_run(out: Floats, n: int, since: tuple[int, float], length: float, border: EdgeIndex, way: Floats) -> int:
-    """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
-
-    since: the point's edge, and the way to it. Also the run's last point; returns the new n.
-    """
+    """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative. since: the
+    point's edge, and the way to it. Also the run's last point; returns the new n."""
     e, way_mm = since
     edges, first, end = border.edges, border.begins[border.loop[e]], border.begins[border.loop[e] + 1]
     left, forward = abs(length), length > 0.0

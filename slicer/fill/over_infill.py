@@ -58,10 +58,8 @@ def anchor_skins(
 def anchored(
     region: Region, sparse_below: Polygons, infill_below: Sequence[Floats], angle_deg: float, width_mm: float, cell_mm: float
 ) -> Region:
-    """The region with its skins grown along lines at an angle, so that all of these end on something.
-
-    sparse_below: what is sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart.
-    """
+    """The region with its skins grown along lines at an angle, so that all of these end on something. sparse_below: what is
+    sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart."""
     skin, sparse = region.solid + region.top, region.sparse
     for _ in range(MOST_ROUNDS):
         added = _extension(skin, sparse_below, infill_below, angle_deg, width_mm) ^ sparse
@@ -80,9 +78,7 @@ def anchored(
 
 def infill_bridges(region: Region, sparse_below: Polygons, width_mm: float) -> Polygons:
     """Where solid lines span the sparse infill of the layer below, and as far beyond as they hold on to what is solid there.
-
-    Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
-    """
+    Strips narrower than NARROW lines are left out: the skin beside them carries their lines."""
     solid = region.solid + (region.top - offset(region.bare, HIDDEN * width_mm))
     if solid.is_empty() or sparse_below.is_empty():
         return Polygons()
@@ -128,10 +124,8 @@ def _row_crossings(segments: Floats, kind: int, apart_mm: float) -> tuple[Indice
 
 @kernel
 def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
-    """(n, 3) row, from and to, of skins that end over a void on either side, grown to what holds them there.
-
-    rows, x and kinds: of the crossings of each row, from left to right.
-    """
+    """(n, 3) row, from and to, of skins that end over a void on either side, grown to what holds them there. rows, x and kinds:
+    of the crossings of each row, from left to right."""
     out = table(2 * len(rows), 3)
     n = begin = 0
     while begin < len(rows):

@@ -65,11 +65,9 @@ def order_beads(
     skin: Polygons | None = None,
     kind_mm_s: Floats | None = None,
 ) -> Strokes:
-    """The beads of one layer in printing order.
-
-    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
-    beside an edge of an interface, which no travel passes over; kind_mm_s: by number of the kind, replaces the process's.
-    """
+    """The beads of one layer in printing order. tip: (2,) where the nozzle stands before, None at the part's start; support:
+    where that is printed; skin: outer walls beside an edge of an interface, which no travel passes over; kind_mm_s: by number of
+    the kind, replaces the process's."""
     if not beads:
         return strokes_of([], np.zeros(0, np.bool_), {}, process.small_wall_mm)
     speed_mm_s: Speed = partial(bead_speed_mm_s, process=process, kind_mm_s=kind_mm_s)
@@ -92,10 +90,8 @@ def order_beads(
 
 
 def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> Ints:
-    """(n,) the number of each bead's island: the smallest outer contour round its start, of the section or of its support.
-
-    Those of support come after those of the section; FIRST: skirt and brim.
-    """
+    """(n,) the number of each bead's island: the smallest outer contour round its start, of the section or of its support. Those
+    of support come after those of the section; FIRST: skirt and brim."""
     ranks = np.array([bead.rank for bead in beads], dtype=np.int32)
     starts = np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
     torn_off = np.array([bead.kind in SUPPORTS for bead in beads], dtype=np.bool_)
@@ -155,10 +151,8 @@ def _middle(beads: Sequence[Bead]) -> Floats:
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
-    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together.
-
-    Inner walls that are open lines and behind no seam are printed with the infill: most have its speed and lie beside it.
-    """
+    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together. Inner
+    walls that are open lines and behind no seam are printed with the infill: most have its speed and lie beside it."""
     leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
     walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
     phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
@@ -193,11 +187,9 @@ def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]
 
 
 def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
-    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
-
-    The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
-    print them first would mean going there and back. Open lines among them begin beside no other wall and stay single.
-    """
+    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader. The others,
+    around places of their own where the walls behind an outer wall part, follow in chains of their own: to print them first would
+    mean going there and back. Open lines among them begin beside no other wall and stay single."""
     chain, others = [leader], list[Bead]()
     for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
         equal = [bead for bead in family if bead.rank == rank]
@@ -246,11 +238,8 @@ def order_lines(
     lines: Sequence[Floats], speeds: Floats, fixed: Mask, freedom: Sequence[int], tip: Floats, goal: Floats
 ) -> list[tuple[int, list[Floats]]]:
     """Lines (n, 2) in a short order from the tip on, as order_paths, begun where their freedom allows it: the number of each and
-    the pieces (n, 2) of it as they are printed.
-
-    speeds: (n, 2) with which each begins and ends; fixed: (n,) must not be reversed; tip: (3,) where and with which speed all
-    begins; goal: (1, 3) where and with which it ends up, or (0, 3).
-    """
+    the pieces (n, 2) of it as they are printed. speeds: (n, 2) with which each begins and ends; fixed: (n,) must not be reversed;
+    tip: (3,) where and with which speed all begins; goal: (1, 3) where and with which it ends up, or (0, 3)."""
     held, cut, pairs = fixed.copy(), [0] * len(lines), zip(lines, freedom, strict=True)
     begun = [_begin_at(line, _corner(line, tip[:2], tip[:2], True)) if free == CLOSED else line for line, free in pairs]
     for _ in range(TRIES if any(freedom) else 1):
@@ -307,10 +296,8 @@ def _nearer_from_its_end(line: Floats, since: Floats, to: Floats) -> bool:
 
 @kernel
 def order_paths(starts: Floats, ends: Floats, fixed: Mask, tip: Floats, goal: Floats) -> tuple[Indices, Mask]:
-    """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) must not be reversed.
-
-    tip: (3,) place and speed from which the order starts; goal: (1, 3) those at which it should end, or (0, 3).
-    """
+    """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) must not be reversed. tip: (3,) place
+    and speed from which the order starts; goal: (1, 3) those at which it should end, or (0, 3)."""
     n = len(starts)
     given, at = table(2 * n + 1, 3), table(2 * n + 1 + len(goal), 3)
     order, flips, held = longs(n, 0), flags(n), flags(n)

@@ -40,11 +40,9 @@ OFF_WALL = 0.7  # of its length a lead has to reach inside: so far beside its mi
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
-
-    tip: (2,) where the nozzle comes from. limits: what they keep clear of. layer: number. planned: (m, 2) where seams are hidden
-    best, of use to aligned ones.
-    """
+    """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below. tip:
+    (2,) where the nozzle comes from. limits: what they keep clear of. layer: number. planned: (m, 2) where seams are hidden best,
+    of use to aligned ones."""
 
     rear: Floats
     before: Floats

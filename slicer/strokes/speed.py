@@ -97,11 +97,9 @@ def melting_speeds_mm_s(strokes: Strokes, profile: Profile, height_mm: float, fl
 
 @kernel
 def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
-    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or LEAST_STEP_GAIN_S or less.
-
-    A stretch of one speed that is faster than those before and after it takes the faster one of theirs, a step between a slower
-    and a faster one the slower one; none gets faster.
-    """
+    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or LEAST_STEP_GAIN_S or less. A
+    stretch of one speed that is faster than those before and after it takes the faster one of theirs, a step between a slower and
+    a faster one the slower one; none gets faster."""
     steadied, changes = speeds.copy(), True
     while changes:
         changes, begin = False, 0
@@ -131,9 +129,7 @@ def _of_strokes(strokes: Strokes, process: Process) -> Floats:
 
 def bead_speed_mm_s(bead: Bead, process: Process, kind_mm_s: Floats | None = None) -> float:
     """Speed of a bead before it becomes a stroke: as in _of_strokes, but without overhangs and without slowing down to cool.
-
-    kind_mm_s: by number of the kind, in place of the process's.
-    """
+    kind_mm_s: by number of the kind, in place of the process's."""
     if kind_mm_s is not None:
         return float(kind_mm_s[KINDS.index(bead.kind)])
     if bead.over_infill:
@@ -183,10 +179,8 @@ def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float
 
 
 def fan_share(material: Material, process: Process, time_s: float) -> float:
-    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then less and less.
-
-    Straight from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as PrusaSlicer has it.
-    """
+    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then less and less. Straight
+    from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as PrusaSlicer has it."""
     least = min(material.fan_least, material.fan)
     quick, slow = process.least_layer_time_s, material.fan_layer_time_s
     falling = max(0.0, (slow - time_s) / (slow - quick)) if slow > quick else 0.0

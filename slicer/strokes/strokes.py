@@ -89,10 +89,8 @@ class Strokes:
         return replace(self, points=points[kept], starts=np.append(0, np.cumsum(kept))[self.starts])
 
     def refined(self, points: Floats, starts: Indices, source: Indices) -> "Strokes":
-        """The strokes with other points; source: (j,) the stroke that each of the new ones is a piece of, in the same order.
-
-        The pieces of a stroke follow each other without a travel: only the first one keeps retraction and approach.
-        """
+        """The strokes with other points; source: (j,) the stroke that each of the new ones is a piece of, in the same order. The
+        pieces of a stroke follow each other without a travel: only the first one keeps retraction and approach."""
         first = np.diff(source, prepend=-1) > 0
         columns = {name: getattr(self, name)[source] for name in COLUMNS}
         approach_starts = np.append(self.approach_starts[source + ~first], len(self.approach))
@@ -154,10 +152,8 @@ def _widths_at(places: Floats, course: Floats) -> Floats:
 
 
 def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float, within_mm: float = 0.0) -> tuple[Strokes, Mask]:
-    """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area.
-
-    No piece is shorter than shortest_mm, none within the area between two outside shorter than within_mm.
-    """
+    """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area. No piece is
+    shorter than shortest_mm, none within the area between two outside shorter than within_mm."""
     index = index_edges(area)
     count, room = -1, 2 * len(strokes.points) + 64
     while count < 0:
@@ -218,9 +214,8 @@ def _append(out: Floats, n: int, points: Floats, first: int, end: int) -> int:
 @helper
 def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, float]) -> None:
     """Runs of steps shorter than that take after their neighbours, those within last so that none is overlooked for a gap.
-
-    shortest_mm: of runs outside and within; within: of the steps between the first `size` points. A single run has no neighbours.
-    """
+    shortest_mm: of runs outside and within; within: of the steps between the first `size` points. A single run has no
+    neighbours."""
     for inner in range(2):
         a = 0
         while a < size - 1:
@@ -270,10 +265,8 @@ def split_overhangs(
 
 
 def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
-    """The strokes in the same order, those of varying width in pieces whose widths are the means of their stretches.
-
-    height_mm: of the layer; the pieces together hold the plastic of the whole.
-    """
+    """The strokes in the same order, those of varying width in pieces whose widths are the means of their stretches. height_mm:
+    of the layer; the pieces together hold the plastic of the whole."""
     if not strokes.varies.any():
         return strokes
     changes = np.abs(np.diff(strokes.points[:, 2]))

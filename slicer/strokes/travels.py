@@ -140,10 +140,8 @@ def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) 
 
 @helper
 def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -> int:
-    """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by.
-
-    From row 1 on; returns the number of rows, 0 where there is no such path.
-    """
+    """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by. From row
+    1 on; returns the number of rows, 0 where there is no such path."""
     room = 16
     shares, crossed = floats(room, 0.0), longs(room, 0)
     many = crossings(track, straight, shares, crossed)
@@ -176,10 +174,8 @@ def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -
 def _go_round(
     track: EdgeIndex, sides: tuple[int, int], end: tuple[float, float], longest: float, path: Floats, n: int
 ) -> tuple[int, float]:
-    """Appends the shorter of the two stretches of a loop from row n on, from one of its sides to a point on the other.
-
-    Returns the new number of rows, 0 when the stretch is too long, and its length.
-    """
+    """Appends the shorter of the two stretches of a loop from row n on, from one of its sides to a point on the other. Returns
+    the new number of rows, 0 when the stretch is too long, and its length."""
     least, shorter = np.inf, 1
     for sense in range(1, -2, -2):
         _, length = _walk(track, sides, end, longest, sense, path, n)
