@@ -42,44 +42,38 @@ def layer_svg(sliced: SlicedPart, number: int) -> str:
     if not 1 <= number <= len(sliced.layers):
         raise SliceError(f"part {sliced.index} has no layer {number}: its layers are 1 to {len(sliced.layers)}")
     layer = sliced.layers[number - 1]
-    points = np.concatenate([path.points for path in layer.paths])
+    paths = layer.paths
+    points = np.concatenate([path.points for path in paths])
     low, high = points.min(axis=0) - MARGIN_MM, points.max(axis=0) + MARGIN_MM
-    kinds = [kind for kind in Kind if any(path.kind is kind for path in layer.paths)]
+    kinds = [kind for kind in Kind if any(path.kind is kind for path in paths)]
     title = f"part {sliced.index}, layer {number}, z {layer.z_mm:.3f} mm, height {layer.height_mm:.3f} mm"
-    lines = [*_head(title, low, high, len(kinds)), *_legend(kinds, low, high)]
+    lines = [*_frame(title, low, high, kinds)]
     lines.append('<g transform="scale(1 -1)" fill="none" stroke-linecap="round" stroke-linejoin="round">')
     for kind in kinds:
-        lines += _beads(kind, [path for path in layer.paths if path.kind is kind])
-    lines += [*_travels(layer.paths), *_seams(layer.paths), "</g>", "</svg>"]
+        lines.append(f'<g id="{kind.value}" stroke="{COLOURS[kind]}">')
+        of_kind = [path for path in paths if path.kind is kind]
+        lines += [f'<polyline stroke-width="{path.width_mm:.4f}" points="{_points(path.points)}"/>' for path in of_kind]
+        lines.append("</g>")
+    lines += [*_travels(paths), *_seams(paths), "</g>", "</svg>"]
     return "\n".join(lines) + "\n"
 
 
-def _head(title: str, low: Floats, high: Floats, rows: int) -> Iterator[str]:
+def _frame(title: str, low: Floats, high: Floats, kinds: Sequence[Kind]) -> Iterator[str]:
+    """The beginning of the picture, its background, and the kinds with their colours below the layer."""
     width, height = high - low
-    width, height = max(width, 10.0 * LEGEND_MM), height + LEGEND_MM * (rows + 1)
+    width, height = max(width, 10.0 * LEGEND_MM), height + LEGEND_MM * (len(kinds) + 1)
     yield (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{SCALE * width:.0f}" height="{SCALE * height:.0f}" '
         f'viewBox="{low[0]:.3f} {-high[1]:.3f} {width:.3f} {height:.3f}">'
     )
     yield f"<title>{title}</title>"
     yield f'<rect x="{low[0]:.3f}" y="{-high[1]:.3f}" width="{width:.3f}" height="{height:.3f}" fill="#ffffff"/>'
-
-
-def _legend(kinds: Sequence[Kind], low: Floats, high: Floats) -> Iterator[str]:
-    """The kinds with their colours, below the layer."""
     for row, kind in enumerate(kinds):
         y = -low[1] + LEGEND_MM * (row + 0.5)
         yield (
             f'<rect x="{low[0] + 1:.3f}" y="{y - 1:.3f}" width="4" height="2" fill="{COLOURS[kind]}"/>'
             f'<text x="{low[0] + 6:.3f}" y="{y + 0.8:.3f}" font-size="2.2" font-family="sans-serif">{kind.value}</text>'
         )
-
-
-def _beads(kind: Kind, paths: Sequence[Path]) -> Iterator[str]:
-    yield f'<g id="{kind.value}" stroke="{COLOURS[kind]}">'
-    for path in paths:
-        yield f'<polyline stroke-width="{path.width_mm:.4f}" points="{_points(path.points)}"/>'
-    yield "</g>"
 
 
 def _travels(paths: Sequence[Path]) -> Iterator[str]:

@@ -143,11 +143,8 @@ def _walled(
     needed: Sequence[int],
 ) -> list[tuple[Walls, tuple[Bead, ...], Polygons]]:
     """The walls of every layer as cut_walls has them; none in layers that are not needed."""
-    process, nozzle_mm, heights_mm = (
-        sections.process,
-        sections.profile.machine.head.nozzle_mm,
-        sections.heights.height_mm.tolist(),
-    )
+    process, nozzle_mm = sections.process, sections.profile.machine.head.nozzle_mm
+    heights_mm = sections.heights.height_mm.tolist()
     whole = [mine if around is None else around for mine, around in zip(sections.own, model, strict=True)]
     above = [*whole[1:], *(sections.above[:1] or [Polygons()])] if process.only_one_wall_top else [None] * len(whole)
 

@@ -24,7 +24,6 @@ Box = tuple[float, float, float, float]
 Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
 Draw = Callable[[Box], Lines]  # for a box x0 y0 x1 y1
 LinePattern = tuple[float, Draw]  # the angle of the frame, deg, in which it is drawn
-OPEN = (0.0, 0.0)  # for lines that do not fill an area
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
 WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: farther in it is too narrow for a bead
 LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a wedge that is smaller stays as it is
@@ -80,12 +79,12 @@ def anchor_lines(
     pieces: Pieces,
     border: EdgeIndex,
     limits_mm: tuple[float, float, float],
-    solid_mm: tuple[float, float] = OPEN,
+    solid_mm: tuple[float, float] = (0.0, 0.0),
     group: Indices | None = None,
 ) -> tuple[list[Floats], Indices]:
     """Pieces as long lines (n, 2), those of one group (k,) joined where ends are near along the border, else with hooks; and the
     group of each line. limits_mm: how near, the length of a hook, and how far it keeps from the next end or hook, for which it
-    may be shorter. solid_mm: of straight pieces that fill an area their distance, and how far inside the area they end."""
+    may be shorter. solid_mm: of straight pieces that fill an area their distance, and how far inside it they end; zeros for others."""
     group = np.zeros(len(pieces.ends), np.int64) if group is None else group
     if not len(pieces.ends):
         return [], group

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import table
 from mdp.kernels.kernel import kernel
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.fill.infill import Filling, filling_beads, open_area, widest_cell_mm
@@ -31,8 +30,6 @@ RIM = 0.1  # line widths by which neighbouring rows overlap, and below which wha
 KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid
 MOST_ROUNDS = 2  # newly solid places may themselves end over a void; what ends there still is held in slicer.fill.ends
 SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
-
-Indices = NDArray[np.int64]
 
 
 def anchor_skins(

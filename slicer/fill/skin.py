@@ -16,17 +16,7 @@ from mdp.mesh import Floats, Indices
 from profiles.process import Process
 from profiles.settings.shell import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
-from slicer.fill.lines import (
-    MARGIN_MM,
-    OPEN,
-    Box,
-    Draw,
-    Lines,
-    anchor_lines,
-    clip_pattern,
-    concentric_lines,
-    horizontal_lines,
-)
+from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines
 from slicer.geometry.clip import Pieces, rotation_2d
 from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, islands, offset
@@ -74,7 +64,7 @@ class SolidLines:
     @property
     def border_mm(self) -> tuple[float, float]:
         """The spacing and how far inside the area lines end that reach into what stays open beside them."""
-        return (self.spacing_mm, self.reach_mm) if self.seen else OPEN
+        return (self.spacing_mm, self.reach_mm) if self.seen else (0.0, 0.0)
 
 
 def lines_angle_deg(process: Process, layer: int) -> float:

@@ -24,21 +24,8 @@ from slicer.strokes.travels import may_wipe_over
 
 KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
 BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
-SPEED_KEYS = {
-    Kind.OUTER_WALL: "outer_wall_speed_mm_s",
-    Kind.INNER_WALL: "inner_wall_speed_mm_s",
-    Kind.OVERHANG: "overhang_75_speed_mm_s",
-    Kind.GAP: "gap_speed_mm_s",
-    Kind.INFILL: "infill_speed_mm_s",
-    Kind.SKIN: "skin_speed_mm_s",
-    Kind.TOP_SKIN: "top_skin_speed_mm_s",
-    Kind.BRIDGE: "bridge_speed_mm_s",
-    Kind.IRONING: "ironing_speed_mm_s",
-    Kind.SKIRT: "first_layer_speed_mm_s",
-    Kind.PURGE: "first_layer_speed_mm_s",
-    Kind.SUPPORT: "support_speed_mm_s",
-    Kind.SUPPORT_INTERFACE: "support_interface_speed_mm_s",
-}
+SPEED_KEYS = {kind: f"{kind.name.lower()}_speed_mm_s" for kind in KINDS} | {Kind.OVERHANG: BY_SHARE[0]}
+SPEED_KEYS |= dict.fromkeys((Kind.SKIRT, Kind.PURGE), "first_layer_speed_mm_s")
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
@@ -52,10 +39,20 @@ FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the 
 def timed(
     strokes: Strokes, profile: Profile, height_mm: float, kind_mm_s: Floats | None, flow: float, of_places: Sequence[Process] = ()
 ) -> tuple[Strokes, Floats]:
-    """The strokes, in pieces of one width and simplified, with their (k,) speeds; parameters as in speeds_mm_s."""
-    strokes = in_pieces(strokes, height_mm)
-    speeds = speeds_mm_s(strokes, profile, height_mm, kind_mm_s, flow, of_places)
-    corners = mark_corners(strokes.points, strokes.starts, profile.process.resolution_mm)
+    """The strokes of a layer, in pieces of one width and simplified, with their (k,) speeds.
+
+    kind_mm_s, by number of the kind, replaces the process's speeds, flow multiplies every stroke's flow. of_places: the processes
+    of the places in which other settings hold; none where kind_mm_s holds. Bounded by what the hot end melts; a layer done before
+    least_layer_time_s is slowed down to last as long, but not below least_speed_mm_s.
+    """
+    strokes, process = in_pieces(strokes, height_mm), profile.process
+    asked = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
+    for number, own in enumerate(of_places, start=1):
+        asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
+    speeds = steady(np.minimum(asked, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
+    time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
+    speeds = _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
+    corners = mark_corners(strokes.points, strokes.starts, process.resolution_mm)
     eased = _without_short_steps(strokes.with_points(strokes.points, corners))
     return eased, np.minimum(speeds, melting_speeds_mm_s(eased, profile, height_mm, flow))
 
@@ -68,24 +65,6 @@ def _without_short_steps(strokes: Strokes) -> Strokes:
     aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN, Kind.BRIDGE), ASIDE_EXACT, ASIDE)
     eased = strokes.with_points(*lengthen_steps(strokes.points, strokes.starts, SHORTEST * width_mm, aside_mm))
     return replace(eased, flow=strokes.flow * strokes.lengths_mm / np.maximum(eased.lengths_mm, 1e-9))
-
-
-def speeds_mm_s(
-    strokes: Strokes, profile: Profile, height_mm: float, kind_mm_s: Floats | None, flow: float, of_places: Sequence[Process] = ()
-) -> Floats:
-    """(k,) speeds of a layer's strokes; kind_mm_s, by number of the kind, replaces the process's speeds, flow multiplies every
-    stroke's flow. of_places: the processes of the places in which other settings hold; none where kind_mm_s holds.
-
-    Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
-    below least_speed_mm_s.
-    """
-    process = profile.process
-    asked = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
-    for number, own in enumerate(of_places, start=1):
-        asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
-    speeds = steady(np.minimum(asked, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
-    time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
-    return _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
 
 
 def melting_speeds_mm_s(strokes: Strokes, profile: Profile, height_mm: float, flow: float) -> Floats:

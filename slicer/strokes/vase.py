@@ -51,7 +51,11 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
         layers.append(_turn(heights, k, turn, profile, np.linspace(0.0, 1.0, PIECES + 1) if k == first else None))
         tip = turn[-1]
     if loops:
-        layers[-1] = _closed(layers[-1], _begun_near(loops[-1], tip, joined=True))
+        top, turn = layers[-1], _begun_near(loops[-1], tip, joined=True)
+        last = top.paths[-1]
+        level = Path(last.kind, turn, last.width_mm, last.speed_mm_s, last.flow, NO_APPROACH, False)
+        running_out = _pieces(level, np.linspace(1.0, 0.0, PIECES + 1), 0.0)
+        layers[-1] = Layer.of(top.z_mm, top.height_mm, (*top.paths, *running_out), top.fan)
     return layers
 
 
@@ -114,14 +118,6 @@ def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floa
     climb, pulled = (height_mm, 0.0), shares is not None
     whole = Path(Kind.OUTER_WALL, turn, width, speed, material.flow, NO_APPROACH, pulled, below_mm=climb, wiped=False)
     return Layer.of(z_mm, height_mm, (whole,) if shares is None else _pieces(whole, shares, height_mm), fan)
-
-
-def _closed(layer: Layer, turn: Floats) -> Layer:
-    """The last turn with one more at its end, level and running out."""
-    *_, last = paths = layer.paths
-    level = Path(last.kind, turn, last.width_mm, last.speed_mm_s, last.flow, NO_APPROACH, False)
-    paths = (*paths, *_pieces(level, np.linspace(1.0, 0.0, PIECES + 1), 0.0))
-    return Layer.of(layer.z_mm, layer.height_mm, paths, layer.fan)
 
 
 def _pieces(path: Path, shares: Floats, climb_mm: float) -> tuple[Path, ...]:

@@ -13,7 +13,7 @@ from slicer.geometry.polyline import lengths_mm
 from slicer.paths import KINDS, Kind
 from slicer.slice import slice_part
 from slicer.strokes.order import order_beads
-from slicer.strokes.speed import speeds_mm_s
+from slicer.strokes.speed import timed
 from slicer.strokes.strokes import strokes_of
 from tests.shapes import box, tee
 from tests.slicer.hand import profile, rows_of, whole
@@ -144,7 +144,7 @@ def test_beads_at_the_floor_leave_the_waiting_to_the_others() -> None:
     strokes = strokes_of(beads, np.zeros(2, np.bool_), {}, 0.0)
     speeds = np.array([12.0 if kind is Kind.GAP else 100.0 for kind in KINDS])
     limits = ("process.least_layer_time_s=6", "process.least_speed_mm_s=10", "material.volumetric_limit_mm3_s=50")
-    slowed = speeds_mm_s(strokes, profile(*limits), 0.2, speeds, 1.0)
+    _, slowed = timed(strokes, profile(*limits), 0.2, speeds, 1.0)
     assert slowed[0] == pytest.approx(10.0)
     assert (strokes.lengths_mm / slowed).sum() == pytest.approx(6.0, rel=1e-3)
 
