@@ -84,7 +84,7 @@ def anchor_lines(
 ) -> tuple[list[Floats], Indices]:
     """Pieces as long lines (n, 2), those of one group (k,) joined where ends are near along the border, else with hooks; and the
     group of each line. limits_mm: how near, the length of a hook, and how far it keeps from the next end or hook, for which it
-    may be shorter. solid_mm: of straight pieces that fill an area their distance, and how far inside it they end; zeros for others."""
+    may be shorter. solid_mm: of straight pieces that fill an area their distance and how far inside it they end, else zeros."""
     group = np.zeros(len(pieces.ends), np.int64) if group is None else group
     if not len(pieces.ends):
         return [], group
