@@ -105,26 +105,31 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     others there is what these need, or nothing."""
     sections = supports.sections
     process, places, processes = sections.process, sections.places, layer_processes(sections)
-    model, count = model_sections(sections), len(processes)
-    counts = wall_counts(sections.own, [own.walls for own in processes], process.walls, places)
+    own, above, (top, bottom), count = sections.own, sections.above, sections.shell_layers, len(processes)
+    model = [joined(*three) for three in zip(sections.ungrooved, own, sections.beside, strict=True)]
+    counts = wall_counts(own, [layer.walls for layer in processes], process.walls, places)
     # What holds a layer is planned from the top where branches do.
     runs = [range(count)] if layers is None or has_lightning(process, places) else _with_those_below(layers)
     needed = [layer for run in runs for layer in run]
-    deep = max(sections.shell_layers[0], 1)
-    above = {layer for run in runs for layer in range(run.start, min(run.stop + deep, count))}  # walls there make infill solid
-    walled = _walled(sections, model, processes, counts, sorted(above))
+    # Walls above make infill solid.
+    with_those_above = {layer for run in runs for layer in range(run.start, min(run.stop + max(top, 1), count))}
+    walled = _walled(sections, model, processes, counts, sorted(with_those_above))
     insides = [walls.inside for walls, _, _ in walled]
-    covers = cover(sections, model, [model_inside for _, _, model_inside in walled])
-    filled = regions(insides, covers, not sections.on_platform, process, runs, places)
-    ironed = ironed_areas(filled, [*sections.beside, *sections.above[:1]], process, places)
+    later = [whole - mine if whole is not mine else Polygons() for whole, mine in zip(model, own, strict=True)] + list(above)
+    # Earlier parts that are not known are taken to fill the first section; under the platform is nothing.
+    below = sections.beneath or [Polygons() if sections.on_platform else own[0]] * bottom
+    known = later if any(not area.is_empty() for area in later) else ()
+    cover = Cover(model, [model_inside for _, _, model_inside in walled], below, above[:top], known)
+    filled = regions(insides, cover, not sections.on_platform, process, runs, places)
+    ironed = ironed_areas(filled, [*sections.beside, *above[:1]], process, places)
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     sparse = [region.sparse for region in filled]
-    fillings = plan_fillings(sparse, sections.own, process, places, sections.heights.height_mm)
-    leaning = leaning_walls(sparse, sections.own, insides, runs, process.line_width_mm)
+    fillings = plan_fillings(sparse, own, process, places, sections.heights.height_mm)
+    leaning = leaning_walls(sparse, own, insides, runs, process.line_width_mm)
     filled, drawn = anchor_skins(filled, leaning, processes, fillings, sections.heights)
     shells = []
-    for k, (own, of, (walled_by, ending, _)) in enumerate(zip(processes, counts, walled, strict=True)):
-        most = own if of.all == [own.walls] else own.model_copy(update={"walls": max(of.all)})
+    for k, (usual, of, (walled_by, ending, _)) in enumerate(zip(processes, counts, walled, strict=True)):
+        most = usual if of.all == [usual.walls] else usual.model_copy(update={"walls": max(of.all)})
         shells.append(Shell(most, walled_by, ending, filled[k], leaning[k], bridges[k], ironed[k], drawn.get(k)))
     return Shells(supports, shells, fillings)
 
@@ -137,7 +142,7 @@ def _with_those_below(layers: Sequence[int]) -> list[range]:
 
 def _walled(
     sections: Sections,
-    model: Sequence[Polygons | None],
+    model: Sequence[Polygons],
     processes: Sequence[Process],
     counts: Sequence[WallCounts],
     needed: Sequence[int],
@@ -145,8 +150,7 @@ def _walled(
     """The walls of every layer as cut_walls has them; none in layers that are not needed."""
     process, nozzle_mm = sections.process, sections.profile.machine.head.nozzle_mm
     heights_mm = sections.heights.height_mm.tolist()
-    whole = [mine if around is None else around for mine, around in zip(sections.own, model, strict=True)]
-    above = [*whole[1:], *(sections.above[:1] or [Polygons()])] if process.only_one_wall_top else [None] * len(whole)
+    above = [*model[1:], *(sections.above[:1] or [Polygons()])] if process.only_one_wall_top else [None] * len(model)
 
     def contours_of(place: int) -> Contours:
         layer = needed[place]
@@ -157,9 +161,12 @@ def _walled(
         areas = [walls.inside, walls.narrow, *([] if inside is walls.inside else [inside])]
         return walls.loops, walls.varying, ending, [area.to_polygons() for area in areas]
 
-    walled = [_walls_from((), (), (), [[], []])] * len(whole)
-    for layer, found in zip(needed, parallel_map(contours_of, len(needed), FEWEST_LAYERS), strict=True):
-        walled[layer] = _walls_from(*found)
+    walled: list[tuple[Walls, tuple[Bead, ...], Polygons]] = [(Walls((), Polygons(), Polygons()), (), Polygons())] * len(model)
+    results = parallel_map(contours_of, len(needed), FEWEST_LAYERS)
+    for layer, (loops, variable, ending, areas) in zip(needed, results, strict=True):
+        # Polygons are built anew, which can round, whichever process has found them.
+        inside, narrow, *model_inside = map(of_contours, areas)
+        walled[layer] = Walls(loops, inside, narrow, variable), ending, model_inside[0] if model_inside else inside
     return walled
 
 
@@ -179,14 +186,9 @@ def layer_processes(sections: Sections) -> list[Process]:
     return processes
 
 
-def model_sections(sections: Sections) -> list[Polygons | None]:
-    """For each layer the islands of the model that it belongs to, None where they are its own section."""
-    return [joined(*three) for three in zip(sections.ungrooved, sections.own, sections.beside, strict=True)]
-
-
-def joined(ungrooved: Polygons, own: Polygons, beside: Polygons) -> Polygons | None:
-    """The islands of the model that hold some of a section; None where they are the part's own. beside: what other parts have."""
-    alone = None if own is ungrooved or ungrooved.area() < own.area() + TOUCHING_MM2 else ungrooved
+def joined(ungrooved: Polygons, own: Polygons, beside: Polygons) -> Polygons:
+    """The islands of the model that hold some of a section; `own` itself where these are it. beside: what other parts have."""
+    alone = own if own is ungrooved or ungrooved.area() < own.area() + TOUCHING_MM2 else ungrooved
     if own.is_empty() or beside.is_empty() or not _boxes_meet(own, beside):
         return alone
     whole = closing(union([ungrooved, beside]), CLOSING_MM)
@@ -203,7 +205,7 @@ def _boxes_meet(own: Polygons, beside: Polygons) -> bool:
 
 def cut_walls(
     section: Polygons,
-    model: Polygons | None,
+    model: Polygons,
     process: Process,
     counts: WallCounts,
     height_mm: float,
@@ -211,14 +213,14 @@ def cut_walls(
     more: int,
     above: Polygons | None,
 ) -> tuple[Walls, tuple[Bead, ...], Polygons]:
-    """The walls of a part's section in its island of the model; None: no other part touches it.
+    """The walls of a part's section in its island of the model, as joined.
 
     Those that run round; inner walls along the surface that end on a cut face's, or where a modifier has fewer, all of one width,
     and what fills between them; what the walls would enclose if the model were not cut and had `more` walls fewer. above: the
     model in the next layer, if the tops that it leaves bare have one wall.
     """
-    whole, least, most = section if model is None else model, min(counts.all), max(counts.all)
-    if model is None and least == most:
+    alone, least, most = model is section, min(counts.all), max(counts.all)
+    if alone and least == most:
 
         def walled(count: int) -> Walls:
             if above is None:
@@ -229,13 +231,13 @@ def cut_walls(
         fewer = walled(most - more) if more else round_
         return round_, (), fewer.inside
     numbers = {number for count in counts.all for number in (count, count - more)}
-    enclosing = {count: walls(whole, count, process, height_mm) for count in numbers}
+    enclosing = {count: walls(model, count, process, height_mm) for count in numbers}
     inside = counts.overlaid(lambda count: enclosing[count].inside)
     model_inside = counts.overlaid(lambda count: enclosing[count - more].inside) if more else inside
-    around = least if model is None else min(process.interface_walls, least)
+    around = least if alone else min(process.interface_walls, least)
     round_ = layer_walls(section, around, process, height_mm, nozzle_mm)
     if around == most or round_.inside.is_empty():
-        return round_, (), round_.inside if model is None else model_inside
+        return round_, (), round_.inside if alone else model_inside
     width, short_mm = process.line_width_mm, 0.5 * spacing_mm(process.line_width_mm, height_mm) - REACH * process.line_width_mm
     within, ranked = offset(round_.inside, -short_mm), process.model_copy(update={"walls": most})
     loops, ending = [*round_.loops, *((),) * (around - len(round_.loops))], []
@@ -248,28 +250,8 @@ def cut_walls(
     inside = round_.inside ^ inside
     lines = [*(bead.points for bead in ending), *(close_loop(loop) for level in loops[around:] for loop in level)]
     ending += gaps([uncovered_area(round_.inside - inside, lines, width)], width, height_mm)
-    model_inside = inside if model is None and not more else model_inside
+    model_inside = inside if alone and not more else model_inside
     return replace(round_, loops=tuple(loops), inside=inside), tuple(ending), model_inside
-
-
-def _walls_from(
-    loops: tuple[tuple[Floats, ...], ...], varying: tuple[Wall, ...], ending: tuple[Bead, ...], areas: list[list[Floats]]
-) -> tuple[Walls, tuple[Bead, ...], Polygons]:
-    """The walls of a layer from what a process has found: polygons are built anew, which can round, whichever process it was."""
-    inside, narrow, *model_inside = map(of_contours, areas)
-    return Walls(loops, inside, narrow, varying), ending, model_inside[0] if model_inside else inside
-
-
-def cover(sections: Sections, model: Sequence[Polygons | None], insides: Sequence[Polygons]) -> Cover:
-    """What lies around the layers of a part, for its regions. model: as model_sections; insides: what walls would enclose of it.
-    Earlier parts that are not known are taken to fill the first section; under the platform is nothing."""
-    top, bottom = sections.shell_layers
-    own, above = sections.own, sections.above
-    beside = [whole - mine if whole is not None else Polygons() for whole, mine in zip(model, own, strict=True)]
-    later = [*beside, *above]
-    below = sections.beneath or [Polygons() if sections.on_platform else own[0]] * bottom
-    filled = [mine if whole is None else whole for whole, mine in zip(model, own, strict=True)]
-    return Cover(filled, insides, below, above[:top], later if any(not area.is_empty() for area in later) else ())
 
 
 def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
