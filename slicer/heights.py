@@ -81,15 +81,10 @@ def layer_heights(
             heights += _heights_from(mesh, plane_mm, process, nozzle_mm, from_mm, first_mm)
             from_mm, first_mm = plane_mm, process.layer_height_mm
     heights += _heights_from(mesh, top_mm, process, nozzle_mm, from_mm, first_mm)
-    return replace(heights, cut_mm=_below_corners(heights.cut_mm, mesh))
-
-
-def _below_corners(cuts_mm: Floats, mesh: Mesh) -> Floats:
-    """The planes of sections, those at the height of a corner just below it, or rounding would tell whether a ceiling there
-    belongs to the layer or to the next."""
-    corners_mm = np.sort(mesh.vertices[:, 2])
+    # Sections at the height of a corner lie just below it, or rounding would tell to which layer a ceiling there belongs.
+    corners_mm, cuts_mm = np.sort(mesh.vertices[:, 2]), heights.cut_mm
     below, up_to = (np.searchsorted(corners_mm, cuts_mm + by_mm) for by_mm in (-SAME_MM, SAME_MM))
-    return np.where(below < up_to, cuts_mm - 2.0 * SAME_MM, cuts_mm)
+    return replace(heights, cut_mm=np.where(below < up_to, cuts_mm - 2.0 * SAME_MM, cuts_mm))
 
 
 def part_heights(part: Part, later: Sequence[Part], profile: Profile) -> Heights:

@@ -153,7 +153,10 @@ def section_part(
     """The sections of a part that is printed after `earlier` and before `later` parts. profile: of the whole print; pins: of all
     its parts, planned here if they are not given. Raises SliceError when the part's mesh is not closed, or too high to be
     meant."""
-    of_print, profile = profile, vase_profile(profile.of_part(part.index))
+    of_print, profile = profile, profile.of_part(part.index)
+    if profile.process.spiral_vase:  # its bottom and what is above it know of one wall and of no inside
+        hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
+        profile = profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.on_platform
     heights = part_heights(part, later, profile)
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
@@ -203,14 +206,6 @@ def section_part(
         pedestal_layers=pedestal,
         too_thin=too_thin,
     )
-
-
-def vase_profile(profile: Profile) -> Profile:
-    """The profile with which the bottom is sliced, and which knows of one wall and no inside above it."""
-    if not profile.process.spiral_vase:
-        return profile
-    hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
-    return profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
 
 
 def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Polygons:

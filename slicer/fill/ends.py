@@ -76,18 +76,17 @@ def hold_ends(
 def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[Bead]:
     """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them. An end
     that lies on nothing for longer than an anchor is part of the pattern, and stays."""
-    layers = [plastic for plastic in below if plastic is not None]
-    return [_cut_anchor(bead, layers) if bead.anchor_mm > 0.0 and not bead.closed else bead for bead in beads]
-
-
-def _cut_anchor(bead: Bead, layers: Sequence[Plastic]) -> Bead:
-    points, width_mm = bead.points, bead.width_mm
-    for _ in range(2):
-        points = np.ascontiguousarray(points[::-1])
-        ways = [_first_held(points, plastic, width_mm, bead.anchor_mm + width_mm) for plastic in layers]
-        way = min((way for way in ways if way >= 0.0), default=0.0)
-        points = _from(points, way - HOLD * width_mm) if way > width_mm else points
-    return bead if np.array_equal(points, bead.points) or length_mm(points) < width_mm else replace(bead, points=points)
+    layers, out = [plastic for plastic in below if plastic is not None], list(beads)
+    for k, bead in enumerate(beads):
+        points, width_mm = bead.points, bead.width_mm
+        for _ in range(2 if bead.anchor_mm > 0.0 and not bead.closed else 0):
+            points = np.ascontiguousarray(points[::-1])
+            ways = [_first_held(points, plastic, width_mm, bead.anchor_mm + width_mm) for plastic in layers]
+            way = min((way for way in ways if way >= 0.0), default=0.0)
+            points = _from(points, way - HOLD * width_mm) if way > width_mm else points
+        if points is not bead.points and not np.array_equal(points, bead.points) and length_mm(points) >= width_mm:
+            out[k] = replace(bead, points=points)
+    return out
 
 
 @kernel

@@ -61,11 +61,6 @@ class SolidLines:
         """How far inside the area the lines end."""
         return 0.5 * self.spacing_mm - self.overlap * self.width_mm
 
-    @property
-    def border_mm(self) -> tuple[float, float]:
-        """The spacing and how far inside the area lines end that reach into what stays open beside them."""
-        return (self.spacing_mm, self.reach_mm) if self.seen else (0.0, 0.0)
-
 
 def lines_angle_deg(process: Process, layer: int) -> float:
     """Direction of the solid lines of a layer: neighbouring layers cross at right angles."""
@@ -118,7 +113,8 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
         return []
     in_order = solid.pattern == "monotonic"
     cell, before = _cells(pieces, solid.angle_deg, solid.spacing_mm) if in_order else (None, [])
-    lines, of = anchor_lines(pieces, border, (JOIN * solid.spacing_mm, 0.0, 0.0), solid.border_mm, cell)
+    reach_mm = (solid.spacing_mm, solid.reach_mm) if solid.seen else (0.0, 0.0)
+    lines, of = anchor_lines(pieces, border, (JOIN * solid.spacing_mm, 0.0, 0.0), reach_mm, cell)
     if in_order and len(lines) > 1:
         by_cell: list[list[Floats]] = [[] for _ in before]
         for line, own in zip(lines, of.tolist(), strict=True):
