@@ -66,15 +66,15 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
         for k, bead in enumerate(beads):
             if bead.kind is kind and not bead.line:
                 loop = np.ascontiguousarray(bead.points)
-                lead_mm = 0.0
                 if kind is Kind.INNER_WALL:
                     distance, *nearest = _nearest(loop, known, np.inf)
                     x, y = nearest if distance < np.inf else loop[0].tolist()
-                    loop, _ = _start_at_best(loop, (x, y, *NO_CORNER), NO_LIMITS)
+                    at, share, free = _best(loop, (x, y, *NO_CORNER), NO_LIMITS)
                 else:
-                    loop, free = _start_at_best(loop, _target(loop, process, around), around.limits)
-                    lead_mm = 0.0 if free else bead.width_mm
-                    loop = loop if free else begin_with_room(loop, lead_mm)
+                    at, share, free = _best(loop, _target(loop, process, around), around.limits)
+                loop, lead_mm = _begin_at(loop, at, share), 0.0 if free else bead.width_mm
+                loop = loop if free else _begin_with_room(loop, lead_mm)
+                if kind is Kind.OUTER_WALL:
                     seams[k] = loop[0]
                 out[k] = replace(bead, points=_open(loop, process.seam_gap * bead.width_mm, lead_mm))
     return out, np.array(list(seams.values())).reshape(-1, 2)
@@ -162,13 +162,10 @@ def _side(loop: Floats, i: int) -> Segment:
     return Segment(loop[i, 0], loop[i, 1], loop[after, 0], loop[after, 1])
 
 
-def _start_at_best(loop: Floats, target: Target, interfaces: SeamLimits) -> tuple[Floats, bool]:
-    """The loop (n, 2) begun at its place of least cost, and whether that is clear of interface edges."""
-    at, share, free = _best(loop, target, interfaces)
-    if share > 0.0:
-        new = loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at])
-        return np.concatenate([new[None], loop[at + 1 :], loop[: at + 1]]), free
-    return start_at(loop, at), free
+def _begin_at(loop: Floats, at: int, share: float) -> Floats:
+    """The loop (n, 2) begun at a share of one of its sides."""
+    begun: Floats = (loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at]))[None]
+    return np.concatenate([begun, loop[at + 1 :], loop[: at + 1]]) if share > 0.0 else start_at(loop, at)
 
 
 @kernel
@@ -211,31 +208,19 @@ def _in_corner(loop: Floats, target: Target) -> bool:
     return share == 0.0 and abs(corner_strength(loop, at)) > KEPT
 
 
-def begin_with_room(loop: Floats, lead_mm: float) -> Floats:
+def _begin_with_room(loop: Floats, lead_mm: float) -> Floats:
     """The loop, begun at the place nearest to its beginning from which a lead leaves its outer wall; the one with most room where
     there is none: in a sharp corner the way inside runs along the wall."""
-    deepest, most = loop, _depth_mm(loop, lead_mm)
-    if most >= OFF_WALL * lead_mm:
-        return loop
-    steps = start_at(loop, 1) - loop
-    counts = (np.hypot(*steps.T) / SAMPLE_MM).astype(np.int64) + 1
-    places = [(i, s / counts[i]) for i in range(len(loop)) for s in range(counts[i])]
-    places.sort(key=lambda place: float(np.hypot(*(loop[place[0]] + place[1] * steps[place[0]] - loop[0]))))
-    for i, share in places:
-        begun = start_at(loop, i)
-        if share:
-            begun = np.concatenate([(loop[i] + share * steps[i])[None], start_at(loop, (i + 1) % len(loop))])
-        depth = _depth_mm(begun, lead_mm)
+    counts = (np.hypot(*(start_at(loop, 1) - loop).T) / SAMPLE_MM).astype(np.int64) + 1
+    places = [_begin_at(loop, i, s / count) for i, count in enumerate(counts.tolist()) for s in range(count)]
+    deepest, most = loop, -1.0
+    for begun in sorted(places, key=lambda begun: float(np.hypot(*(begun[0] - loop[0])))):
+        depth, _, _ = _nearest(begun, (begun[0] + lead_in(begun, lead_mm))[None], np.inf)
         if depth > most:
             deepest, most = begun, depth
         if depth >= OFF_WALL * lead_mm:
             break
     return deepest
-
-
-def _depth_mm(loop: Floats, lead_mm: float) -> float:
-    """How far from the loop a lead begins."""
-    return float(_nearest(loop, (loop[0] + lead_in(loop, lead_mm))[None], np.inf)[0])
 
 
 def lead_in(loop: Floats, lead_mm: float) -> Floats:
