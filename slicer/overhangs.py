@@ -58,12 +58,10 @@ class Overhang:
 
 
 def find_overhangs(sections: Sections) -> list[Overhang]:
-    """For every layer the part of its outline above a risky face, and what begins over nothing.
-
-    On the platform the first layer may lie. What carries itself by the search's definition (mdp.support_need) does not hang;
-    what bridges layer by layer, as arches do, does not either. Without support whatever has an anchor to hold on to is printed as
-    a bridge, however long. Whatever reaches over the layer below in a place where a person wants support hangs.
-    """
+    """For every layer the part of its outline above a risky face, and what begins over nothing. On the platform the first layer
+    may lie. What carries itself by the search's definition (mdp.support_need) does not hang; what bridges layer by layer, as
+    arches do, does not either. Without support whatever has an anchor to hold on to is printed as a bridge, however long.
+    Whatever reaches over the layer below in a place where a person wants support hangs."""
     process, mesh, outlines, cuts_mm = sections.process, sections.mesh, sections.outlines, sections.heights.cut_mm
     level_mm, arch_mm = (inf, inf) if process.support != "auto" else (process.bridge_mm, process.arch_longest_mm)
     enforces = process.support != "none" and len(sections.enforced) > 0
@@ -125,11 +123,9 @@ def _sort_islands(
 
 def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> Bridge | None:
     """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
-
-    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The mean fourth
-    power of the spans is least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach
-    over, that is the direction of the shortest spans. angle_deg: the direction where one is asked for, 0: none is.
-    """
+    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The mean fourth power of the spans is
+    least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach over, that is the
+    direction of the shortest spans. angle_deg: the direction where one is asked for, 0: none is."""
     if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):
         return None
     sides = edges(hanging)

@@ -221,11 +221,9 @@ def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Poly
 
 def lay_on_plate(outlines: list[Polygons], mesh: Mesh, cuts_mm: Floats, process: Process) -> list[Polygons]:
     """The sections of a part on the platform, the lowest ones with all that stands there: the section at PLATFORM_TOLERANCE_MM,
-    below which surfaces stand by the search's definition (mdp.overhang.standing).
-
-    Without it the rest of a base that is not quite level would lie in the second layer, in the air. What reaches no farther than
-    a ledge carries itself and stays as it is: fillets and chamfers keep their form.
-    """
+    below which surfaces stand by the search's definition (mdp.overhang.standing). Without it the rest of a base that is not quite
+    level would lie in the second layer, in the air. What reaches no farther than a ledge carries itself and stays as it is:
+    fillets and chamfers keep their form."""
     base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
     width_mm, ledge_mm = process.line_width_mm, NARROW * process.line_width_mm
     wide = opening(base - offset(outlines[0], ledge_mm), 0.5 * width_mm)

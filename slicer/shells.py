@@ -213,12 +213,10 @@ def cut_walls(
     more: int,
     above: Polygons | None,
 ) -> tuple[Walls, tuple[Bead, ...], Polygons]:
-    """The walls of a part's section in its island of the model, as joined.
-
-    Those that run round; inner walls along the surface that end on a cut face's, or where a modifier has fewer, all of one width,
-    and what fills between them; what the walls would enclose if the model were not cut and had `more` walls fewer. above: the
-    model in the next layer, if the tops that it leaves bare have one wall.
-    """
+    """The walls of a part's section in its island of the model, as joined. Those that run round; inner walls along the surface
+    that end on a cut face's, or where a modifier has fewer, all of one width, and what fills between them; what the walls would
+    enclose if the model were not cut and had `more` walls fewer. above: the model in the next layer, if the tops that it leaves
+    bare have one wall."""
     alone, least, most = model is section, min(counts.all), max(counts.all)
     if alone and least == most:
 

@@ -53,12 +53,10 @@ class Surroundings:
 
 
 def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -> tuple[list[Bead], Floats]:
-    """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls.
-
-    The walls that run round come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its
-    beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
-    inside instead, over its inner walls, and so does one on which a person wants no seam anywhere.
-    """
+    """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls. The walls that run round come as
+    loops (n, 2), solid on their left, and become polylines. A wall stops short of its beginning by seam_gap of its width. An
+    outer wall that is near an interface's edge all round begins and ends a line width inside instead, over its inner walls, and
+    so does one on which a person wants no seam anywhere."""
     seams: dict[int, Floats] = {}
     out = list(beads)
     for kind in RINGS:

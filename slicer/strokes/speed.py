@@ -39,12 +39,10 @@ FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the 
 def timed(
     strokes: Strokes, profile: Profile, height_mm: float, kind_mm_s: Floats | None, flow: float, of_places: Sequence[Process] = ()
 ) -> tuple[Strokes, Floats]:
-    """The strokes of a layer, in pieces of one width and simplified, with their (k,) speeds.
-
-    kind_mm_s, by number of the kind, replaces the process's speeds, flow multiplies every stroke's flow. of_places: the processes
-    of the places in which other settings hold; none where kind_mm_s holds. Bounded by what the hot end melts; a layer done before
-    least_layer_time_s is slowed down to last as long, but not below least_speed_mm_s.
-    """
+    """The strokes of a layer, in pieces of one width and simplified, with their (k,) speeds. kind_mm_s, by number of the kind,
+    replaces the process's speeds, flow multiplies every stroke's flow. of_places: the processes of the places in which other
+    settings hold; none where kind_mm_s holds. Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed
+    down to last as long, but not below least_speed_mm_s."""
     strokes, process = in_pieces(strokes, height_mm), profile.process
     asked = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
     for number, own in enumerate(of_places, start=1):

@@ -234,12 +234,10 @@ def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, f
 def split_overhangs(
     strokes: Strokes, section: Polygons, below: Polygons | None, process: Process, support: Polygons | None = None
 ) -> Strokes:
-    """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic.
-
-    below: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the
-    share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share. support: dense, right under
-    the layer: over it an overhanging wall sags no farther than the gap, however little of it lies on plastic.
-    """
+    """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic. below: what
+    the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the share 1/2 - d/w
+    of its width on it; it overhangs where that is less than process.overhang_share. support: dense, right under the layer: over
+    it an overhanging wall sags no farther than the gap, however little of it lies on plastic."""
     if below is None or process.overhang_share <= 0.0:
         return strokes
     width_mm, shortest_mm = process.line_width_mm, SHORTEST_HANGING * process.line_width_mm

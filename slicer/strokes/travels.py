@@ -37,12 +37,10 @@ ROUND = 4.0  # a path whose ends lie nearer than its width, and that is longer t
 def travels(
     since: Floats, to: Floats, section: Polygons, support: Polygons, process: Process, skin: Polygons | None = None
 ) -> tuple[Mask, dict[int, Floats]]:
-    """Which of the n travels, (n, 2) by two, retract, and the detours (k, 2) of some others, by the travel's number.
-
-    Those no shorter than process.retract_travel_mm retract that leave the inside both of the section and of its support and
-    find no short detour inside either. skin: outer walls beside an edge of an interface; short ones retract as well where they
-    would pass over it, unless they begin or end on it.
-    """
+    """Which of the n travels, (n, 2) by two, retract, and the detours (k, 2) of some others, by the travel's number. Those no
+    shorter than process.retract_travel_mm retract that leave the inside both of the section and of its support and find no short
+    detour inside either. skin: outer walls beside an edge of an interface; short ones retract as well where they would pass over
+    it, unless they begin or end on it."""
     retracts: Mask = np.hypot(*(to - since).T) >= process.retract_travel_mm
     detours: dict[int, Floats] = {}
     widths_mm = (min(process.line_width_mm, outer_wall_width_mm(process)), process.support_line_width_mm or process.line_width_mm)
