@@ -26,8 +26,8 @@ from slicer.bead import (
     varying,
     wall_rank,
 )
+from slicer.fill.ends import ANCHORED, anchor_skins, infill_bridges
 from slicer.fill.infill import Filling, filling_beads, has_lightning, leaning_walls, open_area, plan_fillings, widest_cell_mm
-from slicer.fill.over_infill import ANCHORED, anchor_skins, infill_bridges
 from slicer.fill.region import Cover, Region, ironed_areas, regions
 from slicer.fill.skin import SolidLines, lines_angle_deg, skin_lines
 from slicer.geometry.clip import runs_within

@@ -24,6 +24,8 @@ Box = tuple[float, float, float, float]
 Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
 Draw = Callable[[Box], Lines]  # for a box x0 y0 x1 y1
 LinePattern = tuple[float, Draw]  # the angle of the frame, deg, in which it is drawn
+# A border, (m + 1,) way along all its contours to each edge, (k, 2) edges on which pieces end, and (2 k,) way to each end.
+BorderEnds = tuple[EdgeIndex, Floats, Indices, Floats]
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
 WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: farther in it is too narrow for a bead
 LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a wedge that is smaller stays as it is
@@ -112,7 +114,7 @@ def _lay_lines(
     partner, sense = _join_ends(after, gap, group, most_mm)
     runs = _runs(sense, after, gap, hook_mm, apart_mm)
     wedges = _wedges(pieces, border.edges, sense, after, gap, runs, solid_mm)
-    done = flags(len(pieces.ends))
+    done, border_ends = flags(len(pieces.ends)), (border, way, pieces.ends, along_border)
     n = count = 0
     for seed in range(len(pieces.ends)):
         if done[seed]:
@@ -122,33 +124,30 @@ def _lay_lines(
             end = partner[end] ^ 1
         starts[count], of[count] = n, group[seed]
         count += 1
-        since = (pieces.ends[end // 2, end % 2], along_border[end])
         if runs[end] != 0.0:
-            first, n = n, _append_run(out, n, since, runs[end], border, way)
+            first, n = n, _append_run(out, n, end, runs[end], border_ends)
             _reverse(out, first, n)
         elif wedges[end] != 0.0:
-            n = _append_tip(out, n, since, wedges[end], border, way)
+            n = _append_tip(out, n, end, wedges[end], border_ends)
         while True:
             done[end // 2] = True
             first, n = n, _append_piece(out, n, pieces, end)
             _bend(out, first, first + 1, wedges[end], solid_mm[0])
             end ^= 1
-            since = (pieces.ends[end // 2, end % 2], along_border[end])
             if wedges[end] != 0.0:
                 meets = out[n - 1, 0], out[n - 1, 1]
                 _bend(out, n - 1, n - 2, wedges[end], solid_mm[0])
-                n = _append_tip(out, n, since, wedges[end], border, way)
+                n = _append_tip(out, n, end, wedges[end], border_ends)
                 if partner[end] >= 0:
                     out[n, 0], out[n, 1] = meets
                     n += 1
             if runs[end] != 0.0:
-                n = _append_run(out, n, since, runs[end], border, way)
+                n = _append_run(out, n, end, runs[end], border_ends)
             if partner[end] < 0:
                 break
             end = partner[end]
             if wedges[end] != 0.0:
-                since = (pieces.ends[end // 2, end % 2], along_border[end])
-                n = _append_tip(out, n, since, wedges[end], border, way)
+                n = _append_tip(out, n, end, wedges[end], border_ends)
             else:
                 n -= 1  # the run's last point is the partner itself
     return n, count
@@ -305,19 +304,20 @@ def _bend(out: Floats, end: int, before: int, wedge_mm: float, spacing_mm: float
 
 
 @no_nrt
-def _append_tip(out: Floats, n: int, since: tuple[int, float], length: float, border: EdgeIndex, way: Floats) -> int:
+def _append_tip(out: Floats, n: int, end: int, length: float, border_ends: BorderEnds) -> int:
     """Appends only the last point of a run; returns the new n."""
-    last = _append_run(out, n, since, length, border, way) - 1
+    last = _append_run(out, n, end, length, border_ends) - 1
     out[n, 0], out[n, 1] = out[last, 0], out[last, 1]
     return n + 1
 
 
 @no_nrt
-def _append_run(out: Floats, n: int, since: tuple[int, float], length: float, border: EdgeIndex, way: Floats) -> int:
-    """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative. since: the
-    point's edge, and the way to it. Also the run's last point; returns the new n."""
-    e, way_mm = since
-    edges, first, end = border.edges, border.begins[border.loop[e]], border.begins[border.loop[e] + 1]
+def _append_run(out: Floats, n: int, end: int, length: float, border_ends: BorderEnds) -> int:
+    """Appends the vertices of the contour passed on a run from one of the ends, backward where the length is negative, and the
+    run's last point; returns the new n."""
+    border, way, sides, along_border = border_ends
+    e, way_mm = sides[end // 2, end % 2], along_border[end]
+    edges, first, last = border.edges, border.begins[border.loop[e]], border.begins[border.loop[e] + 1]
     left, forward = abs(length), length > 0.0
     at = way_mm - way[e] if forward else way[e + 1] - way_mm
     step = way[e + 1] - way[e]
@@ -327,7 +327,7 @@ def _append_run(out: Floats, n: int, since: tuple[int, float], length: float, bo
         out[n, 0], out[n, 1] = edges[e, corner], edges[e, corner + 1]
         n += 1
         e += 1 if forward else -1
-        e = first if e == end else end - 1 if e < first else e
+        e = first if e == last else last - 1 if e < first else e
         step, at = way[e + 1] - way[e], 0.0
     share = (at + left) / step if step > 0.0 else 0.0
     share = share if forward else 1.0 - share

@@ -140,13 +140,8 @@ def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) 
 def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -> int:
     """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by. From row
     1 on; returns the number of rows, 0 where there is no such path."""
-    room = 16
-    shares, crossed = floats(room, 0.0), longs(room, 0)
+    shares, crossed = floats(len(track.edges), 0.0), longs(len(track.edges), 0)
     many = crossings(track, straight, shares, crossed)
-    while many < 0:
-        room *= 4
-        shares, crossed = floats(room, 0.0), longs(room, 0)
-        many = crossings(track, straight, shares, crossed)
     x0, y0, x1, y1 = straight
     path[1, 0], path[1, 1] = x0, y0
     n, left, k = 2, longest, 0

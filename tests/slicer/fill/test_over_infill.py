@@ -10,7 +10,7 @@ import shapely
 from shapely.ops import substring
 
 from mdp.mesh import Floats
-from slicer.fill.over_infill import anchored, infill_bridges
+from slicer.fill.ends import anchored, infill_bridges
 from slicer.fill.region import Region
 from slicer.geometry.polygons import Polygons
 from slicer.paths import SKINS, Kind
