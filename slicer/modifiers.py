@@ -19,7 +19,7 @@ from mdp.zone import MeshVolume, Volume
 from profiles.errors import SliceError
 from profiles.part_settings import process_of_part
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, clean, closing, offset, union
+from slicer.geometry.polygons import Polygons, clean, closing, offset, union, unite_layers
 from slicer.heights import SHELL_KEYS, shell_layers
 
 AROUND_MM = 5.0  # beside a part, which is more than its outlines may reach beyond its mesh
@@ -85,8 +85,7 @@ def _with_place(found: Sequence[Place], new: Place) -> list[Place]:
         if same is None:
             merged.append(piece)
         else:
-            areas = [union([a, b]) for a, b in zip(merged[same].areas, piece.areas, strict=True)]
-            merged[same] = Place(piece.settings, areas)
+            merged[same] = Place(piece.settings, unite_layers(merged[same].areas, piece.areas))
     return [place for place in merged if any(not area.is_empty() for area in place.areas)]
 
 

@@ -72,7 +72,9 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     for i in range(int(sections.on_platform), len(outlines)):
         below = outlines[i - 1] if i else offset(sections.plastic_below or Polygons(), RIM_MM)
         beyond, triangles = outlines[i] - below, faces.get(i, [])
-        floating = _floating(outlines[i], below, beyond.area())
+        # What begins over nothing lies beyond it all, however steep it is: a bell's rim that gets thick enough for a line.
+        small = [piece for piece in islands(outlines[i]) if piece.area() < beyond.area() + LEAST_MM2]
+        floating = union([piece for piece in small if (piece ^ below).is_empty()])
         hanging = beyond ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
         hanging = hanging if floating.is_empty() else hanging + floating
         enforced = opening(beyond ^ sections.enforced[i], ROUNDING_MM) if enforces else Polygons()
@@ -91,13 +93,6 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
             overhang = replace(overhang, hanging=wanted, unwanted=overhang.hanging - wanted)
         overhangs[i] = overhang
     return overhangs
-
-
-def _floating(outline: Polygons, below: Polygons, beyond_mm2: float) -> Polygons:
-    """The pieces of a layer that begin over nothing, however steep they are: a bell's rim that gets thick enough for a line.
-    beyond_mm2: how much of the layer lies beyond the one below, which such a piece does all."""
-    small = [piece for piece in islands(outline) if piece.area() < beyond_mm2 + LEAST_MM2]
-    return union([piece for piece in small if (piece ^ below).is_empty()])
 
 
 def _sort_islands(

@@ -84,23 +84,13 @@ def _lower(trees: Trees, inside: Polygons, wanting: Floats, sizes_mm: tuple[floa
     return nodes, parent
 
 
-@kernel
 def _straighten(nodes: Floats, parent: Indices, most: float) -> Floats:
     """The nodes, every one that has one child moved towards the middle between its neighbours, by at most a length."""
-    n = len(nodes)
-    children, child, moved = longs(n, 0), longs(n, 0), nodes.copy()
-    for k in range(n):
-        if parent[k] >= 0:
-            children[parent[k]] += 1
-            child[parent[k]] = k
-    for k in range(n):
-        if parent[k] < 0 or children[k] != 1:
-            continue
-        x = 0.5 * (nodes[parent[k], 0] + nodes[child[k], 0]) - nodes[k, 0]
-        y = 0.5 * (nodes[parent[k], 1] + nodes[child[k], 1]) - nodes[k, 1]
-        share = min(1.0, most / max(np.hypot(x, y), 1e-12))
-        moved[k, 0] += share * x
-        moved[k, 1] += share * y
+    moved, held, child = nodes.copy(), np.flatnonzero(parent >= 0), np.zeros_like(parent)
+    child[parent[held]] = held
+    held = held[np.bincount(parent[held], minlength=len(nodes))[held] == 1]
+    way = 0.5 * (nodes[parent[held]] + nodes[child[held]]) - nodes[held]
+    moved[held] += np.minimum(1.0, most / np.maximum(np.hypot(*way.T), 1e-12))[:, None] * way
     return moved
 
 

@@ -5,7 +5,6 @@ Strokes are parted where they enter and leave an area, where they hardly lie on 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from slicer.bead import EVEN_MM, NOISE_MM, Bead, hanging_area
 from slicer.geometry.clip import cut_into
 from slicer.geometry.edge_index import EdgeIndex, index_edges
 from slicer.geometry.polygons import Polygons
-from slicer.geometry.polyline import Segment, lengths_mm, nearest_share
+from slicer.geometry.polyline import Segment, length_between, lengths_mm, nearest_share
 from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
@@ -267,9 +266,15 @@ def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
     of the layer; the pieces together hold the plastic of the whole."""
     if not strokes.varies.any():
         return strokes
-    changes = np.abs(np.diff(strokes.points[:, 2]))
-    room = 2 * (len(strokes.points) + int(np.ceil(changes / EVEN_MM).sum()))
-    points, starts, source, width_mm = _part(strokes.points, strokes.starts, strokes.varies, strokes.width_mm, room)
+    # Points are added where the width changes by more than EVEN_MM from one to the next.
+    points, starts = strokes.points, strokes.starts
+    after = np.concatenate([points[1:], points[-1:]])
+    many = np.maximum(np.ceil(np.abs(after[:, 2] - points[:, 2]) / EVEN_MM), 1.0).astype(np.int64)
+    many[~np.repeat(strokes.varies, np.diff(starts))] = many[starts[1:] - 1] = 1
+    which, ends = np.repeat(np.arange(len(points)), many), np.cumsum(many)
+    share = (np.arange(len(which)) - (ends - many)[which]) / many[which]
+    points, starts = points[which] + share[:, None] * (after - points)[which], np.append(0, ends)[starts]
+    points, starts, source, width_mm = _part(points, starts, strokes.varies, strokes.width_mm)
     out = strokes.refined(points, starts, source)
     whole, own = bead_area_mm2(out.width_mm, height_mm), bead_area_mm2(width_mm, height_mm)
     flow = np.where(out.varies, 1.0 + (out.flow - 1.0) * whole / own, out.flow)
@@ -277,8 +282,9 @@ def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
 
 
 @kernel
-def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats, room: int) -> tuple[Floats, Indices, Indices, Floats]:
-    """The pieces: points (n, 3), n no more than the room, (k + 1,) where each begins, (k,) the stroke and the width of each."""
+def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats) -> tuple[Floats, Indices, Indices, Floats]:
+    """The pieces: points (n, 3), (k + 1,) where each begins, (k,) the stroke and the width of each."""
+    room = 2 * len(points)
     out, begins, source, widths = table(room, 3), longs(room, 0), longs(room, 0), floats(room, 0.0)
     count = n = 0
     for k in range(len(starts) - 1):
@@ -288,7 +294,7 @@ def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats, room:
             source[count], widths[count], begins[count + 1] = k, width_mm[k], n
             count += 1
             continue
-        line = _with_small_steps(points[a:b])
+        line = points[a:b]
         ends = _ends(line)
         begin = 0
         for end in range(1, len(line)):
@@ -306,32 +312,10 @@ def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats, room:
 
 
 @helper
-def _with_small_steps(points: Floats) -> Floats:
-    """The line (n, 3) with points added where its width changes by more than EVEN_MM from one to the next."""
-    size = 1
-    for i in range(len(points) - 1):
-        size += max(ceil(abs(points[i + 1, 2] - points[i, 2]) / EVEN_MM), 1)
-    out = table(size, 3)
-    n = 0
-    for i in range(len(points) - 1):
-        steps = max(ceil(abs(points[i + 1, 2] - points[i, 2]) / EVEN_MM), 1)
-        for s in range(steps):
-            for axis in range(3):
-                out[n, axis] = points[i, axis] + s / steps * (points[i + 1, axis] - points[i, axis])
-            n += 1
-    for axis in range(3):
-        out[n, axis] = points[len(points) - 1, axis]
-    return out
-
-
-@helper
 def _ends(line: Floats) -> Mask:
     """(n,) True for the points of a line (n, 3) at which a piece ends: pieces are as long as the widths allow."""
     ends = flags(len(line))
-    left = 0.0
-    for i in range(len(line) - 1):
-        left += np.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
-    length = 0.0
+    length, left = 0.0, length_between(line, 0, len(line))
     low = high = 0.5 * (line[1, 2] + line[0, 2])
     for i in range(len(line) - 1):
         step = np.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
