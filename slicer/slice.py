@@ -49,7 +49,6 @@ LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other p
 PIN_RANK = OUTSIDE - 1  # pins come before all else of a layer
 PIN_CHORDS = 12  # chords of the circle that the tip goes round a pin
 PIN_MOST_AREA = 3.0  # section of its stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
-OnLayer = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,15 +92,20 @@ def slice_parts(
     layers = np.frombuffer(mmap(-1, 4 * len(parts)), np.int32)  # those that are done: other processes write them, too
     ready: list[SlicedPart | None] = [None] * len(parts)
     errors: dict[int, SliceError] = {}
-    here = os.getpid()
+    here, largest_first = (
+        os.getpid(),
+        sorted(range(len(parts)), key=lambda k: (-expected[k], k)),
+    )  # no large one is left for the end
 
     def show() -> None:
         if on_progress is not None and os.getpid() == here:
             on_progress(SlicingProgress(tuple(layers.tolist()), tuple(expected), tuple(ready)))
 
-    def sliced(k: int) -> SlicedPart | SliceError:
-        def on_layer(layer: int, of: int) -> None:
-            layers[k] = layer
+    def sliced(place: int) -> SlicedPart | SliceError:
+        k = largest_first[place]
+
+        def on_layer(done: int) -> None:
+            layers[k] = done
             show()
 
         try:
@@ -110,12 +114,8 @@ def slice_parts(
             return error
 
     by_layers = max(expected) > LARGEST_SHARE * sum(expected) or sum(expected) < FEWEST_IN_ALL
-    largest_first = sorted(range(len(parts)), key=lambda k: (-expected[k], k))  # so that no large one is left for the end
-    results = (
-        map(sliced, largest_first)
-        if by_layers
-        else parallel_map(lambda place: sliced(largest_first[place]), len(parts), helps=False, on_wait=show)
-    )
+    count = len(parts)
+    results = map(sliced, range(count)) if by_layers else parallel_map(sliced, count, helps=False, on_wait=show)
     for k, result in zip(largest_first, results, strict=True):
         if isinstance(result, SliceError):
             errors[k] = result
@@ -128,14 +128,12 @@ def slice_parts(
     return tuple(piece for piece in ready if piece is not None)
 
 
-def slice_part(
-    part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = (), on_layer: OnLayer | None = None
-) -> SlicedPart:
+def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> SlicedPart:
     """The part's layers from its base plane upward.
 
     earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. Support is
-    the part's own (slice_parts hands it down to earlier parts). The same input gives the same paths. on_layer: called after each
-    layer with its number and how many there are. Raises SliceError when the part gives no bead at all.
+    the part's own (slice_parts hands it down to earlier parts). The same input gives the same paths. Raises SliceError when the
+    part gives no bead at all.
 
     >>> from manifold3d import Manifold
     >>> from mdp.cut import mesh_of
@@ -150,12 +148,13 @@ def slice_part(
     """
     sections = section_part(part, profile, earlier, later)
     overhangs = find_overhangs(sections)
-    supports = own_supports(sections, overhangs)
-    return slice_supported(supports, overhangs, on_layer)
+    return slice_supported(own_supports(sections, overhangs), overhangs)
 
 
-def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer: OnLayer | None = None) -> SlicedPart:
-    """The layers of a part with the support planned for it, as slice_part."""
+def slice_supported(
+    supports: Supports, overhangs: Sequence[Overhang], on_layer: Callable[[int], None] = lambda done: None
+) -> SlicedPart:
+    """The layers of a part with the support planned for it, as slice_part; on_layer: called with how many are done."""
     shells = build_shells(supports, overhangs)
     sections, process = supports.sections, supports.sections.process
     rear, edges = rear_of(sections.mesh.bounds_mm), sections.joints
@@ -186,8 +185,7 @@ def slice_supported(supports: Supports, overhangs: Sequence[Overhang], on_layer:
         if len(layer):
             tip = layer.points[-1]
             layers.append(layer)
-        if on_layer is not None:
-            on_layer(i + 1, count)
+        on_layer(i + 1)
     if usual < count:
         turns = vase_layers(sections, supports.areas, usual, tip)
         layers += turns
