@@ -92,10 +92,8 @@ def slice_parts(
     layers = np.frombuffer(mmap(-1, 4 * len(parts)), np.int32)  # those that are done: other processes write them, too
     ready: list[SlicedPart | None] = [None] * len(parts)
     errors: dict[int, SliceError] = {}
-    here, largest_first = (
-        os.getpid(),
-        sorted(range(len(parts)), key=lambda k: (-expected[k], k)),
-    )  # no large one is left for the end
+    largest_first = sorted(range(len(parts)), key=lambda k: (-expected[k], k))  # so that no large one is left for the end
+    here = os.getpid()
 
     def show() -> None:
         if on_progress is not None and os.getpid() == here:

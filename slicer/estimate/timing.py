@@ -1,4 +1,4 @@
-"""Timing: how long every straight move takes, with acceleration and look-ahead at the corners.
+"""Timing: how long every straight move takes, with acceleration and look-ahead at the corners, and the strokes of a layer.
 
 The model of classic Marlin: constant acceleration along the move, at a corner every axis may change its speed at once by at
 most the junction speed, and the speeds at the corners are the greatest from which the machine can still stop.
@@ -10,14 +10,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import floats
+from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, no_nrt
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
+from mdp.overhang import Mask
 from profiles.machine import Machine
 from profiles.profile import Profile
-from slicer.strokes.speed import travel_mm_s2
+from slicer.strokes.speed import stroke_accelerations, travel_mm_s2
+from slicer.strokes.strokes import Strokes
+from slicer.strokes.travels import STANDING_MM
 
 TINY = 1e-9
+# A wipe turns in its middle by 45 deg, as over the small rings after which most are: mm along each axis for a mm of all of it.
+TURNED = 0.5 / sqrt(2.0)
 
 
 class Speeds(NamedTuple):
@@ -174,3 +179,80 @@ def _block_times(blocks: Blocks, junction_speed: float) -> Floats:
         corner[i + 1] = min(corner[i + 1], fastest)
         times[i] = block_time(blocks, i, corner[i], corner[i + 1])
     return times
+
+
+def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
+    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions. tip:
+    (2,) where the layer below ends."""
+    machine, process, material, speeds = profile.machine, profile.process, profile.material, speeds_of(profile)
+    places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
+    bounds = speeds_mm_s, stroke_accelerations(profile, first_layer)[strokes.kind]
+    pulls = material.retract_mm > 0.0
+    wipe_mm = material.wipe_mm if pulls else 0.0
+    moves = _moves(places, tip, bounds, strokes.retract, speeds, (process.lift_mm, wipe_mm, material.retract_mm))
+    speed_mm_s, most_mm_s2, stands = np.ascontiguousarray(moves[:, 6:].T)
+    moving_s = move_times(moves[:, :6], speed_mm_s, stands > 0.0, machine, most_mm_s2).sum()
+    rise_s = line_s(process.layer_height_mm, speeds.lift_mm_s, machine.z.acceleration_mm_s2)
+    # The filament moves alone where a retraction ends, and where it begins without a wipe.
+    alone_mm = [material.retract_mm + material.retract_prime_extra_mm, *([] if wipe_mm > 0.0 else [material.retract_mm])]
+    ramp = machine.extruder_acceleration_mm_s2
+    standing_s = sum(line_s(length_mm, speeds.filament_mm_s, ramp) for length_mm in alone_mm) if pulls else 0.0
+    return float(moving_s + rise_s + int(strokes.retract.sum()) * standing_s)
+
+
+@kernel
+def _moves(
+    places: tuple[Floats, Indices, Floats, Indices],
+    tip: Floats,
+    bounds: tuple[Floats, Floats],
+    retract: Mask,
+    paces: Speeds,
+    far_mm: tuple[float, float, float],
+) -> Floats:
+    """(n, 9) straight moves of strokes one after the other with the travels to them: steps of X Y Z tilt turn E, speed, greatest
+    acceleration, and 1 where the machine stands still before. A travel that retracts wipes and lifts, and ends at a stand, where
+    the filament is primed. far_mm: of a lift, a wipe and the filament pulled back meanwhile."""
+    points, starts, approach, approach_starts = places
+    speeds, most = bounds
+    lift_mm, wipe_mm, pulled_mm = far_mm
+    wipe_mm_s = min(paces.travel_mm_s, wipe_mm * paces.filament_mm_s / max(pulled_mm, TINY))
+    moves, n = table(len(points) + len(approach) + 4 * len(speeds) + 1, 9), 0
+    x, y = tip[0], tip[1]
+    for k in range(len(speeds)):
+        first, stands = starts[k], retract[k] and wipe_mm <= 0.0
+        if retract[k]:
+            if n > 0:
+                begun = starts[k - 1]
+                apart = sqrt((x - points[begun, 0]) ** 2 + (y - points[begun, 1]) ** 2)
+                wipe = wipe_mm if apart <= points[begun, 2] else -wipe_mm  # on along a ring, back along a line
+                ux, uy, uz = moves[n - 1, 0], moves[n - 1, 1], moves[n - 1, 2]
+                length = sqrt(ux**2 + uy**2 + uz**2)
+                ux, uy, aside = ux / length, uy / length, TURNED * wipe
+                n = _add(moves, n, (0.5 * wipe * ux, 0.5 * wipe * uy, 0.0), wipe_mm_s, np.inf, False)
+                n = _add(moves, n, (aside * (ux - uy), aside * (ux + uy), 0.0), wipe_mm_s, np.inf, False)
+            n = _add(moves, n, (0.0, 0.0, lift_mm), paces.lift_mm_s, np.inf, stands)
+        for i in range(approach_starts[k], approach_starts[k + 1] + 1):
+            if i < approach_starts[k + 1]:
+                x1, y1 = approach[i, 0], approach[i, 1]
+            else:
+                x1, y1 = points[first, 0], points[first, 1]
+            stands = stands and i == approach_starts[k] and lift_mm <= STANDING_MM
+            n = _add(moves, n, (x1 - x, y1 - y, 0.0), paces.travel_mm_s, paces.acceleration_mm_s2, stands)
+            x, y = x1, y1
+        if retract[k]:
+            n = _add(moves, n, (0.0, 0.0, -lift_mm), paces.lift_mm_s, np.inf, False)
+        for i in range(first + 1, starts[k + 1]):
+            step = (points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1], 0.0)
+            n = _add(moves, n, step, speeds[k], most[k], retract[k] and i == first + 1)
+        x, y = points[starts[k + 1] - 1, 0], points[starts[k + 1] - 1, 1]
+    return moves[:n]
+
+
+@no_nrt
+def _add(moves: Floats, n: int, step: tuple[float, float, float], speed: float, most_mm_s2: float, stands: bool) -> int:
+    """Appends a move as row n; returns the new n."""
+    if sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2) <= STANDING_MM:
+        return n
+    moves[n, 0], moves[n, 1], moves[n, 2] = step
+    moves[n, 6], moves[n, 7], moves[n, 8] = speed, most_mm_s2, stands
+    return n + 1

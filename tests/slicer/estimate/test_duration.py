@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from slicer.bead import Bead
-from slicer.estimate.estimate import strokes_s
-from slicer.estimate.timing import line_s
+from slicer.estimate.timing import line_s, strokes_s
 from slicer.paths import Kind
 from slicer.strokes.strokes import strokes_of
 from tests.slicer.hand import profile

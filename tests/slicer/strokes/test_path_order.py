@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mdp.mesh import Floats
-from slicer.strokes.order import order_paths
+from slicer.strokes.path_order import order_paths
 
 NO_GOAL, ORIGIN = np.zeros((0, 3)), np.zeros(3)
 CHANGE_MM = 3.0  # of travel that a change of speed is worth

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from slicer.geometry.polyline import length_mm
-from slicer.strokes.order import AS_IT_IS, CLOSED, OPEN, order_lines
+from slicer.strokes.path_order import AS_IT_IS, CLOSED, OPEN, order_lines
 
 SQUARE = np.array([[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]], dtype=float)
 THERE_AND_BACK = np.array([[50, 0], [25, 0], [0, 0], [0, 2], [25, 2], [50, 2]], dtype=float)
