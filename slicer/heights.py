@@ -57,9 +57,6 @@ class Heights:
         return self + Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
 
 
-NO_LAYERS = Heights(np.zeros(0), np.zeros(0), np.zeros(0))
-
-
 def layer_heights(
     mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0, limb_planes_mm: Sequence[float] = ()
 ) -> Heights:
@@ -69,7 +66,7 @@ def layer_heights(
     Raises SliceError as equal_heights()."""
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
     first_mm = process.first_layer_height_mm if on_platform else interface_height_mm(process)
-    from_mm, heights = 0.0, NO_LAYERS
+    from_mm, heights = 0.0, Heights(*np.zeros((3, 0)))
     roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top_mm and roof_mm >= process.least_layer_height_mm:
         heights = equal_heights(roof_mm, process, nozzle_mm, first_mm)
@@ -91,11 +88,6 @@ def part_heights(part: Part, later: Sequence[Part], profile: Profile) -> Heights
     planes_mm = {base.offset_mm - part.base.offset_mm for base in limbs if float(base.normal @ part.base.normal) > 1.0 - LEVEL}
     pedestal_mm = profile.search.pedestal_mm if part.on_platform else 0.0
     return layer_heights(part.in_part_frame(), profile, part.on_platform, pedestal_mm, sorted(planes_mm))
-
-
-def pedestal_layers(heights: Heights, pedestal_mm: float) -> int:
-    """How many layers belong to the pedestal."""
-    return int(np.searchsorted(heights.tip_mm, pedestal_mm + 1e-6))
 
 
 def shell_layers(process: Process) -> tuple[int, int]:

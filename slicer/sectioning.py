@@ -38,7 +38,7 @@ from slicer.geometry.polygons import (
     union,
 )
 from slicer.geometry.polyline import length_mm
-from slicer.heights import Heights, part_heights, pedestal_layers
+from slicer.heights import Heights, part_heights
 from slicer.interface.interface import (
     AROUND_MM,
     Pins,
@@ -160,7 +160,7 @@ def section_part(
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.on_platform
     heights = part_heights(part, later, profile)
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    cuts_mm, pedestal = heights.cut_mm, pedestal_layers(heights, pedestal_mm)
+    cuts_mm, pedestal = heights.cut_mm, int(np.searchsorted(heights.tip_mm, pedestal_mm + 1e-6))
     whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
     outlines = [without_hairs(section, process, profile.machine.head.nozzle_mm) for section in whole]
     too_thin = frozenset(i for i, outline in enumerate(outlines) if outline.is_empty() and not whole[i].is_empty())
