@@ -126,11 +126,6 @@ class Sections:
         """Where other speeds hold, as slicer.modifiers.combined."""
         return combined(self.places, SPEEDS_OF_A_PLACE)
 
-    @property
-    def shell_layers(self) -> tuple[int, int]:
-        """Solid layers under and over a surface, where a place has most of them."""
-        return most_shell_layers(self.process, self.places)
-
     @cached_property
     def support_process(self) -> Process:
         """The settings of its support, with the width of its lines."""

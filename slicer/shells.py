@@ -46,7 +46,7 @@ from slicer.geometry.polygons import (
 )
 from slicer.geometry.polyline import length_mm
 from slicer.interface.interface import limb_planes, plane_in_frame_of
-from slicer.modifiers import LEAST_MM2, WallCounts, wall_counts
+from slicer.modifiers import LEAST_MM2, WallCounts, most_shell_layers, wall_counts
 from slicer.overhangs import Bridge, Overhang, bridges_of_layers
 from slicer.paths import Kind, bead_area_mm2
 from slicer.sectioning import Sections
@@ -105,7 +105,7 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     others there is what these need, or nothing."""
     sections = supports.sections
     process, places, processes = sections.process, sections.places, layer_processes(sections)
-    own, above, (top, bottom), count = sections.own, sections.above, sections.shell_layers, len(processes)
+    own, above, (top, bottom), count = sections.own, sections.above, most_shell_layers(process, places), len(processes)
     model = [joined(*three) for three in zip(sections.ungrooved, own, sections.beside, strict=True)]
     counts = wall_counts(own, [layer.walls for layer in processes], process.walls, places)
     # What holds a layer is planned from the top where branches do.
@@ -128,9 +128,9 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     leaning = leaning_walls(sparse, own, insides, runs, process.line_width_mm)
     filled, drawn = anchor_skins(filled, leaning, processes, fillings, sections.heights)
     shells = []
-    for k, (usual, of, (walled_by, ending, _)) in enumerate(zip(processes, counts, walled, strict=True)):
-        most = usual if of.all == [usual.walls] else usual.model_copy(update={"walls": max(of.all)})
-        shells.append(Shell(most, walled_by, ending, filled[k], leaning[k], bridges[k], ironed[k], drawn.get(k)))
+    for k, (usual, numbers, (round_, ending, _)) in enumerate(zip(processes, counts, walled, strict=True)):
+        most = usual if numbers.all == [usual.walls] else usual.model_copy(update={"walls": max(numbers.all)})
+        shells.append(Shell(most, round_, ending, filled[k], leaning[k], bridges[k], ironed[k], drawn.get(k)))
     return Shells(supports, shells, fillings)
 
 
@@ -254,10 +254,6 @@ def cut_walls(
 
 def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
     """What a layer prints of the part itself, and for it; walls that run round come as loops, without their seams."""
-    return _part_beads(shells, layer), auxiliary_beads(shells.supports, shells.layers[layer].process, layer)
-
-
-def _part_beads(shells: Shells, layer: int) -> list[Bead]:
     shell, heights = shells.layers[layer], shells.sections.heights
     process, region, height_mm = shell.process, shell.region, float(heights.height_mm[layer])
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
@@ -304,9 +300,10 @@ def _part_beads(shells: Shells, layer: int) -> list[Bead]:
         beads += gaps(around, width_mm, height_mm)
     beads += ironing_beads(shell.ironed, skins, process)
     beads = [bead for bead in beads if bead.kind is not Kind.GAP or bead.length_mm >= process.gap_least_mm]
-    if shell.infill is not None and region.sparse is shell.region.sparse:
-        return beads + shell.infill
-    return beads + filling_beads(region.sparse, shell.leaning, shells.fillings, process, heights, layer)
+    infill = shell.infill if region.sparse is shell.region.sparse else None
+    if infill is None:
+        infill = filling_beads(region.sparse, shell.leaning, shells.fillings, process, heights, layer)
+    return beads + infill, auxiliary_beads(shells.supports, process, layer)
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
