@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,20 @@ from numpy.typing import NDArray
 AT_ONCE = 4096  # lines
 BYTES_AT_ONCE = 2**20
 NEWLINE = 10
+Bytes = NDArray[np.uint8]
 Starts = NDArray[np.signedinteger[Any]]
+
+
+class Texts(NamedTuple):
+    """Pieces of text one after the other: piece k is content[start[k] : start[k + 1]], UTF-8."""
+
+    content: Bytes
+    start: Starts
+
+    @staticmethod
+    def of(pieces: Sequence[bytes]) -> "Texts":
+        """Pieces put together."""
+        return Texts(np.frombuffer(b"".join(pieces) or b" ", np.uint8), np.cumsum([0, *map(len, pieces)]))
 
 
 class Lines(Sequence[str]):
@@ -20,7 +33,7 @@ class Lines(Sequence[str]):
     bits as long as these do.
     """
 
-    def __init__(self, content: NDArray[np.uint8], start: Starts) -> None:
+    def __init__(self, content: Bytes, start: Starts) -> None:
         self.content, self.start = content, start
 
     @classmethod
@@ -107,5 +120,5 @@ def _bytes(text: str) -> bytes:
     return text.encode("utf-8", "surrogatepass")
 
 
-def _text(content: NDArray[np.uint8]) -> str:
+def _text(content: Bytes) -> str:
     return content.tobytes().decode("utf-8", "surrogatepass")

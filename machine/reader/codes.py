@@ -1,12 +1,19 @@
-"""Codes: what each G and M code does to the reader."""
+"""Codes: what each G and M code does to the reader; straight moves, arcs and turns of steppers become rows."""
 
 from collections.abc import Callable
-from math import pi
+from math import hypot, inf, pi
 
+import numpy as np
+
+from machine.gcode.arcs import arc_centre, chord_count, chords, sweep_rad
 from machine.gcode.modes import COMMANDS, E_AXIS
-from machine.reader.motion import arc, flush, follow, push, straight
+from machine.kinematics.coordinates import axis_positions, followed_places
 from machine.reader.state import Reader, Words
+from mdp.pose import Pose
 from profiles.errors import GcodeError
+
+CHORD_MM = 0.005  # arcs are read as chords that stay so near
+ROUND_MM = 0.1  # by how much an arc's radius may differ at its ends
 
 
 def dispatch(reader: Reader, name: str, words: Words) -> None:
@@ -15,70 +22,127 @@ def dispatch(reader: Reader, name: str, words: Words) -> None:
     if reader.turning:
         flush(reader)
     if name in (dialect.follow_on, dialect.follow_off):
-        reader.note(name, 0.0, "")
-        follow(reader, name == dialect.follow_on)
-        return
-    action = CODES.get(name)
-    if action is not None:
-        action(reader, name, words)
+        _follow(reader, name)
+    elif name in CODES:
+        CODES[name](reader, name, words)
     elif name in ("M2", "M30") and dialect.last:
-        reader.ended = reader.number
-    elif name == "T0" or name == "T-1" or (name[0] == "T" and not dialect.serial):
-        return
+        reader.ended = True
     elif name[0] == "T":
-        raise GcodeError(f"line {reader.number}: {name} is not supported: this machine has one tool, T0")
+        if dialect.serial and name not in ("T0", "T-1"):
+            raise GcodeError(f"{name} is not supported: this machine has one tool, T0")
     elif name == "M98":
         reader.own(name)
     elif name[0] == "G":
         raise GcodeError(
-            f"line {reader.number}: {name} is not supported: motion codes are G0 to G4, G10, G11, G28 and G92, modes G17, G20, "
+            f"{name} is not supported: motion codes are G0 to G4, G10, G11, G28 and G92, modes G17, G20, "
             f"G21, G90, G91{', G93, G94' if dialect.inverse_time else ''}{f', {dialect.follow_on}' if dialect.follow_on else ''}"
         )
     else:
         reader.ignore(name)
 
 
-def _move(reader: Reader, name: str, words: Words) -> None:
-    reader.motion = name
-    if endstop := reader.dialect.endstop_word:
-        kind = next((value for letter, value in words if letter == endstop), 0.0)
-        words = [word for word in words if word[0] != endstop]
-        if kind in (1.0, 3.0, 4.0):  # until an end stop
-            named = [letter for letter, _ in words if letter in reader.letters and letter != "E"]
-            _at_home(reader, named)
+def flush(reader: Reader) -> None:
+    """The turns of steppers that go on together become one row, as long as the slowest of them."""
+    before, minutes = reader.at.copy(), 0.0
+    for axis, value, speed_deg_s in reader.turning:
+        minutes = max(minutes, abs(value - before[axis]) / speed_deg_s / 60.0)
+        reader.at[axis] = value
+    reader.turning.clear()
+    reader.row(before, -1.0 / minutes if minutes > 0 else inf)
+
+
+def _follow(reader: Reader, name: str) -> None:
+    """From here on X Y Z are places on the table (TCP), or axis positions again; nothing moves."""
+    reader.note(name)
+    on = name == reader.dialect.follow_on
+    if on != reader.followed:
+        reader.followed = on
+        reader.switches.append(reader.rows)
+        coordinates, pose = np.array([reader.at[:5]]), Pose(reader.at[3], reader.at[4])
+        moved = followed_places(reader.machine, pose, coordinates[:, :3]) if on else axis_positions(reader.machine, coordinates)
+        reader.at[:3] = moved[0].tolist()
+
+
+def _straight(reader: Reader, name: str, words: Words) -> None:
+    """G0 and G1: a row, unless only F is given; RepRapFirmware's H1, H3 and H4 go until an end stop."""
+    reader.motion, dialect, modes = name, reader.dialect, reader.modes
+    if dialect.endstop_word and name in ("G0", "G1"):
+        if words.get(dialect.endstop_word) in (1.0, 3.0, 4.0):
+            _at_home(reader, _axes(reader, words))
             return
-    straight(reader, words, name == "G0")
+        words = {letter: value for letter, value in words.items() if letter != dialect.endstop_word}
+    before = reader.at.copy()
+    if not modes.move(reader.at, words.items()):
+        return
+    if reader.flow != 1.0 or reader.filament_mm2:  # the extruder turns by more or less; the program's own sum stays
+        step = reader.at[E_AXIS] - before[E_AXIS]
+        pushed = step * reader.flow / (reader.filament_mm2 or 1.0)
+        reader.at[E_AXIS] = before[E_AXIS] + pushed
+        modes.offset[E_AXIS] -= pushed - step
+    feed = modes.feed * reader.feed_share
+    if name == "G0" and dialect.rapid:
+        feed = inf
+    elif modes.inverse_time:
+        if "F" not in words:
+            raise GcodeError("after G93 every move needs its own F")
+        feed = -feed
+    reader.row(before, feed)
 
 
 def _arc(reader: Reader, name: str, words: Words) -> None:
-    reader.motion = name
-    arc(reader, name, words)
+    """G2 and G3 in the X Y plane, by I J or R: rows of chords, the other axes going along evenly."""
+    clockwise, before = name == "G2", reader.at.copy()
+    unit_mm, letters = reader.modes.unit_mm, reader.letters
+    shape = {letter: value * unit_mm for letter, value in words.items() if letter in "IJR" and letter not in letters}
+    known = reader.rows
+    _straight(reader, name, {letter: value for letter, value in words.items() if letter not in shape})
+    after = reader.at.copy()
+    reader.rows = known
+    start, end = (before[0], before[1]), (after[0], after[1])
+    centre = arc_centre(start, end, shape, clockwise)
+    radii = [0.0, 0.0] if centre is None else [hypot(p[0] - centre[0], p[1] - centre[1]) for p in (start, end)]
+    if centre is None or min(radii) == 0.0 or abs(radii[0] - radii[1]) > ROUND_MM:
+        raise GcodeError(f"{name} is no arc: I and J, or R, must give a centre as far from its beginning as from its end")
+    sweep = sweep_rad(start, end, centre, clockwise)
+    points = chords(start, end, centre, sweep, chord_count(max(radii), sweep, CHORD_MM))
+    reader.at[:] = before
+    feed = reader.modes.feed * reader.feed_share * (-len(points) if reader.modes.inverse_time else 1)
+    for k, point in enumerate(points, start=1):
+        row_before, share = reader.at.copy(), k / len(points)
+        others = [a + share * (b - a) for a, b in zip(before[2:], after[2:], strict=True)]
+        reader.at[:] = after if k == len(points) else [*point, *others]
+        reader.row(row_before, feed)
 
 
 def _mode(reader: Reader, name: str, words: Words) -> None:
     if name == "G93" and not reader.dialect.inverse_time:
-        raise GcodeError(f"line {reader.number}: G93 is not supported: {reader.dialect.firmware} has no inverse time feed")
+        raise GcodeError(f"G93 is not supported: {reader.dialect.firmware} has no inverse time feed")
     reader.modes.set(name)
 
 
+def _axes(reader: Reader, words: Words) -> list[str]:
+    """The letters of axes, filament left out."""
+    return [letter for letter in words if reader.letters.get(letter, E_AXIS) != E_AXIS]
+
+
 def _home(reader: Reader, name: str, words: Words) -> None:
-    """G28: the named axes, or all, stand at 0 (or the nearest place inside their limits)."""
-    named = [letter for letter, _ in words if letter in reader.letters and reader.letters[letter] != E_AXIS]
-    _at_home(reader, named or [letter for letter, axis in reader.letters.items() if axis != E_AXIS])
+    """G28: the named axes, or all."""
+    _at_home(reader, _axes(reader, words) or _axes(reader, reader.letters))
 
 
-def _at_home(reader: Reader, named: list[str]) -> None:
+def _at_home(reader: Reader, letters: list[str]) -> None:
+    """Axes stand at 0, or the nearest place inside their limits."""
     if reader.followed:
-        raise GcodeError(f"line {reader.number}: homing while the firmware follows the table: {reader.dialect.follow_off} first")
-    reader.note("G28", 0.0, "".join(named))
-    for letter in named:
+        raise GcodeError(f"homing while the firmware follows the table: {reader.dialect.follow_off} first")
+    reader.note("G28", letters="".join(letters))
+    for letter in letters:
         reader.at[reader.letters[letter]] = reader.home[reader.letters[letter]]
 
 
 def _set(reader: Reader, name: str, words: Words) -> None:
     """G92: the named axes stand at the given values from now on; E keeps its sum and changes its zero."""
     _note(reader, name, words)
-    for axis, coordinate in reader.modes.named(words):
+    for axis, coordinate in reader.modes.named(words.items()):
         if axis == E_AXIS:
             reader.modes.offset[E_AXIS] = coordinate - reader.at[E_AXIS]
         else:
@@ -87,55 +151,43 @@ def _set(reader: Reader, name: str, words: Words) -> None:
 
 def _note(reader: Reader, name: str, words: Words) -> None:
     """Put a command on record under its Marlin name, with its value."""
-    values = dict(words)
     order = ("P", "S", "R") if reader.dialect.value_word == "P" else ("S", "R")
-    value = next((values[letter] for letter in order if letter in values), 0.0)
+    value = next((words[letter] for letter in order if letter in words), 0.0)
     if name == "G4":
-        seconds = 1.0 if not reader.dialect.serial else 0.001
-        value = values.get("S", values.get("P", 0.0) * seconds)
-    elif name in ("M104", "M109"):
-        reader.nozzle_c = value
-    elif name in ("M140", "M190"):
-        reader.bed_c = value
-    reader.note(name, value, "".join(letter for letter, _ in words))
+        value = words.get("S", words.get("P", 0.0) * (0.001 if reader.dialect.serial else 1.0))
+    reader.note(name, value, "".join(words))
 
 
-def _offset(reader: Reader, name: str, words: Words) -> None:
-    """G10: pull filament back as M207 has it; with P (RepRapFirmware) a tool's temperature; with L20 (CNC) a new zero."""
-    values = dict(words)
-    if values.get("L") == 20.0:
-        _set(reader, "G92", [word for word in words if word[0] in reader.letters])
-    elif "L" in values:
-        raise GcodeError(f"line {reader.number}: G10 L{values['L']:g} is not supported: of the offsets only L20 is")
-    elif "P" in values:
-        if "S" in values:
-            _note(reader, "M104", [("S", values["S"])])
-    elif not reader.retracted:
-        reader.retracted = True
-        push(reader, -reader.retraction_mm, reader.retraction_feed)
-
-
-def _recover(reader: Reader, name: str, words: Words) -> None:
-    """G11: push what G10 has pulled."""
-    if reader.retracted:
-        reader.retracted = False
-        push(reader, reader.retraction_mm, reader.retraction_feed)
+def _retract(reader: Reader, name: str, words: Words) -> None:
+    """G10 pulls filament back as M207 has it, G11 pushes it again; with P G10 sets a tool's temperature (RepRapFirmware), with
+    L20 a new zero (CNC)."""
+    if name == "G10" and words.get("L") == 20.0:
+        _set(reader, "G92", {letter: value for letter, value in words.items() if letter in reader.letters})
+    elif name == "G10" and "L" in words:
+        raise GcodeError(f"G10 L{words['L']:g} is not supported: of the offsets only L20 is")
+    elif name == "G10" and "P" in words:
+        if "S" in words:
+            reader.note("M104", words["S"], "S")
+    elif reader.retracted == (name == "G11"):
+        reader.retracted, before = not reader.retracted, reader.at.copy()
+        pushed_mm = -reader.retraction_mm if reader.retracted else reader.retraction_mm
+        reader.at[E_AXIS] += pushed_mm
+        reader.modes.offset[E_AXIS] -= pushed_mm
+        reader.row(before, reader.retraction_feed)
 
 
 def _retraction(reader: Reader, name: str, words: Words) -> None:
     """M207: how much G10 pulls (S, mm) and how fast (F, mm/min)."""
-    values = dict(words)
     if not reader.retracted:
-        reader.retraction_mm = max(0.0, values.get("S", reader.retraction_mm))
-    if values.get("F", 0.0) > 0:
-        reader.retraction_feed = values["F"]
+        reader.retraction_mm = max(0.0, words.get("S", reader.retraction_mm))
+    if words.get("F", 0.0) > 0:
+        reader.retraction_feed = words["F"]
 
 
 def _tool_heat(reader: Reader, name: str, words: Words) -> None:
     """M568 (RepRapFirmware): S sets the tool's temperature, A0 switches its heater off."""
-    values = dict(words)
-    if "S" in values or values.get("A") == 0.0:
-        _note(reader, "M104", [("S", 0.0 if values.get("A") == 0.0 else values["S"])])
+    if "S" in words or words.get("A") == 0.0:
+        reader.note("M104", 0.0 if words.get("A") == 0.0 else words["S"], "S")
 
 
 def _wait(reader: Reader, name: str, words: Words) -> None:
@@ -147,7 +199,7 @@ def _wait(reader: Reader, name: str, words: Words) -> None:
 
 def _accelerate(reader: Reader, name: str, words: Words) -> None:
     """M204: P while filament moves, T while it stands still, S both; what is not above 0 changes nothing."""
-    for letter, value in words:
+    for letter, value in words.items():
         if value > 0 and letter in "PS":
             reader.printing = value * reader.modes.unit_mm
         if value > 0 and letter in "TS":
@@ -156,7 +208,7 @@ def _accelerate(reader: Reader, name: str, words: Words) -> None:
 
 def _override(reader: Reader, name: str, words: Words) -> None:
     """M220, M221: S percent of every feed, of all filament; what is not above 0 changes nothing."""
-    percent = dict(words).get("S", 0.0)
+    percent = words.get("S", 0.0)
     if percent > 0 and name == "M220":
         reader.feed_share = percent / 100.0
     elif percent > 0:
@@ -165,10 +217,9 @@ def _override(reader: Reader, name: str, words: Words) -> None:
 
 def _volumetric(reader: Reader, name: str, words: Words) -> None:
     """M200: with D, the filament's diameter, E words are mm3 from here on; D0 or S0: millimetres again."""
-    values = dict(words)
-    diameter = values.get("D", 0.0) * reader.modes.unit_mm
-    if diameter > 0 or "D" in values or values.get("S") == 0.0:
-        reader.filament_mm2 = pi * max(diameter, 0.0) ** 2 / 4.0 if values.get("S") != 0.0 else 0.0
+    if "D" in words or words.get("S") == 0.0:
+        diameter = words.get("D", 0.0) * reader.modes.unit_mm
+        reader.filament_mm2 = pi * max(diameter, 0.0) ** 2 / 4.0 if words.get("S") != 0.0 else 0.0
 
 
 def _nothing(reader: Reader, name: str, words: Words) -> None:
@@ -180,9 +231,8 @@ def _probe(reader: Reader, name: str, words: Words) -> None:
     reader.ignore(name)
 
 
-Action = Callable[[Reader, str, Words], None]
-ACTIONS: tuple[tuple[Action, str], ...] = (
-    (_move, "G0 G1"),
+ACTIONS: tuple[tuple[Callable[[Reader, str, Words], None], str], ...] = (
+    (_straight, "G0 G1"),
     (_arc, "G2 G3"),
     (_mode, " ".join(COMMANDS)),
     (_note, "G4 M0 M1 M226 M600 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
@@ -193,15 +243,14 @@ ACTIONS: tuple[tuple[Action, str], ...] = (
     (_volumetric, "M200"),
     (_home, "G28"),
     (_set, "G92"),
-    (_offset, "G10"),
-    (_recover, "G11"),
+    (_retract, "G10 G11"),
     (_retraction, "M207"),
     (_tool_heat, "M568"),
     (_wait, "M116"),
     (_probe, "G29 G32 G34"),
 )
+CODES = {code: action for action, codes in ACTIONS for code in codes.split()}
 # What may stand behind a command besides words with numbers: of G codes only these take letters alone, of M codes those that set
 # what the dry run counts with take none; firmwares differ in what they make of the rest.
 BARE_WORDS = frozenset({"G28", "G29", "G32", "G34"})
 VALUED = frozenset({"M82", "M83", "M104", "M109", "M140", "M190", "M200", "M204", "M207", "M220", "M221", "M568"})
-CODES: dict[str, Action] = {code: action for action, codes in ACTIONS for code in codes.split()}

@@ -1,21 +1,20 @@
 """Parse: G-code text of any dialect back into moves with absolute axis positions, one array row per move."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from machine.gcode.commands import PATHS
 from machine.gcode.line_text import FREE_TEXT, begins_layer, begun_part, command_name, read_line, to_ascii
 from machine.gcode.lines import Lines
 from machine.gcode.modes import COMMANDS
 from machine.gcode.settings import PART_TOTALS, read_totals
-from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, quote, read_words
-from machine.reader.codes import BARE_WORDS, VALUED, dispatch
+from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, Word, quote, read_words
+from machine.reader.codes import BARE_WORDS, VALUED, dispatch, flush
 from machine.reader.macros import macro
-from machine.reader.motion import flush
 from machine.reader.parsed import ParsedProgram, Unheld
 from machine.reader.plain_moves import read_plain_moves
 from machine.reader.program import program_of
-from machine.reader.state import Reader, Words, reader_of
+from machine.reader.state import Reader, reader_of
 from profiles.errors import GcodeError
 from profiles.machine import Machine
 
@@ -24,6 +23,7 @@ CONDITIONS = ("IF", "ELIF", "ELSE", "WHILE")
 SECOND = re.compile(r"[GM] *[0-9]+")  # a second command of a line
 STRING = re.compile(r'"[^"]*"')
 PLACED = (*PATHS, "G4", "G10", "G28", "G92")
+STOPS = ("M0", "M1", "M2", "M30")
 
 
 def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
@@ -38,7 +38,15 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
         after = read_plain_moves(reader, lines, at)
         if after == at:
             reader.number = after = at + 1
-            _line(reader, lines[at])
+            line = lines[at]
+            if len(line) > LONGEST_LINE and len(line.partition(";")[0]) > LONGEST_LINE:
+                raise GcodeError(
+                    f"line {after} is {len(line)} characters long: a G-code line has at most {LONGEST_LINE} before its comment"
+                )
+            try:
+                _line(reader, line)
+            except GcodeError as error:
+                raise GcodeError(f"line {after}: {error}") from None
         at = after
     if reader.turning:
         flush(reader)
@@ -46,24 +54,22 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
 
 
 def _line(reader: Reader, line: str) -> None:
-    """Any line: its comment, then its command."""
-    if len(line) > LONGEST_LINE and len(line.partition(";")[0]) > LONGEST_LINE:
-        raise GcodeError(
-            f"line {reader.number} is {len(line)} characters long: a G-code line has at most {LONGEST_LINE} before its comment"
-        )
+    """Any line: its comment, then its command, as it is sent. Raises GcodeError, which does not name the line."""
     if reader.ended:
         _remark(reader, line.partition(";")[2])
         return
-    try:
-        command, comment = read_line(line)
-    except GcodeError as error:
-        raise GcodeError(f"line {reader.number}: {error}") from None
+    text, comment = read_line(line)
     if comment:
         _remark(reader, comment)
-    if command:
-        if reader.dialect.statements:
-            _check_condition(reader, line, command)
-        _command(reader, command)
+    if not text:
+        return
+    if reader.dialect.statements:
+        _check_condition(reader, line, text)
+    code = text.upper()
+    if BLOCK.fullmatch(code):
+        _block(reader, read_words(code), text)
+    else:
+        _irregular(reader, code, text)
 
 
 def _remark(reader: Reader, text: str) -> None:
@@ -88,8 +94,7 @@ def _remark(reader: Reader, text: str) -> None:
     elif key == "HEIGHT":
         reader.height = _positive(value)
     elif key == PART_TOTALS:
-        totals = read_totals(value, reader.number, reader.part)
-        if totals is not None:
+        if totals := read_totals(value, reader.number, reader.part):
             reader.part_totals.append(totals)
     elif key == "UNSUPPORTED":
         area, _, rest = value.partition("@")
@@ -110,98 +115,76 @@ def _check_condition(reader: Reader, line: str, command: str) -> None:
     if reader.condition is not None and indent <= reader.condition:
         reader.condition = None
     if reader.condition is not None and name in (*PATHS, *COMMANDS, "G10", "G11", "G92"):
-        raise GcodeError(f"line {reader.number}: {quote(command)} depends on a condition: write moves and modes outside of it")
+        raise GcodeError(f"{quote(command)} depends on a condition: write moves and modes outside of it")
     if name in CONDITIONS and reader.condition is None:
         reader.condition = indent
 
 
-def _command(reader: Reader, text: str) -> None:
-    """One command, as it is sent."""
-    code = text.upper()
-    if BLOCK.fullmatch(code):
-        _block(reader, read_words(code), text)
-    else:
-        _irregular(reader, code, text)
+def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
+    """Letters and numbers: one command, or as CNC firmwares have it several, their words shared, the one that moves last.
 
-
-def _block(reader: Reader, words: Words, text: str) -> None:
-    """Letters and numbers: one command, or as CNC firmwares have it several, their words shared, the one that moves last."""
-    if reader.dialect.serial:
-        _one_command(reader, words, text)
+    A firmware on a serial line wants a command in front and one command in a line: Marlin and Klipper take a second one for a
+    parameter, RepRapFirmware does it.
+    """
+    named = [_name(*word) for word in words if word[0] in "GMT"]
+    others = {letter: value for letter, value in words if letter not in "GMT"}
+    goes_on = reader.motion != "" and not reader.dialect.serial and not reader.letters.keys().isdisjoint(others)
+    if not named and goes_on:
+        dispatch(reader, reader.motion, others)
         return
-    named = [_name(letter, value) for letter, value in words if letter in "GMT"]
-    others = [word for word in words if word[0] not in "GMT"]
-    if not named:
-        if reader.motion and any(letter in reader.letters for letter, _ in words):
-            dispatch(reader, reader.motion, words)
-        elif words[0][0] == "F" and words[0][1] > 0:
-            reader.modes.move(reader.at, words[:1])
-        else:
-            raise GcodeError(f"line {reader.number}: {quote(text)} begins with no command: G, M or T is expected")
+    if not named and not reader.dialect.serial and words[0][0] == "F" and words[0][1] > 0:
+        reader.modes.move(reader.at, words[:1])
         return
     if words[0][0] not in "GMT":
-        raise GcodeError(f"line {reader.number}: {quote(text)} begins with no command: G, M or T is expected")
-    if len(named) == 1:
-        dispatch(reader, named[0], words[1:])
+        raise GcodeError(f"{quote(text)} begins with no command: G, M or T is expected")
+    if reader.dialect.serial and (second := next((_name(*word) for word in words[1:] if word[0] in "GM"), None)):
+        raise GcodeError(f"{quote(text)} holds two commands, {named[0]} and {second}: write one a line")
+    if len(named) == 1 or reader.dialect.serial:
+        dispatch(reader, named[0], dict(words[1:]))
         return
     placed = [name for name in named if name in PLACED]
     if len(placed) > 1:
-        raise GcodeError(f"line {reader.number}: {quote(text)} holds two motions, {placed[0]} and {placed[1]}")
-    for name in [name for name in named if name not in (*placed, "M0", "M1", "M2", "M30")]:
-        dispatch(reader, name, [] if name[0] == "G" else others)
-    if placed:
-        dispatch(reader, placed[0], others)
-    elif reader.motion and any(letter in reader.letters for letter, _ in others):
-        dispatch(reader, reader.motion, others)
-    for name in [name for name in named if name in ("M0", "M1", "M2", "M30")]:
-        dispatch(reader, name, [])
-
-
-def _one_command(reader: Reader, words: Words, text: str) -> None:
-    """Letters and numbers for a firmware on a serial line, which wants a command in front and one command in a line: Marlin and
-    Klipper take a second one for a parameter, RepRapFirmware does it."""
-    (letter, value), *others = words
-    if letter not in "GMT":
-        raise GcodeError(f"line {reader.number}: {quote(text)} begins with no command: G, M or T is expected")
-    second = next((_name(*word) for word in others if word[0] in "GM"), None)
-    if second is not None:
-        raise GcodeError(
-            f"line {reader.number}: {quote(text)} holds two commands, {_name(letter, value)} and {second}: write one a line"
-        )
-    dispatch(reader, _name(letter, value), others)
+        raise GcodeError(f"{quote(text)} holds two motions, {placed[0]} and {placed[1]}")
+    for name in [name for name in named if name not in (*placed, *STOPS)]:
+        dispatch(reader, name, {} if name[0] == "G" else others)
+    if placed or goes_on:
+        dispatch(reader, placed[0] if placed else reader.motion, others)
+    for name in [name for name in named if name in STOPS]:
+        dispatch(reader, name, {})
 
 
 def _irregular(reader: Reader, code: str, text: str) -> None:
     """Commands whose words are not all letter and number: axis names alone, texts, macros."""
+    dialect = reader.dialect
     if to_ascii(text) != text:
         reader.replaced.append((reader.number, text))
     head = re.match(r"([GM]) *([0-9]{1,6}(?:\.[0-9]{1,6})?)(?![0-9])", code)
     if head and (head[1] == "M" or FLAGS.fullmatch(code)):
         name, rest = _name(head[1], float(head[2])), code[head.end() :]
         if head[1] == "G" and name not in BARE_WORDS:
-            raise GcodeError(f"line {reader.number}: {quote(text)} has a word without a number")
+            raise GcodeError(f"{quote(text)} has a word without a number")
         if name in VALUED:
-            raise GcodeError(f"line {reader.number}: {quote(text)}: behind {name} only letters with a number are allowed")
-        if reader.dialect.serial and name not in FREE_TEXT:
-            _check_alone(reader, name, rest, text)
-        words = [(letter, float(value or 0.0)) for letter, value in FLAG.findall(rest)] if FLAGS.fullmatch(code) else []
-        dispatch(reader, name, words)
+            raise GcodeError(f"{quote(text)}: behind {name} only letters with a number are allowed")
+        if dialect.serial and name not in FREE_TEXT:
+            _check_alone(name, rest, text)
+        words = FLAG.findall(rest) if FLAGS.fullmatch(code) else []
+        dispatch(reader, name, {letter: float(value or 0.0) for letter, value in words})
     elif MACRO.fullmatch(code) and text.isprintable():
         name, _, rest = code.partition(" ")
-        if reader.dialect.serial and not reader.dialect.macros and name not in reader.dialect.statements:
-            _check_alone(reader, name, rest, text)
-        if not macro(reader, code):
+        if dialect.serial and not dialect.macros and name not in dialect.statements:
+            _check_alone(name, rest, text)
+        if not dialect.macros or not macro(reader, code):
             reader.own(name)
     elif re.match(r"O *[0-9<]|#|IF *\[|WHILE *\[", code):
-        raise GcodeError(f"line {reader.number}: {quote(text)}: parameters and O words are not supported, only plain G-code is")
+        raise GcodeError(f"{quote(text)}: parameters and O words are not supported, only plain G-code is")
     else:
-        raise GcodeError(f"line {reader.number}: {quote(text)} cannot be read as G-code")
+        raise GcodeError(f"{quote(text)} cannot be read as G-code")
 
 
-def _check_alone(reader: Reader, name: str, rest: str, text: str) -> None:
+def _check_alone(name: str, rest: str, text: str) -> None:
     """Refuse a second command behind the words and texts of a first one, which RepRapFirmware would do."""
     if second := SECOND.search(STRING.sub("", rest)):
-        raise GcodeError(f"line {reader.number}: {quote(text)} holds two commands, {name} and {second[0]}: write one a line")
+        raise GcodeError(f"{quote(text)} holds two commands, {name} and {second[0]}: write one a line")
 
 
 def _name(letter: str, value: float) -> str:

@@ -12,13 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.gcode.lines import Lines, Starts
+from machine.gcode.lines import Bytes, Lines, Texts
 from machine.gcode.modes import E_AXIS
 from machine.reader.state import REMARK_COLUMNS, Columns, Reader
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
-
-Bytes = NDArray[np.uint8]
 
 LONGEST = 200
 MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
@@ -30,20 +28,9 @@ FIRST = (b"G0", b"G1", b";", b"\n")  # of lines that may be plain
 PART, LAYER, TYPE, WIDTH, HEIGHT, LAYERS, STATE = range(7, 14)
 
 
-class Text(NamedTuple):
-    """Lines as bytes; line k is text[start[k]:start[k + 1]], with its end."""
-
-    text: Bytes
-    start: Starts
-
-
-def _text_of(*words: bytes) -> Text:
-    return Text(np.frombuffer(b"".join(words) or b" ", dtype=np.uint8), np.cumsum([0, *map(len, words)]))
-
-
 # What begins a comment that says something; the others say nothing. SINGLE stands alone.
 WIDTH_IS, HEIGHT_IS, TYPE_IS, SINGLE = range(4)
-WORDS = _text_of(b"WIDTH:", b"HEIGHT:", b"TYPE:", b"LAYER_CHANGE", b"LAYER:", b"PART:", b"CONTENTS:", b"UNSUPPORTED:")
+WORDS = Texts.of([b"WIDTH:", b"HEIGHT:", b"TYPE:", b"LAYER_CHANGE", b"LAYER:", b"PART:", b"CONTENTS:", b"UNSUPPORTED:"])
 
 
 class Meaning(NamedTuple):
@@ -53,8 +40,8 @@ class Meaning(NamedTuple):
     """
 
     letters: NDArray[np.int8]
-    words: Text
-    types: Text
+    words: Texts
+    types: Texts
     units: Floats
     steps: NDArray[np.bool_]
     offset: Floats
@@ -68,7 +55,7 @@ def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
 
     Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row.
     """
-    modes, table = reader.modes, reader.table
+    modes = reader.modes
     begin = lines.content[lines.start[first] : lines.start[first] + 2].tobytes()
     if begin not in FIRST and begin[:1] not in FIRST:  # nothing need be got ready
         return first
@@ -79,19 +66,19 @@ def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
     for letter, axis in (*reader.letters.items(), ("F", F)):
         letters[ord(letter)] = axis
     meaning = Meaning(
-        letters, WORDS, _text_of(*kinds), np.array(modes.units), np.array(modes.steps), np.array(modes.offset),
+        letters, WORDS, Texts.of(kinds), np.array(modes.units), np.array(modes.steps), np.array(modes.offset),
         reader.feed_share, bool(reader.dialect.rapid), np.array([reader.printing, reader.travelling]),
     )  # fmt: skip
     remark = (reader.part, reader.layer, reader.type, reader.width, reader.height)
     state, at = np.array([*reader.at, modes.feed, *remark, reader.layers]), first
     while True:
-        table.begin(state.tolist(), len(lines) - at)
-        counts = np.array([at, table.rows, table.remarks, -1])
-        _read_run(Text(lines.content, lines.start), meaning, table.columns, state, counts)
-        begun, at, table.rows, table.remarks, move = at, *(int(count) for count in counts)
+        reader.make_room(state.tolist(), len(lines) - at)
+        counts = np.array([at, reader.rows, reader.remarks, -1])
+        _read_run(Texts(lines.content, lines.start), meaning, reader.columns, state, counts)
+        begun, at, reader.rows, reader.remarks, move = at, *(int(count) for count in counts)
         if move >= 0:
             reader.motion = lines[move][:2]
-        if at == begun or table.remarks < len(table.columns.remark_rows):
+        if at == begun or reader.remarks < len(reader.columns.remark_rows):
             break
     if at > first:
         reader.number, reader.at[:], modes.feed = at, state[:F].tolist(), float(state[F])
@@ -101,20 +88,20 @@ def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
 
 
 @kernel
-def _read_run(text: Text, meaning: Meaning, columns: Columns, state: Floats, counts: NDArray[np.int64]) -> None:
+def _read_run(lines: Texts, meaning: Meaning, columns: Columns, state: Floats, counts: NDArray[np.int64]) -> None:
     """counts: the line after the run, rows, remarks, and the line of the last move; they are updated, as is the state."""
-    words = np.empty((32, 2))
+    text, words = lines.content, np.empty((32, 2))
     line, row, remarks = counts[0], counts[1], counts[2]
-    while line < len(text.start) - 1 and remarks < len(columns.remark_rows):
-        begin, end = text.start[line], text.start[line + 1]
-        while end > begin and _is_blank(text.text[end - 1]):
+    while line < len(lines.start) - 1 and remarks < len(columns.remark_rows):
+        begin, end = lines.start[line], lines.start[line + 1]
+        while end > begin and _is_blank(text[end - 1]):
             end -= 1
-        if end == begin or text.text[begin] == 59:
-            if end > begin and not _read_remark(text.text, begin + 1, end, meaning, state):
+        if end == begin or text[begin] == 59:
+            if end > begin and not _read_remark(text, begin + 1, end, meaning, state):
                 break
             line += 1
             continue
-        count = _read_words(text.text, begin, end, meaning.letters, words)
+        count = _read_words(text, begin, end, meaning.letters, words)
         if count < 0:
             break
         if len(columns.starts):
@@ -137,7 +124,7 @@ def _read_run(text: Text, meaning: Meaning, columns: Columns, state: Floats, cou
         for k in range(E_AXIS):
             columns.places[row + 1, k] = state[k]
         columns.e_mm[row] = state[E_AXIS] - filament_mm
-        columns.feed[row] = inf if meaning.rapid and text.text[begin + 1] == 48 else state[F] * meaning.feed_share
+        columns.feed[row] = inf if meaning.rapid and text[begin + 1] == 48 else state[F] * meaning.feed_share
         remarks = _remark(state, meaning.accelerations[0 if state[E_AXIS] != filament_mm else 1], columns.remark_rows, remarks)
         columns.remark[row] = remarks - 1
         row += 1
@@ -174,15 +161,16 @@ def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Flo
     if text[begin] < 32 or text[begin] > 126 or text[end - 1] < 32 or text[end - 1] > 126:  # it may be a blank of another kind
         return False
     for k in range(len(meaning.words.start) - 1):
-        word = meaning.words.text[meaning.words.start[k] : meaning.words.start[k + 1]]
+        word = meaning.words.content[meaning.words.start[k] : meaning.words.start[k + 1]]
         if not _begins(text, begin, end, word):
             continue
         begin += len(word)
         if k in (WIDTH_IS, HEIGHT_IS):
-            value = _read_size(text, begin, end)
-            if value >= 0.0:
-                state[WIDTH + k] = value
-            return value >= 0.0
+            after, value, digits, decimals = _read_number(text, begin, end)
+            if after < end or not 0 < digits <= WHOLE_DIGITS or decimals == 0 or decimals > DECIMALS:
+                return False
+            state[WIDTH + k] = value
+            return True
         if k == SINGLE and begin == end:
             state[LAYER] += 1.0
             state[LAYERS] += 1.0
@@ -190,7 +178,7 @@ def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Flo
         if k != TYPE_IS:
             return k == SINGLE
         for kind in range(len(meaning.types.start) - 1):
-            known = meaning.types.text[meaning.types.start[kind] : meaning.types.start[kind + 1]]
+            known = meaning.types.content[meaning.types.start[kind] : meaning.types.start[kind + 1]]
             if end - begin == len(known) and _begins(text, begin, end, known):
                 state[TYPE] = kind
                 return True
@@ -199,29 +187,24 @@ def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Flo
 
 
 @no_nrt
-def _read_size(text: Bytes, begin: int, end: int) -> float:
-    """The number of a comment; below 0: it is not read here."""
-    whole, digits, behind = 0, 0, -1
-    for at in range(begin, end):
-        if text[at] == 46 and behind < 0 and digits > 0:
-            behind = 0
+def _read_number(text: Bytes, at: int, end: int) -> tuple[int, float, int, int]:
+    """Where a number without sign ends, at a blank or the end; its value, digits before its point and after it, -1 without one.
+
+    An end of -1: it is none, or has more digits than are read exactly."""
+    whole, digits, decimals = 0, 0, -1
+    while at < end and text[at] != 32:
+        if text[at] == 46 and decimals < 0:
+            decimals = 0
         elif 48 <= text[at] <= 57 and digits < MOST_DIGITS:
             whole, digits = 10 * whole + (text[at] - 48), digits + 1
-            behind += behind >= 0
+            decimals += decimals >= 0
         else:
-            return -1.0
-    decimals = max(behind, 0)
-    if digits == 0 or behind == 0 or digits - decimals > WHOLE_DIGITS or decimals > DECIMALS:
-        return -1.0
-    return whole / _power_of_ten(decimals)
-
-
-@no_nrt
-def _power_of_ten(exponent: int) -> float:
+            return -1, 0.0, 0, 0
+        at += 1
     power = 1.0
-    for _ in range(exponent):
+    for _ in range(decimals):
         power *= 10.0
-    return power
+    return at if digits > 0 else -1, whole / power, digits - max(decimals, 0), decimals
 
 
 @no_nrt
@@ -247,22 +230,9 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
         negative = text[at] == 45
         if negative or text[at] == 43:
             at += 1
-        whole, digits, behind, dotted = 0, 0, 0, False
-        while at < end and text[at] != 32:
-            if text[at] == 46 and not dotted:
-                dotted = True
-            elif 48 <= text[at] <= 57:
-                whole = 10 * whole + (text[at] - 48)
-                digits += 1
-                behind += dotted
-            else:
-                return -1
-            at += 1
-            if digits > MOST_DIGITS:
-                return -1
-        if axis == NONE or digits == 0 or digits - behind > 12:
+        at, value, digits, _ = _read_number(text, at, end)
+        if at < 0 or axis == NONE or digits > 12:
             return -1
-        value = whole / _power_of_ten(behind)
         if (axis == F and (negative or value <= 0.0)) or named >> axis & 1:  # firmwares do not agree on a word given twice
             return -1
         named |= 1 << axis

@@ -19,8 +19,8 @@ TRAVEL, EXTRUDE, RETRACT, ROTATE = (int(kind) for kind in MoveKind)
 
 def program_of(reader: Reader) -> ParsedProgram:
     """All that a reader has read."""
-    columns, count = reader.table.columns, reader.table.rows
-    begins, remark = columns.starts if len(columns.starts) else columns.places, columns.remark_rows[: reader.table.remarks].T
+    columns, count = reader.columns, reader.rows
+    begins, remark = columns.starts if len(columns.starts) else columns.places, columns.remark_rows[: reader.remarks].T
     program = ParsedProgram(
         line=columns.line[:count], start=begins[:count], end=columns.places[1 : count + 1], e_mm=columns.e_mm[:count],
         feed=columns.feed[:count], kind=np.empty(count, np.int8), remark=columns.remark[:count],

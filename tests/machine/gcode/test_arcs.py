@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from machine.dryrun import dry_run
 from machine.gcode.arcs import arc_box, centre_of, chord_count, chords, sweep_rad
 from machine.gcode.writer import write_gcode
-from machine.reader.motion import CHORD_MM
+from machine.reader.codes import CHORD_MM
 from machine.reader.parse import parse_gcode
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
