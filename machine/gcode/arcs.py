@@ -30,9 +30,12 @@ def sweep_rad(start: Point, end: Point, centre: Point, clockwise: bool) -> float
     return angle if angle > 0.0 else 2.0 * pi
 
 
-def centre_of(start: Point, end: Point, radius: float, clockwise: bool) -> Point | None:
-    """Centre of the arc of that radius (R word), the wider one where the radius is below 0; None: the ends are too far apart."""
-    dx, dy = end[0] - start[0], end[1] - start[1]
+def arc_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: bool) -> Point | None:
+    """Centre by the words I J or R of an arc, mm; None where they give none, or the ends are too far apart for R. An R below 0
+    takes the wider arc."""
+    if "R" not in shape:
+        return (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None
+    radius, dx, dy = shape["R"], end[0] - start[0], end[1] - start[1]
     half = 0.5 * hypot(dx, dy)
     if half == 0.0 or abs(radius) < half * (1.0 - 1e-6):
         return None
@@ -40,13 +43,6 @@ def centre_of(start: Point, end: Point, radius: float, clockwise: bool) -> Point
     if clockwise != (radius < 0.0):
         aside = -aside
     return 0.5 * (start[0] + end[0]) - aside * dy, 0.5 * (start[1] + end[1]) + aside * dx
-
-
-def arc_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: bool) -> Point | None:
-    """Centre by the words R or I J of an arc, mm; None where they give none."""
-    if "R" in shape:
-        return centre_of(start, end, shape["R"], clockwise)
-    return (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None
 
 
 def arc_box(start: Point, end: Point, centre: Point, clockwise: bool) -> tuple[Point, Point]:

@@ -3,6 +3,7 @@
 Positions are those of the program (what M114 tells), rotary axes unwrapped; None where the sender cannot know them.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
@@ -41,25 +42,41 @@ class ModalState:
 
     def take(self, command: str) -> bool:
         """Take note of a command; True when it moves an axis or filament."""
-        text = command.upper()
+        text, axes = command.upper(), self.axes
         self.pushed_mm = 0.0
         if text[:3] == "G1 ":  # nearly every line
             return self._move(text[2:])
         name, rest = split_command(text)
         if name in PATHS:
             return self._move(rest)
-        action = ACTIONS.get(name)
-        if action is not None:
-            return action(self, name, rest)
-        if name and name in (self.axes.follow_on, self.axes.follow_off):
+        if name == "G28" or name.startswith("HOME_"):
+            named = set(name[5:] if name != "G28" else read_letters(rest)) & set(axes.letters[:E_AXIS])
+            for letter in named or (axes.letters[:E_AXIS] if name == "G28" else ()):
+                self.at[axes.letters.index(letter)] = None
+            return True
+        if name == "MANUAL_STEPPER":
+            return self._turn(read_values(rest))
+        words, heats = read_words(rest), EVERY[name].heats if name in EVERY else ""
+        if name in COMMANDS:
+            self.modes.set(name)
+        elif name == "G92":
+            for axis, coordinate in self.modes.named(words):
+                self.at[axis] = coordinate
+        elif heats in ("nozzle", "bed"):
+            values = dict(words)
+            self._heat(heats, values.get("S", values.get("R")))
+        elif name == "SET_HEATER_TEMPERATURE":
+            heater, target = (read_values(rest).get(key, "") for key in ("HEATER", "TARGET"))
+            self._heat({"EXTRUDER": "nozzle", "HEATER_BED": "bed"}.get(heater, ""), read_number(target) or 0.0)
+        elif name == "TURN_OFF_HEATERS":
+            self.nozzle_c = self.bed_c = 0.0
+        elif name in ("M106", "M107"):
+            self.fans[f"{dict(words).get('P', 0.0):g}"] = f"{name} {rest.strip()}".strip()
+        elif name and name in (axes.follow_on, axes.follow_off):
             self.settings["follow"] = name
             return True
-        if command_named(name).modal:
-            self.settings[name + "".join(sorted(letter for letter, _ in read_words(rest)))] = command
-        elif name.startswith("HOME_"):
-            for letter in name[5:]:
-                self._forget(letter)
-            return True
+        elif command_named(name).modal:
+            self.settings[name + "".join(sorted(letter for letter, _ in words))] = command
         return False
 
     def lines(self) -> list[str]:
@@ -94,41 +111,8 @@ class ModalState:
         pushed = [value * self.modes.unit_mm for letter, value in words if self.axes.words.get(letter) == E_AXIS]
         return sum(pushed) if self.modes.steps[E_AXIS] or not pushed else inf
 
-    def _forget(self, letter: str) -> None:
-        if letter in self.axes.letters[:E_AXIS]:
-            self.at[self.axes.letters.index(letter)] = None
-
-    def _mode(self, name: str, rest: str) -> bool:
-        self.modes.set(name)
-        return False
-
-    def _home(self, name: str, rest: str) -> bool:
-        named = [letter for letter in read_letters(rest) if letter in self.axes.letters[:E_AXIS]]
-        for letter in named or self.axes.letters[:E_AXIS]:
-            self._forget(letter)
-        return True
-
-    def _call_it(self, name: str, rest: str) -> bool:
-        for axis, coordinate in self.modes.named(read_words(rest)):
-            self.at[axis] = coordinate
-        return False
-
-    def _heat(self, name: str, rest: str) -> bool:
-        words = dict(read_words(rest))
-        target = words.get("S", words.get("R"))
-        if target is not None and EVERY[name].heats == "bed":
-            self.bed_c = target
-        elif target is not None:
-            self.nozzle_c = target
-        return False
-
-    def _blow(self, name: str, rest: str) -> bool:
-        fan = dict(read_words(rest)).get("P", 0.0)
-        self.fans[f"{fan:g}"] = f"{name} {rest.strip()}".strip()
-        return False
-
-    def _stepper(self, name: str, rest: str) -> bool:
-        values = read_values(rest)
+    def _turn(self, values: Mapping[str, str]) -> bool:
+        """A MANUAL_STEPPER."""
         if values.get("STEPPER") not in self.axes.steppers:
             return False
         axis = 3 + self.axes.steppers.index(values["STEPPER"])
@@ -140,29 +124,8 @@ class ModalState:
             self.at[axis] = None
         return "MOVE" in values
 
-    def _heater(self, name: str, rest: str) -> bool:
-        values = read_values(rest)
-        target = read_number(values.get("TARGET", "")) or 0.0
-        if values.get("HEATER") == "EXTRUDER":
-            self.nozzle_c = target
-        elif values.get("HEATER") == "HEATER_BED":
-            self.bed_c = target
-        return False
-
-    def _off(self, name: str, rest: str) -> bool:
-        self.nozzle_c = self.bed_c = 0.0
-        return False
-
-
-ACTIONS = (
-    dict.fromkeys(COMMANDS, ModalState._mode)
-    | {name: ModalState._heat for name, command in EVERY.items() if command.heats in ("nozzle", "bed")}
-    | dict.fromkeys(("M106", "M107"), ModalState._blow)
-    | {
-        "G28": ModalState._home,
-        "G92": ModalState._call_it,
-        "MANUAL_STEPPER": ModalState._stepper,
-        "SET_HEATER_TEMPERATURE": ModalState._heater,
-        "TURN_OFF_HEATERS": ModalState._off,
-    }
-)
+    def _heat(self, heater: str, target_c: float | None) -> None:
+        if heater == "nozzle" and target_c is not None:
+            self.nozzle_c = target_c
+        elif heater == "bed" and target_c is not None:
+            self.bed_c = target_c

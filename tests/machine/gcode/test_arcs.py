@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
-from machine.gcode.arcs import arc_box, centre_of, chord_count, chords, sweep_rad
+from machine.gcode.arcs import arc_box, arc_centre, chord_count, chords, sweep_rad
 from machine.gcode.writer import write_gcode
 from machine.reader.codes import CHORD_MM
 from machine.reader.parse import parse_gcode
@@ -119,7 +119,7 @@ def test_the_centre_by_radius_is_as_far_from_both_ends_and_gives_the_shorter_way
     x: float, y: float, factor: float, clockwise: bool
 ) -> None:
     apart = float(np.hypot(x, y))
-    centre = centre_of((0.0, 0.0), (x, y), 0.5 * factor * apart, clockwise)
+    centre = arc_centre((0.0, 0.0), (x, y), {"R": 0.5 * factor * apart}, clockwise)
     if apart > 1e-3:
         assert centre is not None
         assert np.hypot(*centre) == pytest.approx(0.5 * factor * apart, rel=1e-6)
