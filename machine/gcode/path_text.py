@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.gcode.lines import Bytes, Texts
 from machine.planning.moves import RICHER
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from slicer.strokes.travels import distance
 
-Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int64]
 
 LONGEST = 128  # characters of a line: five words of 20 digits at most with sign and point, and the command
@@ -35,13 +35,6 @@ class Paths(NamedTuple):
     most_mm_s: Floats
 
 
-class Texts(NamedTuple):
-    """Lines between paths: content; starts: (m + 2,) where the text before each path begins, and that after the last one."""
-
-    content: Bytes
-    starts: Indices
-
-
 class PathWords(NamedTuple):
     """The commands of strokes and travels, the letter of filament, and whether its word is a step."""
 
@@ -51,14 +44,10 @@ class PathWords(NamedTuple):
     relative: bool
 
 
-def as_bytes(text: str) -> Bytes:
-    """Text for the kernel."""
-    return np.frombuffer(text.encode("utf-8"), dtype=np.uint8)
-
-
 def path_text(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_mm: Floats) -> str:
     """The lines of paths, with their ends: the coordinates that change, then filament, then the F that changes.
 
+    texts: m + 1 of lines between paths, one before each and one behind the last.
     known: (5,) X Y Z in thousandths of a mm, filament in 1e-5 mm and F in units/min that the firmware knows; filament_mm: (1,)
     pushed so far, not rounded. Both become those after the last line. A point where the tip is already gives no line, its
     filament goes to the next one.
@@ -74,7 +63,7 @@ def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_
     """Fills in the text and returns its length."""
     at = 0
     for path in range(len(paths.starts) - 1):
-        at = _copy(texts.content, texts.starts[path], texts.starts[path + 1], text, at)
+        at = _copy(texts.content, texts.start[path], texts.start[path + 1], text, at)
         first, end = paths.starts[path], paths.starts[path + 1]
         if paths.does[path] == STANDING:
             filament_mm[0] += paths.filament_mm[first]
@@ -108,7 +97,7 @@ def _write(paths: Paths, texts: Texts, words: PathWords, known: Whole, filament_
                 at, written = _feed(paths.speed[path] / slower, known, text, at), True
             text[at] = LINE_END
             at += 1
-    return _copy(texts.content, texts.starts[len(paths.starts) - 1], texts.starts[len(paths.starts)], text, at)
+    return _copy(texts.content, texts.start[len(paths.starts) - 1], texts.start[len(paths.starts)], text, at)
 
 
 @helper

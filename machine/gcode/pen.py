@@ -8,13 +8,15 @@ from math import ceil, hypot
 import numpy as np
 
 from machine.firmware import Dialect
-from machine.gcode.path_text import PUSHED, F, Paths, PathWords, Texts, Whole, X, as_bytes, path_text
+from machine.gcode.lines import Texts
+from machine.gcode.path_text import PUSHED, F, Paths, PathWords, Whole, X, path_text
 from machine.kinematics.coordinates import axis_positions, followed_places
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.machine import Machine
 
 UNKNOWN = -(10**12)
+STROKE = np.frombuffer(b"G1", np.uint8)
 STEP_DEG = 1.0  # a followed turn goes in steps: between them the tip leaves its place by a thousandth of its distance to the axes
 
 
@@ -54,9 +56,8 @@ class Pen:
 
     def paths(self, paths: Paths, texts: Texts) -> str:
         """The lines of many moves."""
-        words = PathWords(
-            as_bytes("G1"), as_bytes(self.dialect.travel), ord(self.filament_letter), self.dialect.filament_relative
-        )
+        travel, letter = np.frombuffer(self.dialect.travel.encode(), np.uint8), ord(self.filament_letter)
+        words = PathWords(STROKE, travel, letter, self.dialect.filament_relative)
         return path_text(paths, texts, words, self.known, self.pushed_mm)
 
     def filament(self, pushed_mm: float) -> str:

@@ -4,22 +4,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from math import ceil, isinf, isnan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
 from machine.gcode.blocks import BEFORE_LAYER, check_blocks, fill_block, placeholders
-from machine.gcode.lines import Lines
-from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, Texts, Z, as_bytes
+from machine.gcode.lines import Lines, Texts
+from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, Z
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, turn
 from machine.gcode.settings import totals_comment
 from machine.gcode.words import PAUSE_REMARK
 from machine.planning.limits import stroke_filament_mm_s, wipe_filament_mm_s
 from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, straight_moves
-from mdp.mesh import Floats, Indices
+from mdp.mesh import Floats
 from mdp.pose import level
-from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.estimate.timing import move_times
 from slicer.paths import KINDS, NUMBER, Kind
@@ -40,10 +38,11 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Lines:
     letter = next(word for word in dialect.filament if word not in (machine.tilt.letter, machine.turn.letter))
     pen = Pen(dialect, machine, letter, level(machine))
     elapsed, filament_mm = elapsed_s(program, profile)
-    pen.values = placeholders(program.name, profile, _parts(program), float(elapsed[-1]), filament_mm)
+    parts = [mark for mark in program.marks if isinstance(mark, BeginPart)]
+    pen.values = placeholders(program.name, profile, parts, float(elapsed[-1]), filament_mm)
     for name in BLOCKS:
         _block(name, pen)
-    return Lines.of_text(_text(program, profile, elapsed, filament_mm, pen))
+    return Lines.of_text(_text(program, parts, profile, elapsed, filament_mm, pen))
 
 
 def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
@@ -57,7 +56,7 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
     times = move_times(end - start, program.speed[move], stop, machine, program.acceleration_mm_s2[move])
     seconds = np.bincount(move, weights=times, minlength=len(program))
     heat_c = profile.material.first_layer_nozzle_c
-    for k, (row, mark) in enumerate(zip(program.mark_rows.tolist(), program.marks, strict=True)):
+    for k, (row, mark) in enumerate(program.marked()):
         if isinstance(mark, Reorient):
             seconds[row] += machine.heating_s(_coming_c(program.marks[k:], profile) - heat_c, float(seconds[row]))
         elif isinstance(mark, BeginLayer):
@@ -66,59 +65,44 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
     return elapsed, float(end[:, 5].max(initial=0.0))
 
 
-def _text(program: MachineProgram, profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen) -> Iterator[str]:
+def _text(
+    program: MachineProgram, parts: Sequence[BeginPart], profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen
+) -> Iterator[str]:
     """The text in pieces, each of whole lines: the moves between two marks, which are most of it, as a kernel writes them."""
-    total, parts = float(elapsed[-1]), _parts(program)
-    coming = iter(parts)
-    next_part = next(coming, None)
-    last_strokes = _last_strokes(program)
+    total = float(elapsed[-1])
+    part_rows = [*(row for row, mark in program.marked() if isinstance(mark, BeginPart)), len(program)]
+    strokes = np.flatnonzero(program.is_stroke & (program.what != NUMBER[Kind.PURGE]))  # the purge line belongs to no part
+    before = np.searchsorted(strokes, part_rows)
+    last_strokes = set(strokes[before[before > 0] - 1].tolist())
     top_mm = {mark.part: mark.z_mm for mark in program.marks if isinstance(mark, BeginLayer)}
-    yield from _ended(settings.head(program.name, profile))
-    yield from _ended(_start(profile, parts, pen))
+    yield _ended((*settings.head(program.name, profile), *_start(profile, parts, pen)))
     done = 0
-    for k, (row, mark) in enumerate(zip(program.mark_rows.tolist(), program.marks, strict=True)):
+    for k, (row, mark) in enumerate(program.marked()):
         yield from _moves(program, done, row, last_strokes, profile, pen)
         done = row + 1
         if isinstance(mark, Reorient):
             # the heat of the layer after the turn where that is to be hotter: some of it comes in the meantime
-            ahead = list(_set_nozzle(max(_coming_c(program.marks[k:], profile), pen.nozzle_c), pen))
-            yield from _ended((*ahead, *_reorient(mark, next_part, pen)))
-            if ahead:
-                yield f"{pen.dialect.nozzle_wait.format(number(pen.nozzle_c))}\n"
-        elif isinstance(mark, Pause):
-            yield from _ended(_pause(mark, pen))
+            ahead = _set_nozzle(max(_coming_c(program.marks[k:], profile), pen.nozzle_c), pen)
+            wait = [pen.dialect.nozzle_wait.format(number(pen.nozzle_c))] if ahead else []
+            yield _ended((*ahead, *_reorient(mark, parts[pen.part] if pen.part < len(parts) else None, pen), *wait))
+        elif isinstance(mark, Pause):  # the firmware's own word; a sender that pauses by itself goes by the remark
+            word, reason = (pen.dialect.filament_change, "filament change") if mark.change else (pen.dialect.pause, "pause")
+            yield f"{word} {PAUSE_REMARK}{reason} before layer {mark.layer} of part {mark.part}\n"
         elif isinstance(mark, BeginPart):
-            next_part = next(coming, None)
-            yield from _ended((*_begin_part(mark, len(parts), pen), *_contents(program, row)))
+            contents = _contents(program, row, part_rows[pen.part + 1])
+            yield _ended((*_begin_part(mark, len(parts), pen), *([contents] if contents else [])))
         else:
-            yield from _ended((*_begin_layer(mark, profile, pen), *_progress(float(elapsed[row]), total, pen)))
+            yield _ended((*_begin_layer(mark, profile, pen), *_progress(float(elapsed[row]), total, pen)))
             heights = {"layer_z": float(mark.z_mm), "max_layer_z": float(top_mm[mark.part])}
-            yield from _ended(_block(BEFORE_LAYER, pen, layer_num=pen.layers - 1, **heights))
+            yield _ended(_block(BEFORE_LAYER, pen, layer_num=pen.layers - 1, **heights))
     yield from _moves(program, done, len(program), last_strokes, profile, pen)
-    yield from _ended((*_end(pen), *_progress(total, total, pen), *_dialect_line(pen.dialect.last, pen)))
-    yield from _ended(settings.foot(profile, filament_mm, total))
+    yield _ended((*_end(pen), *_progress(total, total, pen), *_dialect_line(pen.dialect.last, pen)))
+    yield _ended(settings.foot(profile, filament_mm, total))
 
 
-def _ended(lines: Iterable[str]) -> Iterator[str]:
+def _ended(lines: Iterable[str]) -> str:
     """Lines with their ends."""
-    return (f"{line}\n" for line in lines)
-
-
-def _parts(program: MachineProgram) -> list[BeginPart]:
-    return [mark for mark in program.marks if isinstance(mark, BeginPart)]
-
-
-def _part_rows(program: MachineProgram) -> list[int]:
-    """Where parts begin, and the end of the last one."""
-    marks = zip(program.mark_rows.tolist(), program.marks, strict=True)
-    return [*(row for row, mark in marks if isinstance(mark, BeginPart)), len(program)]
-
-
-def _last_strokes(program: MachineProgram) -> set[int]:
-    """Rows of the last stroke of each part; the purge line belongs to none."""
-    strokes = np.flatnonzero(program.is_stroke & (program.what != NUMBER[Kind.PURGE]))
-    before = np.searchsorted(strokes, _part_rows(program))
-    return set(strokes[before[before > 0] - 1].tolist())
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _block(name: str, pen: Pen, **values: object) -> list[str]:
@@ -131,9 +115,9 @@ def _dialect_line(word: str, pen: Pen, **values: object) -> list[str]:
     return fill_block(word, "dialect", pen.values | values, pen.dialect)
 
 
-def _start(profile: Profile, parts: list[BeginPart], pen: Pen) -> Iterator[str]:
+def _start(profile: Profile, parts: Sequence[BeginPart], pen: Pen) -> Iterator[str]:
     """What the firmware wants to know first, the start block, its modes, and the first layer's heat if that has not come yet."""
-    dialect, heat = pen.dialect, profile.material.first_layer_nozzle_c
+    dialect, heat, advance = pen.dialect, profile.material.first_layer_nozzle_c, profile.material.pressure_advance
     yield ";TYPE:Custom"
     for word in (*dialect.before_start, dialect.parts):
         yield from _dialect_line(word, pen)
@@ -146,8 +130,8 @@ def _start(profile: Profile, parts: list[BeginPart], pen: Pen) -> Iterator[str]:
     if hot not in lines:
         yield hot
     yield from dialect.modes
-    if profile.material.pressure_advance is not None and dialect.pressure_advance:
-        yield dialect.pressure_advance.format(f"{profile.material.pressure_advance:g}")
+    if advance is not None and dialect.pressure_advance:
+        yield dialect.pressure_advance.format(f"{advance:g}")
     for word in dialect.after_start:
         yield from _dialect_line(word, pen)
     if pen.machine.coordinates == "workpiece":
@@ -176,26 +160,21 @@ def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
     pen.part += 1
 
 
-def _contents(program: MachineProgram, row: int) -> Iterator[str]:
-    """What the strokes of the part that begins at a row come to."""
-    after = next(end for end in _part_rows(program) if end > row)
+def _contents(program: MachineProgram, row: int, after: int) -> str:
+    """What the strokes of a part, rows `row` to `after`, come to."""
     begin, end = program.starts[row], program.starts[after]
     own = program.is_stroke[row:after] & (program.what[row:after] != NUMBER[Kind.PURGE])
     points = np.repeat(own, np.diff(program.starts[row : after + 1]))
     layers = np.unique(np.searchsorted(program.mark_rows, row + np.flatnonzero(own)))
     filament_mm = float(program.filament_mm[begin:end][points].sum())
-    comment = totals_comment(program.points_mm[begin:end][points], filament_mm, len(layers))
-    if comment:
-        yield comment
+    return totals_comment(program.points_mm[begin:end][points], filament_mm, len(layers))
 
 
 def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     if pen.labelled != pen.part:
         pen.labelled = pen.part
         yield from _dialect_line(pen.dialect.part_begin, pen, index=pen.part - 1, number=move.part)
-    yield ";LAYER_CHANGE"
-    yield f";Z:{number(move.z_mm)}"
-    yield f";HEIGHT:{number(move.height_mm)}"
+    yield from (";LAYER_CHANGE", f";Z:{number(move.z_mm)}", f";HEIGHT:{number(move.height_mm)}")
     pen.kind = -1
     pen.layers += 1
     if pen.dialect.layer:
@@ -207,8 +186,7 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
 
 def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:
     """How hot the first layer among marks is printed; 0 where there is none."""
-    coming = next((mark for mark in marks if isinstance(mark, BeginLayer)), None)
-    return 0.0 if coming is None else _nozzle_c(coming, profile)
+    return next((_nozzle_c(mark, profile) for mark in marks if isinstance(mark, BeginLayer)), 0.0)
 
 
 def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:
@@ -216,17 +194,11 @@ def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:
     return min(profile.material.nozzle_c + layer.nozzle_add_c, profile.machine.nozzle_limit_c)
 
 
-def _set_nozzle(wanted_c: float, pen: Pen) -> Iterator[str]:
-    if wanted_c != pen.nozzle_c:
-        pen.nozzle_c = wanted_c
-        yield pen.dialect.nozzle.format(number(wanted_c))
-
-
-def _pause(move: Pause, pen: Pen) -> Iterator[str]:
-    """The firmware's own word; a sender that pauses by itself goes by the remark."""
-    word = pen.dialect.filament_change if move.change else pen.dialect.pause
-    reason = "filament change" if move.change else "pause"
-    yield f"{word} {PAUSE_REMARK}{reason} before layer {move.layer} of part {move.part}"
+def _set_nozzle(wanted_c: float, pen: Pen) -> list[str]:
+    if wanted_c == pen.nozzle_c:
+        return []
+    pen.nozzle_c = wanted_c
+    return [pen.dialect.nozzle.format(number(wanted_c))]
 
 
 def _set_fan(share: float, pen: Pen) -> Iterator[str]:
@@ -246,35 +218,39 @@ def _progress(seconds: float, total: float, pen: Pen) -> Iterator[str]:
 
 def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int], profile: Profile, pen: Pen) -> Iterator[str]:
     """The text of the moves in rows first to end, among which there is no mark."""
-    if first < end and pen.known[Z] == UNKNOWN and program.what[first] == TRAVEL:  # plan() begins with travels
-        yield _first_travel(program, first, pen)
-        first += 1
     if first == end:
         return
-    begin = program.starts[first]
-    points = pen.file_coordinates(program.points_mm[begin : program.starts[end]])
-    filament_mm = program.filament_mm[begin : program.starts[end]]
-    starts, what = program.starts[first : end + 1] - begin, program.what[first:end]
+    points = pen.file_coordinates(program.points_mm[program.starts[first] : program.starts[end]])
+    filament_mm = program.filament_mm[program.starts[first] : program.starts[end]]
+    if pen.known[Z] == UNKNOWN and program.what[first] == TRAVEL:
+        # plan() begins with travels; of the first only Z is written: after the start block the tip rises before it crosses
+        pen.known[Z] = round(float(points[0, 2]) * 1000.0)
+        yield f"{pen.dialect.travel} Z{pen.known[Z] / 1000:.3f}{pen.speed(float(program.speed[first]))}\n"
+        points, filament_mm = (column[program.starts[first + 1] - program.starts[first] :] for column in (points, filament_mm))
+        first += 1
+    starts, what, speed = (
+        program.starts[first : end + 1] - program.starts[first],
+        program.what[first:end],
+        program.speed[first:end],
+    )
     does = np.select([what < TRAVEL, what == TRAVEL, what == WIPE], [PUSHING, TRAVELLING, PUSHING], STANDING).astype(np.int8)
     most = np.where(what == WIPE, wipe_filament_mm_s(profile.machine), stroke_filament_mm_s(profile))
-    speed, curved = program.speed[first:end], _curved(points, starts, what, profile.machine)
-    texts, done = list[str](), 0
+    many = np.flatnonzero((what < TRAVEL) & (np.diff(starts) > FEWEST_CHORDS)).tolist() if profile.machine.arcs else []
+    curved = {k for k in many if np.ptp(points[starts[k] : starts[k + 1], 2]) < 1e-9}  # strokes in one plane
+    texts, done, after = list[str](), 0, ""
 
     def write(until: int) -> str:
-        pieces = [text.encode() for text in texts]
         paths = Paths(points, filament_mm, starts[done : until + 1], does[done:until], speed[done:until], most[done:until])
-        return pen.paths(paths, Texts(np.frombuffer(b"".join(pieces), np.uint8), np.cumsum([0, *map(len, pieces)])))
+        return pen.paths(paths, Texts.of([text.encode() for text in texts]))
 
-    after = ""
     columns = (what, program.fan[first:end], program.acceleration_mm_s2[first:end], program.width_mm[first:end])
-    for k, (number_, fan, acceleration, width_mm) in enumerate(zip(*(column.tolist() for column in columns), strict=True)):
-        before = after
-        after = ""
-        if number_ < TRAVEL:
-            before += "".join(_ended(_before_stroke(number_, fan, acceleration, width_mm, profile, pen)))
+    for k, (kind, fan, acceleration, width_mm) in enumerate(zip(*(column.tolist() for column in columns), strict=True)):
+        before, after = after, ""
+        if kind < TRAVEL:
+            before += _ended(_before_stroke(kind, fan, acceleration, width_mm, profile, pen))
             if first + k in last_strokes:
-                after = "".join(_ended(_dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"])))
-        elif number_ == WIPE:
+                after = _ended(_dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"]))
+        elif kind == WIPE:
             before, after = before + ";WIPE_START\n", ";WIPE_END\n"
         texts.append(before)
         if k in curved:
@@ -302,29 +278,20 @@ def _before_stroke(
         yield f";WIDTH:{number(width_mm)}"
 
 
-def _first_travel(program: MachineProgram, row: int, pen: Pen) -> str:
-    """The first travel after the start block, of which only Z is written: the tip rises before it crosses."""
-    point = pen.file_coordinates(program.points_mm[program.starts[row] : program.starts[row] + 1])
-    pen.known[Z] = round(float(point[0, 2]) * 1000.0)
-    return f"{pen.dialect.travel} Z{pen.known[Z] / 1000:.3f}{pen.speed(float(program.speed[row]))}\n"
-
-
-def _curved(points_mm: Floats, starts: Indices, what: NDArray[np.int8], machine: Machine) -> set[int]:
-    """Which of the moves are strokes in one plane with enough points for arcs."""
-    if not machine.arcs:
-        return set()
-    many = np.flatnonzero((what < TRAVEL) & (np.diff(starts) > FEWEST_CHORDS)).tolist()
-    return {k for k in many if np.ptp(points_mm[starts[k] : starts[k + 1], 2]) < 1e-9}
-
-
 def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profile: Profile, pen: Pen) -> Iterator[str]:
     """A stroke (n, 3) in one plane with arcs where they keep to it; filament_mm: (n - 1,)."""
     flat = np.rint(points_mm[:, :2] * 1000.0) / 1000.0
     runs, arcs = fit_arcs(flat, filament_mm, profile.machine.arc_tolerance_mm - ROUNDING_MM)
+    does, speed, most = np.array([PUSHING], np.int8), np.array([speed_mm_s]), np.array([stroke_filament_mm_s(profile)])
+
+    def straight(first: int, last: int) -> str:
+        points, filament = np.ascontiguousarray(points_mm[first : last + 1]), np.append(0.0, filament_mm[first:last])
+        return pen.paths(Paths(points, filament, np.array([0, len(points)]), does, speed, most), Texts.of([b"", b""]))
+
     done = 0
     for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
         if first > done:
-            yield _straight(points_mm[done : first + 1], filament_mm[done:first], speed_mm_s, profile, pen)
+            yield straight(done, first)
         pushed = pen.filament(float(filament_mm[first:last].sum()))
         pen.known[:Z] = np.rint(points_mm[last, :2] * 1000.0).astype(np.int64)
         end, centre = pen.place_mm, (x - flat[first, 0], y - flat[first, 1])
@@ -332,15 +299,7 @@ def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profil
         yield f"{'G2' if clockwise > 0 else 'G3'}{words}\n"
         done = last
     if done < len(flat) - 1:
-        yield _straight(points_mm[done:], filament_mm[done:], speed_mm_s, profile, pen)
-
-
-def _straight(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profile: Profile, pen: Pen) -> str:
-    """A single path of straight moves."""
-    starts, does = np.array([0, len(points_mm)]), np.array([PUSHING], dtype=np.int8)
-    speed, most = np.array([speed_mm_s]), np.array([stroke_filament_mm_s(profile)])
-    paths = Paths(np.ascontiguousarray(points_mm), np.append(0.0, filament_mm), starts, does, speed, most)
-    return pen.paths(paths, Texts(as_bytes(""), np.zeros(3, dtype=np.int64)))
+        yield straight(done, len(flat) - 1)
 
 
 def _reorient(move: Reorient, next_part: BeginPart | None, pen: Pen) -> Iterator[str]:

@@ -42,9 +42,9 @@ def arrange(
             return Misfit(len(rows), len(rows), False)
         if is_clear(dict(enumerate(rows))):
             return rows
-    corner = -machine.table.radius_mm, -machine.table.radius_mm
     found = _one_by_one(sizes_mm, gap_mm, machine, about_mm, is_clear)
     if isinstance(found, Misfit):  # two that fit side by side do not where the first one has the middle
+        corner = -machine.table.radius_mm, -machine.table.radius_mm
         from_corner = _one_by_one(sizes_mm, gap_mm, machine, corner, is_clear)
         if isinstance(from_corner, Misfit):
             return max(found, from_corner, key=lambda misfit: misfit.standing)
@@ -58,14 +58,11 @@ def _one_by_one(
     """The largest first, each as near to a place as it may stand."""
     standing: dict[int, Place] = {}
     for k in sorted(range(len(sizes_mm)), key=lambda k: (-sizes_mm[k][0] * sizes_mm[k][1], k)):
-        is_met = False
-        for place in _free_places(k, standing, sizes_mm, gap_mm, machine, near_mm):
-            if is_clear({**standing, k: place}):
-                standing[k] = place
-                break
-            is_met = True
-        else:
-            return Misfit(k, len(standing), is_met)
+        places = _free_places(k, standing, sizes_mm, gap_mm, machine, near_mm)
+        place = next((place for place in places if is_clear({**standing, k: place})), None)
+        if place is None:
+            return Misfit(k, len(standing), bool(places))
+        standing[k] = place
     return [standing[k] for k in range(len(sizes_mm))]
 
 
@@ -106,26 +103,14 @@ def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine,
     Rows and columns may have a box or a gap at that place, or in the middle of the plate: what holds most is taken, among equals
     what stays nearer to the place.
     """
-    best: list[Place] = []
-    for anchor in dict.fromkeys((about_mm, MIDDLE)):
-        for shift in product((0.0, 0.5), (0.0, 0.5)):
-            inside = _lattice(size_mm, gap_mm, shift, machine, anchor)
-            lattice = sorted(inside, key=lambda middle: (round(dist(middle, about_mm), 6), middle[1], middle[0]))[:count]
-            if (len(lattice), -_farthest_mm(lattice, about_mm)) > (len(best), -_farthest_mm(best, about_mm)):
-                best = lattice
-    return best
-
-
-def _farthest_mm(places: list[Place], about_mm: Place) -> float:
-    return max((dist(place, about_mm) for place in places), default=0.0)
-
-
-def _lattice(size_mm: Place, gap_mm: float, shift: Place, machine: Machine, anchor_mm: Place) -> list[Place]:
-    """Those of its places whose boxes lie on the plate."""
-    steps = [side + gap_mm for side in size_mm]
-    reach_mm = machine.table.radius_mm + hypot(*anchor_mm)
-    counts = [ceil(2.0 * reach_mm / step) + 1 for step in steps]
-    columns, rows = ([(k + part) * step for k in range(-n, n + 1)] for n, part, step in zip(counts, shift, steps, strict=True))
-    middles = np.array(list(product(columns, rows))) + np.array(anchor_mm)
-    over_mm, _ = over_edge_mm(np.abs(middles) + 0.5 * np.array(size_mm) + EDGE_MM, machine.table)
-    return [(x, y) for x, y in middles[over_mm <= 0.0].tolist()]
+    lattices: list[list[Place]] = []
+    for anchor_mm, shift in product(dict.fromkeys((about_mm, MIDDLE)), product((0.0, 0.5), (0.0, 0.5))):
+        axes, reach_mm = [], machine.table.radius_mm + hypot(*anchor_mm)
+        for side, part in zip(size_mm, shift, strict=True):
+            most = ceil(2.0 * reach_mm / (side + gap_mm)) + 1
+            axes.append([(k + part) * (side + gap_mm) for k in range(-most, most + 1)])
+        middles = np.array(list(product(*axes))) + np.array(anchor_mm)
+        over_mm, _ = over_edge_mm(np.abs(middles) + 0.5 * np.array(size_mm) + EDGE_MM, machine.table)
+        inside = ((x, y) for x, y in middles[over_mm <= 0.0].tolist())
+        lattices.append(sorted(inside, key=lambda place: (round(dist(place, about_mm), 6), place[1], place[0]))[:count])
+    return max(lattices, key=lambda places: (len(places), -max((dist(place, about_mm) for place in places), default=0.0)))

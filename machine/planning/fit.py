@@ -30,19 +30,18 @@ def check_parts(parts: Sequence[Part], profile: Profile) -> None:
     is left at the sides, for the tip stays so far inside what it prints.
     """
     for part in parts:
-        inset_mm = 0.5 * profile.of_part(part.index).process.line_width_mm
-        _check_reach(part, inset_mm, profile)
+        _check_reach(part, profile)
         if part.on_platform:
             check_standing(part.mesh, profile)
 
 
-def _check_reach(part: Part, inset_mm: float, profile: Profile) -> None:
+def _check_reach(part: Part, profile: Profile) -> None:
     machine = profile.machine
     reached = machine_points(machine, part.pose, part.mesh.vertices + _shift(profile))
-    inset = inset_mm * np.array([1.0, 1.0, 0.0])
-    low, high = reached.min(axis=0) + inset, reached.max(axis=0) - inset
-    for axis, (letter, limits) in enumerate(list(axis_limits(machine).items())[:3]):
-        for value in (low[axis], high[axis]):
+    inset = 0.5 * profile.of_part(part.index).process.line_width_mm * np.array([1.0, 1.0, 0.0])
+    ends = np.transpose([reached.min(axis=0) + inset, reached.max(axis=0) - inset])
+    for values, (letter, limits) in zip(ends, list(axis_limits(machine).items())[:3], strict=True):
+        for value in values:
             if not limits[0] - ROUNDING <= value <= limits[1] + ROUNDING:
                 where = f"{machine.tilt.letter}{part.pose.tilt_deg:.1f} {machine.turn.letter}{part.pose.turn_deg:.1f}"
                 raise MoveError(
@@ -74,9 +73,9 @@ def _shift(profile: Profile) -> Floats:
 
 
 def _advice(profile: Profile) -> str:
-    if profile.process.place_mm == MIDDLE:
-        return "process.scale makes the model smaller"
     x, y = profile.process.place_mm
+    if (x, y) == MIDDLE:
+        return "process.scale makes the model smaller"
     return f"process.place_mm moves it from {x:g}, {y:g} mm back towards the middle"
 
 

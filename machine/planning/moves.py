@@ -1,6 +1,6 @@
 """Moves: the machine program between the slicer and the G-code text, a row for each move, in machine coordinates."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -126,6 +126,10 @@ class MachineProgram:
     def mark_rows(self) -> Indices:
         """Where the marks stand among the moves."""
         return np.flatnonzero(self.what >= REORIENT)
+
+    def marked(self) -> Iterator[tuple[int, Mark]]:
+        """The row and the value of each mark."""
+        return zip(self.mark_rows.tolist(), self.marks, strict=True)
 
 
 def straight_moves(program: MachineProgram, start: Pose) -> tuple[Floats, Floats, Indices]:

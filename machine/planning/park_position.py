@@ -6,6 +6,7 @@ stands, and back the same way.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -46,7 +47,8 @@ def find_park_position(
     lift = (x, y, height)
     if height < min(top, most) - 1e-9:
         return Park(lift, lift)
-    for point in sorted([*stands, *_corners(machine)], key=lambda point: abs(point[0] - x) + abs(point[1] - y)):
+    corners = product(*((low + ASIDE_MM, high - ASIDE_MM) for low, high in (machine.x.limits_mm, machine.y.limits_mm)))
+    for point in sorted([*stands, *corners], key=lambda point: abs(point[0] - x) + abs(point[1] - y)):
         stand = (*point, height)
         if height >= top - 1e-9 or is_way_clear(machine, pose, np.array(lift), np.array(stand), printed, PARTS):
             return Park(lift, stand)
@@ -77,11 +79,6 @@ def obstacle_top_mm(machine: Machine, printed: Printed | None, pose: Pose) -> fl
 def over_print_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
     """Z at which the tip clears all that is printed, wherever it goes at a pose."""
     return float(printed.reach(machine, pose, UP[None])[0]) + machine.clearance_mm
-
-
-def _corners(machine: Machine) -> list[tuple[float, float]]:
-    (left, right), (front, back) = machine.x.limits_mm, machine.y.limits_mm
-    return [(x, y) for x in (left + ASIDE_MM, right - ASIDE_MM) for y in (front + ASIDE_MM, back - ASIDE_MM)]
 
 
 def is_way_clear(

@@ -8,7 +8,6 @@ cradle and print, swept: between two poses that are tried each direction's reach
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise, product
 from math import ceil, hypot, inf, radians
 
@@ -67,28 +66,15 @@ def poses_between(start: Pose, end: Pose, step_deg: float = STEP_DEG) -> list[Po
     return [Pose(start.tilt_deg + tilt * k / count, start.turn_deg + turn * k / count) for k in range(count + 1)]
 
 
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    """What turns under the head during a whole turn: (p, s, k) reaches of s solids along k directions, in p short turns."""
+def least_z(machine: Machine, tried: Floats, reach: Floats, over_mm: tuple[float, float], every: int = 1) -> float:
+    """Least Z from which on upward the tip may stand at X, Y while solids reach (p, s, k) along (k, 3) directions; else infinite.
 
-    machine: Machine
-    tried: Floats
-    reach: Floats
-
-    def least_z(self, x: float, y: float, every: int = 1) -> float:
-        """Least Z from which on upward the tip may stand at X, Y through the whole turn; infinite when there is none.
-
-        Along a direction d that leans upward the gap grows with Z, so each direction gives a least Z of its own.
-        every: take only every nth of the short turns, which gives a lower bound.
-        """
-        need_mm = max(self.machine.lift_mm, self.machine.clearance_mm)
-        least_mm = self._least_mm + self.tried[:, :2] @ np.array([x, y])
-        return float(_least_z(self.reach, every, need_mm, least_mm, np.ascontiguousarray(self.tried[:, 2])))
-
-    @cached_property
-    def _least_mm(self) -> Floats:
-        """(b, k) how far each body of the head reaches against each direction, the tip at X0 Y0 Z0."""
-        return np.array([body.least(self.tried) for body in bodies(self.machine)])
+    Along a direction d that leans upward the gap grows with Z, so each direction gives a least Z of its own.
+    every: take only every nth of the short turns, which gives a lower bound.
+    """
+    need_mm = max(machine.lift_mm, machine.clearance_mm)
+    least_mm = np.array([body.least(tried) for body in bodies(machine)]) + tried[:, :2] @ np.array(over_mm)
+    return float(_least_z(reach, every, need_mm, least_mm, np.ascontiguousarray(tried[:, 2])))
 
 
 @kernel
@@ -113,26 +99,20 @@ def _least_z(reach: Floats, every: int, need_mm: float, least_mm: Floats, up: Fl
     return highest
 
 
-def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> Sweep:
-    """All that turns between two poses, print included."""
+def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> tuple[Floats, Floats]:
+    """What turns under the head between two poses, print included: (k, 3) directions, those of some poses' normals and a field as
+    far as they do not point down; and (p, s, k) reaches of s solids along them, in p short turns."""
     turning = poses_between(start, end)
-    tried = _upward(machine, turning)
+    fans = [directions(rotation(machine, pose) @ UP)[:27] for pose in turning[:: max(1, len(turning) // TRIED)]]
+    around = np.radians(np.arange(0.0, 360.0, 15.0))
+    level = np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])
+    tried = np.vstack([UP[None], *fans, spread(2 * FIELD), level])
+    tried = np.unique(np.round(tried[tried[:, 2] >= -1e-12], 12), axis=0)
     reach = np.array([[reach_of(tried) for _, reach_of in solids(machine, pose, printed)] for pose in turning])
     step = radians(hypot(turning[1].tilt_deg - turning[0].tilt_deg, turning[1].turn_deg - turning[0].turn_deg))
     # d . x changes along the turn with a second derivative of at most 2 r a^2, a the angle of both axes together
     sagitta = swing_mm(machine, printed) * step**2 / 4.0
-    return Sweep(machine, tried, np.maximum(reach[:-1], reach[1:]) + sagitta)
-
-
-def _upward(machine: Machine, turning: list[Pose]) -> Floats:
-    """(k, 3) directions to try: those of some poses' normals and a field, as far as they do not point down."""
-    chosen = turning[:: max(1, len(turning) // TRIED)]
-    fans = [directions(rotation(machine, pose) @ UP)[:27] for pose in chosen]
-    tried = np.vstack([UP[None], *fans, spread(2 * FIELD)])
-    around = np.radians(np.arange(0.0, 360.0, 15.0))
-    tried = np.vstack([tried, np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])])
-    upward: Floats = tried[tried[:, 2] >= -1e-12]
-    return np.unique(np.round(upward, 12), axis=0)
+    return tried, np.maximum(reach[:-1], reach[1:]) + sagitta
 
 
 def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Speeds) -> Route:
@@ -140,13 +120,13 @@ def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Spe
 
     Raises MoveError when no stand is safe inside the axis limits.
     """
-    swept = sweep(machine, printed, turn.start, turn.end)
+    tried, reach = sweep(machine, printed, turn.start, turn.end)
     best: Route | None = None
     lowest = inf
-    for x, y in stands(machine, turn):
+    for over_mm in stands(machine, turn):
         for every in (COARSE, 1):
-            least = swept.least_z(x, y, every)
-            candidate = _at((x, y), least, turn, machine, speeds)
+            least = least_z(machine, tried, reach, over_mm, every)
+            candidate = _at(over_mm, least, turn, machine, speeds)
             if candidate.across_z_mm > machine.z.limits_mm[1] or (best is not None and candidate.seconds >= best.seconds):
                 break
         else:
@@ -175,10 +155,8 @@ def stands(machine: Machine, turn: Turn) -> Iterator[tuple[float, float]]:
     """Places to stand: where the tip is, above the next first point, half way, then a lattice over X and Y."""
     here = turn.at_mm[:2]
     there = here if turn.target_mm is None else turn.target_mm[:2]
-    for point in (here, there, 0.5 * (here + there)):
-        yield float(point[0]), float(point[1])
-    xs, ys = (np.linspace(*axis.limits_mm, STANDS).tolist() for axis in (machine.x, machine.y))
-    yield from product(xs, ys)
+    yield from ((float(x), float(y)) for x, y in (here, there, 0.5 * (here + there)))
+    yield from product(*(np.linspace(*axis.limits_mm, STANDS).tolist() for axis in (machine.x, machine.y)))
 
 
 def way_s(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float], machine: Machine, speeds: Speeds) -> float:

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, PathWords, Texts, as_bytes, path_text
+from machine.gcode.lines import Texts
+from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, PathWords, path_text
 from mdp.mesh import Floats
 
 Point = tuple[float, float, float, float]  # X Y Z, and the filament of the step to it
@@ -15,7 +16,7 @@ NO_TEXT = ("", "")
 
 
 def words(letter: str = "E", relative: bool = True) -> PathWords:
-    return PathWords(as_bytes("G1"), as_bytes("G0"), ord(letter), relative)
+    return PathWords(np.frombuffer(b"G1", np.uint8), np.frombuffer(b"G0", np.uint8), ord(letter), relative)
 
 
 def known() -> np.typing.NDArray[np.int64]:
@@ -23,7 +24,7 @@ def known() -> np.typing.NDArray[np.int64]:
 
 
 def texts(*lines: str) -> Texts:
-    return Texts(as_bytes("".join(lines)), np.cumsum([0, *map(len, lines)]))
+    return Texts.of([line.encode() for line in lines])
 
 
 def path(rows: list[Point], does: int, speed: float = 20.0, most_mm_s: float = 1e9) -> Paths:

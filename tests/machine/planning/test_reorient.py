@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from machine.kinematics.collision import hull, solids
 from machine.kinematics.table import machine_points
-from machine.planning.reorient import Sweep, Turn, poses_between, route, stands, sweep, way_s
+from machine.planning.reorient import Turn, least_z, poses_between, route, stands, sweep, way_s
 from mdp.head import bodies, corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
@@ -115,12 +115,12 @@ def test_no_stand_of_the_family_is_quicker_and_safe_too(name: str) -> None:
 
 def test_between_two_poses_that_are_tried_nothing_reaches_farther_than_is_reckoned_with() -> None:
     machine, printed = _machine("cradle"), hull(PRINT, 0.0)
-    swept, tried = sweep(machine, printed, level(machine), TURN), poses_between(level(machine), TURN)
-    assert len(swept.reach) == len(tried) - 1
+    (tried, swept), poses = sweep(machine, printed, level(machine), TURN), poses_between(level(machine), TURN)
+    assert len(swept) == len(poses) - 1
     nearest = np.inf
-    for known, (a, b) in zip(swept.reach, pairwise(tried), strict=True):
+    for known, (a, b) in zip(swept, pairwise(poses), strict=True):
         between = Pose(0.5 * (a.tilt_deg + b.tilt_deg), 0.5 * (a.turn_deg + b.turn_deg))
-        reach = np.array([reach_of(swept.tried) for _, reach_of in solids(machine, between, printed)])
+        reach = np.array([reach_of(tried) for _, reach_of in solids(machine, between, printed)])
         nearest = min(nearest, float((known - reach).min()))
     assert 0.0 <= nearest < 0.01  # mm
 
@@ -155,4 +155,4 @@ def test_the_least_height_is_that_of_all_directions_bodies_and_turns(seed: int, 
                 missing = solid + max(machine.lift_mm, machine.clearance_mm) - body.least(tried) - tried[:, :2] @ [x, y]
                 level = [-np.inf if gap <= 0.0 else np.inf for gap in missing]
                 heights.append(min(gap / up if up else flat for gap, up, flat in zip(missing, tried[:, 2], level, strict=True)))
-    assert Sweep(machine, tried, reach).least_z(x, y, every) == pytest.approx(max(heights))
+    assert least_z(machine, tried, reach, (x, y), every) == pytest.approx(max(heights))
