@@ -10,8 +10,7 @@ from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
 from machine.gcode.blocks import BEFORE_LAYER, check_blocks, fill_block, placeholders
 from machine.gcode.lines import Lines, Texts
-from machine.gcode.path_text import PUSHING, STANDING, TRAVELLING, Paths, Z
-from machine.gcode.pen import UNKNOWN, Pen, angle, number, turn
+from machine.gcode.pen import PUSHING, STANDING, TRAVELLING, UNKNOWN, Paths, Pen, Z, angle, number, turn
 from machine.gcode.settings import totals_comment
 from machine.gcode.words import PAUSE_REMARK
 from machine.planning.limits import stroke_filament_mm_s, wipe_filament_mm_s

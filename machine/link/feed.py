@@ -6,8 +6,7 @@ from dataclasses import replace
 from math import inf
 from threading import Event as Flag
 
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import axes_of
+from machine.gcode.modes import ModalState, axes_of
 from machine.gcode.words import PAUSE_REMARK
 from machine.link.exchange import Exchange
 from machine.link.journal import FINISHED, LEFT, PAUSED, Checkpoint, Journal

@@ -7,8 +7,7 @@ place they were sent to, to a thousandth, and the filament with it.
 from collections.abc import Mapping, Sequence
 
 from machine.gcode.commands import command_in
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import E_AXIS
+from machine.gcode.modes import E_AXIS, ModalState
 from machine.link.status import PrinterStatus
 
 SAME = 0.01  # mm or deg: what program and firmware round

@@ -11,8 +11,7 @@ from enum import Enum, auto
 from threading import Event as Flag
 
 from machine.gcode.commands import command_in
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import Axes
+from machine.gcode.modes import Axes, ModalState
 from machine.gcode.words import read_words, split_command
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from profiles.errors import LocalProtocolError

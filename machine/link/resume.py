@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import E_AXIS, axes_of
+from machine.gcode.modes import E_AXIS, ModalState, axes_of
 from machine.kinematics.collision import Printed
 from machine.link.journal import EVERY_LINES, LEFT, PAUSED, Checkpoint
 from machine.link.line_history import shifts
@@ -25,7 +24,7 @@ from machine.link.pause.return_path import homed_return_moves, return_moves
 from machine.link.progress import ProgramPosition
 from machine.link.protocol.framing import command_of
 from machine.link.status import PrinterStatus
-from machine.planning.reorient import Turn
+from machine.planning.stand import Turn
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import FirmwareError, JournalError, SilenceError

@@ -1,33 +1,295 @@
-"""Layer: a layer's strokes as moves, each as fast as axes, extruder and hot end can, and the ways of the tip between them.
+"""Layer: a layer's strokes as moves, each as fast as axes, extruder and hot end can, and the tip's ways between them: pulling
+back with a wipe, lifting, crossing, and how high for the head to clear what stands beside a limb that is being printed.
 
 Filament that makes up for what oozed while the table turned is pushed during a stroke inside, not at standstill. How much oozed
 is not known. Pushed at the beginning of a wall, what did not ooze would be a drop on the seam; spread over the first stretch of
 infill or support it makes that a little thicker, where nobody sees or feels it.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
-from math import pi
+from math import inf, nan, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from machine.planning.limits import path_speeds, stroke_filament_mm_s
-from machine.planning.moves import POINTS, RETRACT, SPEED, Moves, add_point, add_row
-from machine.planning.travel import Laid, Tip, add_travel, height_to, trail_after
+from machine.planning.limits import path_speed, path_speeds, stroke_filament_mm_s, wipe_filament_mm_s
+from machine.planning.moves import MARK, POINTS, REORIENT, RETRACT, SPEED, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
+from mdp.clearance import Standing, highest_in_cells
+from mdp.decomposition import Part
 from mdp.kernels.arrays import floats, longs, table
-from mdp.kernels.kernel import kernel
+from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
+from mdp.pose import Pose
+from profiles.errors import MoveError
+from profiles.machine import Machine
 from profiles.profile import Profile
-from slicer.estimate.timing import Speeds
+from slicer.estimate.timing import Speeds, speeds_of
 from slicer.geometry.polyline import length_between
-from slicer.paths import Kind, Layer, bead_area_mm2
+from slicer.interface.interface import frame_change
+from slicer.paths import Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
-from slicer.strokes.travels import STANDING_MM
+from slicer.strokes.travels import STANDING_MM, distance, first_length, runs_round, wipe_trail
 
+TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
+NOWHERE = np.zeros((0, 3))
+NO_ENDS = np.zeros(0, dtype=np.int64)
+STEP_MM = 0.5  # between the points that sample ways and beads, and size of the cells in which only the highest point counts
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 RUN_MM = 20.0  # the filament of a turn is spread over so much of a stroke
 MOST_FULL = 1.5  # of what the width and the height of a bead need: what did not ooze shall not fill the room twice
 SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN)
+
+
+@dataclass
+class Tip:
+    """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back, and all moves so far.
+
+    trail: (n, 3) the way of a wipe over what has been printed since the last retraction. run_in_mm: filament that the next
+    strokes inside are to push beyond their own. limb: while a limb is printed, its part number and what stands beside it.
+    """
+
+    profile: Profile
+    at_mm: Floats
+    pose: Pose
+    retracted_mm: float = 0.0
+    prime_extra_mm: float = 0.0
+    run_in_mm: float = 0.0
+    trail: Floats = field(default_factory=lambda: NOWHERE)
+    limb: tuple[int, Standing] | None = None
+    moves: list[Moves] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
+
+    @cached_property
+    def speeds(self) -> Speeds:
+        """What its moves between strokes may have."""
+        return speeds_of(self.profile)
+
+    def add(self, moves: Moves) -> None:
+        """Moves that begin where it stands."""
+        self.moves.append(moves)
+        if len(moves.ways):
+            self.at_mm = moves.ways[-1, :3]
+
+    def move(self, what: int, way_mm: Floats, pushed_mm: Floats | float, speed: float, acceleration_mm_s2: float = inf) -> None:
+        """One move that is not a stroke, along (n, 3) points."""
+        ways = np.empty((len(way_mm), 4))
+        ways[:, :3], ways[:, 3] = way_mm, pushed_mm
+        self.add(Moves(ways, np.array([[what, len(way_mm), speed, nan, nan, acceleration_mm_s2]])))
+
+    def mark(self, mark: Mark) -> None:
+        """A mark, or a turn of the table, after which nothing of what was printed is to be wiped over any more."""
+        self.marks.append(mark)
+        if isinstance(mark, Reorient):
+            self.move(REORIENT, self.at_mm[None], 0.0, mark.speed_deg_s)
+            self.pose, self.trail = mark.pose, NOWHERE
+        else:
+            self.move(MARK, NOWHERE, 0.0, 0.0)
+
+
+def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats) -> float:
+    """Z at which the tip crosses along an approach (k, 2) to a stroke's start, pulled back where it `retracts`.
+
+    Within a limb the filament is pulled back and the tip lifted wherever the head would meet what stands beside the limb.
+    """
+    if retracts:
+        retract(tip)
+    lift, level = tip.profile.process.lift_mm if retracts else 0.0, float(start[2])
+    over = max(level, min(level + lift, tip.profile.machine.z.limits_mm[1]))
+    if tip.limb is None:
+        return over
+    clear = _over_standing(tip, approach, start, shift, over)
+    if clear > over and not retracts:
+        retract(tip)  # a wipe moves the tip
+        clear = _over_standing(tip, approach, start, shift, over)
+    return clear
+
+
+def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float) -> float:
+    """Z at which the head clears what stands beside a limb on the way to a path's start: `over` where that is enough, else the
+    least height that is, with the clearance beneath the nozzle, too."""
+    assert tip.limb is not None
+    (part, standing), machine = tip.limb, tip.profile.machine
+    way = np.vstack([tip.at_mm[:2], approach, start[:2]])
+    z_mm = clear_height_mm(standing, way - shift[:2], over - float(shift[2])) + float(shift[2])
+    if z_mm <= over + STANDING_MM:
+        return over
+    z_mm += machine.clearance_mm
+    if z_mm > machine.z.limits_mm[1]:
+        raise MoveError(
+            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside the part, "
+            f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm"
+        )
+    return z_mm
+
+
+def go(tip: Tip, *goals_mm: Sequence[float] | Floats) -> None:
+    """Straight travels from place to place, straight up and down at the lift speed."""
+    for goal_mm in goals_mm:
+        tip.add(_straight(tip.at_mm, np.array(goal_mm, dtype=np.float64), tip.speeds))
+
+
+@kernel
+def _straight(at_mm: Floats, goal_mm: Floats, speeds: Speeds) -> Moves:
+    out, done = Moves(table(3, 4), table(1, 6)), longs(2, 0)
+    add_point(out, done, at_mm[0], at_mm[1], at_mm[2], 0.0)
+    add_travel(out, done, table(0, 2), goal_mm, speeds)
+    return Moves(out.ways[1 : done[0]], out.rows[: done[1]])
+
+
+@no_nrt
+def add_travel(out: Moves, done: Indices, between_mm: Floats, goal_mm: Floats, speeds: Speeds) -> None:
+    """Write a travel from the last point past (k, 2) places at the goal's height to the goal; it leaves out points where the tip
+    stands already, and is left out where it leads nowhere. done: as in add_point."""
+    first, upright = done[0], True
+    x, y, z = out.ways[first - 1, 0], out.ways[first - 1, 1], out.ways[first - 1, 2]
+    add_point(out, done, x, y, z, 0.0)
+    for k in range(len(between_mm) + 1):
+        to_x, to_y, to_z = goal_mm[0], goal_mm[1], goal_mm[2]
+        if k < len(between_mm):
+            to_x, to_y = between_mm[k, 0], between_mm[k, 1]
+        if np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2 + (to_z - z) ** 2) > STANDING_MM:
+            add_point(out, done, to_x, to_y, to_z, 0.0)
+            upright = upright and abs(to_x - x) <= STANDING_MM and abs(to_y - y) <= STANDING_MM
+        x, y, z = to_x, to_y, to_z
+    if done[0] == first + 1:
+        done[0] = first
+        return
+    speed = path_speed(out.ways, first, done[0], speeds.lift_mm_s if upright else speeds.travel_mm_s, speeds.axes_mm_s)
+    add_row(out, done, TRAVEL, done[0] - first, speed, speeds.acceleration_mm_s2)
+
+
+def retract(tip: Tip) -> None:
+    """Pull back what is not yet pulled back, moving over what was just printed where there is any."""
+    material, speeds = tip.profile.material, tip.speeds
+    amount = material.retract_mm - tip.retracted_mm
+    if amount <= 0:
+        return
+    tip.retracted_mm += amount
+    tip.prime_extra_mm = max(tip.prime_extra_mm, material.retract_prime_extra_mm)
+    way, tip.trail = tip.trail, NOWHERE
+    length = np.linalg.norm(np.diff(way, axis=0), axis=1)
+    if len(way) < 2 or float(np.linalg.norm(way[0] - tip.at_mm)) > STANDING_MM:
+        tip.move(RETRACT, tip.at_mm[None], -amount, speeds.filament_mm_s)
+        return
+    filament_mm_s = min(speeds.filament_mm_s, wipe_filament_mm_s(tip.profile.machine))
+    speed = min(speeds.travel_mm_s, float(length.sum()) * filament_mm_s / amount)
+    (speed,) = path_speeds(way, np.array([0, len(way)]), np.array([speed]), speeds.axes_mm_s)
+    tip.move(WIPE, way, np.append(0.0, -length * (amount / length.sum())), speed)
+
+
+class Laid(NamedTuple):
+    """The strokes of a layer where they lie in the machine, mm: points (n, 3), where those of each begin (k + 1,), widths (k,),
+    whether a wipe may go over each; the way to each: points (m, 2) of all of them, where those begin (k + 1,)."""
+
+    points: Floats
+    starts: Indices
+    width: Floats
+    wiped: Mask
+    approach: Floats
+    approach_starts: Indices
+
+
+@kernel
+def trail_after(laid: Laid, first: int, end: int, before: Floats, wipe_mm: float) -> Floats:
+    """The way (n, 3) of a wipe of wipe_mm after some of a layer's strokes; before: that before them, none after a retraction."""
+    from_here = end - 1
+    while from_here > first and not _suffices(laid, from_here, wipe_mm):
+        from_here -= 1
+    trail = before
+    for k in range(from_here, end):
+        trail = first_length(_trail_after(laid, k, trail, wipe_mm), wipe_mm)
+    return trail
+
+
+@no_nrt
+def _suffices(laid: Laid, k: int, wipe_mm: float) -> bool:
+    """Whether what was printed before a stroke does not matter for a wipe after it."""
+    if laid.wiped[k]:
+        return bool(length_between(laid.points, laid.starts[k], laid.starts[k + 1]) >= wipe_mm)
+    return not runs_round(laid.points[laid.starts[k] : laid.starts[k + 1]], laid.width[k])
+
+
+@helper
+def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
+    """The way of a wipe after one stroke.
+
+    Where the stroke is shorter it goes on, back over the way to its beginning, to the strokes before it in the layer; where
+    there are none, to and fro. Where it must not go over the stroke itself, it goes on over those at once.
+    """
+    points = laid.points[laid.starts[k] : laid.starts[k + 1]]
+    if not laid.wiped[k] and not (len(before) and runs_round(points, laid.width[k])):
+        return before[:0]
+    own = wipe_trail(points, laid.width[k])
+    if not laid.wiped[k]:
+        for axis in range(3):
+            own[0, axis], own[1, axis] = points[-1, axis], points[0, axis]
+        own = own[:2]
+    if distance(points, 0, len(points) - 1) >= wipe_mm or length_between(own, 0, len(own)) >= wipe_mm:
+        return own
+    passed = laid.approach[laid.approach_starts[k] : laid.approach_starts[k + 1]]
+    goes_on = len(before) > 0 and abs(before[0, 2] - points[0, 2]) <= STANDING_MM
+    once = len(own) + (len(passed) + len(before) if goes_on else 0)
+    trail: Floats = table(once + TO_AND_FRO * (once - 1), 3)
+    for i in range(once):
+        for axis in range(3):
+            if i < len(own):
+                trail[i, axis] = own[i, axis]
+            elif i < len(own) + len(passed):
+                trail[i, axis] = passed[len(own) + len(passed) - 1 - i, axis] if axis < 2 else points[0, 2]
+            else:
+                trail[i, axis] = before[i - len(own) - len(passed), axis]
+    count = once
+    for _ in range(TO_AND_FRO):
+        if length_between(trail, 0, count) >= wipe_mm:
+            break
+        for i in range(count, count + once - 1):
+            for axis in range(3):
+                trail[i, axis] = trail[2 * (count - 1) - i, axis]
+        count += once - 1
+    return trail[:count]
+
+
+def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> Standing:
+    """The printed beads that stand above the base plane of a limb, in its frame.
+
+    Beads less than their width above the plane are left out: they are the steps of the cut face on which the limb stands.
+    """
+    tops, widest_mm = [np.zeros((0, 3))], 0.0
+    for part, piece in printed:
+        turn, shift = frame_change(part, limb)
+        for layer in piece.layers:
+            placed, width_mm = layer.points_mm @ turn.T + shift, np.repeat(layer.width_mm, np.diff(layer.starts))
+            high = placed[:, 2] > width_mm
+            if not high.any():
+                continue
+            points, before = _resampled(placed, layer.starts[1:-1] - 1)
+            tops.append(points[points[:, 2] > width_mm[before]])
+            widest_mm = max(widest_mm, float(width_mm[high].max()))
+    slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of way and of bead, half a cell's diagonal
+    return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
+
+
+def clear_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> float:
+    """The least height of at least height_mm at which the tip may go along a way (n, 2) in the limb's frame."""
+    return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm)[0], height_mm).max()))
+
+
+def _resampled(way_mm: Floats, ends: Indices = NO_ENDS) -> tuple[Floats, Indices]:
+    """A way (n, d) with points added so that they are at most STEP_MM apart, and the point of the way that each comes from.
+
+    ends: points from which no way leads to the next one.
+    """
+    steps = np.diff(way_mm, axis=0)
+    counts = np.maximum(np.ceil(np.linalg.norm(steps, axis=1) / STEP_MM), 1).astype(np.int64)
+    counts[ends] = 1
+    share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / np.repeat(counts, counts)
+    points: Floats = np.repeat(way_mm[:-1], counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
+    before = np.append(np.repeat(np.arange(len(counts)), counts), len(counts))
+    return np.concatenate([points, way_mm[-1:]]), before
 
 
 def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_plate: bool) -> None:

@@ -9,8 +9,7 @@ from machine.gcode.lines import Lines
 from machine.gcode.modes import COMMANDS
 from machine.gcode.settings import PART_TOTALS, read_totals
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, Word, quote, read_words
-from machine.reader.codes import BARE_WORDS, VALUED, dispatch, flush
-from machine.reader.macros import macro
+from machine.reader.codes import BARE_WORDS, VALUED, dispatch, flush, macro
 from machine.reader.parsed import ParsedProgram, Unheld
 from machine.reader.plain_moves import read_plain_moves
 from machine.reader.program import program_of

@@ -35,8 +35,7 @@ from machine.gcode.blocks import check_blocks
 from machine.gcode.writer import write_gcode
 from machine.planning.fit import check_parts, check_standing, lifted, standing_at
 from machine.planning.moves import MachineProgram
-from machine.planning.plan import plan
-from machine.planning.purge import has_purge
+from machine.planning.plan import has_purge, plan
 from machine.planning.stops import Stop
 from machine.program import Program
 from mdp.decomposition import Decomposition, Part

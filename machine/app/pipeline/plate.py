@@ -11,9 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from machine.planning.arrange import Misfit, arrange
+from machine.planning.arrange import Misfit, Passing, arrange
 from machine.planning.fit import Place, check_parts, standing_at
-from machine.planning.passing import Passing
 from mdp.cost.footing import tips_over
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh, together

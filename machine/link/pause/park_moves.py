@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from machine.firmware import dialect_of
-from machine.gcode.modal_state import ModalState
+from machine.gcode.modes import ModalState
 from machine.gcode.pen import number
 from machine.kinematics.coordinates import axis_positions, followed_places
 from machine.link.pause.printed_bounds import PrintedBounds
-from machine.planning.park_position import Park, find_park_position
+from machine.planning.stand import Park, find_park_position
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine

@@ -10,7 +10,7 @@ from math import inf
 
 from machine.firmware import dialect_of
 from machine.gcode.commands import command_in
-from machine.gcode.modal_state import Coordinates, ModalState
+from machine.gcode.modes import Coordinates, ModalState
 from machine.gcode.pen import number
 from machine.link.exchange import Exchange
 from machine.link.pause.park_moves import fill_commands, heat_commands, plan_park

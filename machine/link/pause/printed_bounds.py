@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from machine.gcode.arcs import arc_box, arc_centre
-from machine.gcode.modal_state import Coordinates, ModalState
+from machine.gcode.modes import Coordinates, ModalState
 from machine.gcode.words import read_words, split_command
 from machine.kinematics.collision import Printed
 from machine.kinematics.coordinates import origin_mm

@@ -12,8 +12,7 @@ from machine.gcode.blocks import fill_block, resume_placeholders
 from machine.gcode.pen import Pen, turn
 from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
-from machine.planning.park_position import obstacle_top_mm, over_print_mm
-from machine.planning.reorient import Turn, route
+from machine.planning.stand import Turn, obstacle_top_mm, over_print_mm, route
 from mdp.pose import Pose
 from profiles.errors import JournalError
 from profiles.profile import Profile

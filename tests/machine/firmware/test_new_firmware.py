@@ -7,8 +7,7 @@ from machine import firmware
 from machine.calibration.program import calibration_lines, plan_touches
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialects, identify
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import axes_of
+from machine.gcode.modes import ModalState, axes_of
 from machine.gcode.writer import write_gcode
 from machine.link.protocol.connection import Connection
 from machine.link.stream import print_lines

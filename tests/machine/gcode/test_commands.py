@@ -12,8 +12,7 @@ from machine.gcode.blocks import cold_block, filled_start
 from machine.gcode.commands import EVERY, NOTHING_KNOWN, Heat, command_in, command_named, heat_in
 from machine.gcode.modes import COMMANDS as MODES
 from machine.link.protocol.framing import command_of
-from machine.reader.codes import CODES
-from machine.reader.macros import MACROS
+from machine.reader.codes import CODES, MACROS
 from machine.simulator.commands import COMMANDS as SIMULATED
 from machine.simulator.macros import MACROS as SIMULATED_MACROS
 from profiles.errors import LocalProtocolError, MoveError

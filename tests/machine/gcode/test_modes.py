@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.firmware import dialect_of, dialects
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import E_AXIS, axes_of
+from machine.gcode.modes import E_AXIS, ModalState, axes_of
 from machine.reader.parse import parse_gcode
 from machine.simulator.firmware import SimulatedFirmware
 from profiles.machine import Machine

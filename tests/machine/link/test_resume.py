@@ -14,8 +14,7 @@ import pytest
 from machine.app.cli import main
 from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import tap
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import axes_of
+from machine.gcode.modes import ModalState, axes_of
 from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from machine.link.medium import SERIAL, Medium, Wire

@@ -11,7 +11,7 @@ from machine.planning import travel
 from machine.planning.fit import standing_at
 from machine.planning.moves import Pause
 from machine.planning.plan import plan
-from machine.planning.reorient import Turn, route
+from machine.planning.stand import Turn, route
 from machine.planning.stops import Stop
 from mdp.pose import Pose, level
 from profiles.errors import MoveError

@@ -10,7 +10,7 @@ from machine.kinematics.collision import hull
 from machine.kinematics.table import workpiece_points
 from machine.planning.moves import BeginLayer, BeginPart, Reorient
 from machine.planning.plan import plan
-from machine.planning.reorient import Turn, poses_between, route
+from machine.planning.stand import Turn, poses_between, route
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.profile import Profile, load

@@ -6,8 +6,7 @@ import pytest
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import BeginPart, MachineProgram
-from machine.planning.plan import plan
-from machine.planning.purge import has_purge, purge_lanes
+from machine.planning.plan import has_purge, plan, purge_lanes
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
 from mdp.plane import PLATFORM

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from machine.kinematics.collision import hull, solids
 from machine.kinematics.table import machine_points
-from machine.planning.reorient import Turn, least_z, poses_between, route, stands, sweep, way_s
+from machine.planning.stand import Turn, least_z, poses_between, route, stands, sweep, way_s
 from mdp.head import bodies, corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError

@@ -5,13 +5,12 @@ import re
 import numpy as np
 import pytest
 
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import axes_of
+from machine.gcode.modes import ModalState, axes_of
 from machine.kinematics.collision import solids
 from machine.kinematics.table import machine_points
 from machine.link.pause.park_moves import axis_position, lift_words, plan_park
 from machine.link.pause.printed_bounds import PrintedBounds
-from machine.planning.park_position import find_park_position
+from machine.planning.stand import find_park_position
 from mdp.head import bodies, directions
 from mdp.pose import UP, Pose, rotation
 from profiles.profile import load

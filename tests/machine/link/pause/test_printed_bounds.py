@@ -2,8 +2,7 @@
 
 import pytest
 
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import axes_of
+from machine.gcode.modes import ModalState, axes_of
 from machine.kinematics.coordinates import origin_mm
 from machine.link.pause.printed_bounds import PrintedBounds
 from profiles.profile import load
