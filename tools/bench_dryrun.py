@@ -24,9 +24,9 @@ from machine.app.requests import ModelRequest
 from machine.dryrun import clearance, dry_run, extrusion, heat, layering, motion, own_comments, placement, sequence
 from machine.dryrun.replay import replay
 from machine.dryrun.strokes import beads_of
+from machine.gcode.lines import GcodeFile
 from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
-from machine.reader.gcode_file import GcodeFile
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
 from profiles.profile import Profile, load

@@ -31,13 +31,13 @@ from time import monotonic, sleep
 
 import numpy as np
 
+from machine.gcode.lines import GcodeFile
 from machine.link.journal import SYNC_S, Checkpoint, Journal, JournalHeading, read_journal
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint, heights_mm, is_in_doubt, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
-from machine.reader.gcode_file import GcodeFile
 from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
 from machine.simulator.virtual import PATH, VirtualPrinter

@@ -20,7 +20,7 @@ from profiles.machine import Blocks, Machine
 from profiles.places import shipped_of_dialect
 from profiles.profile import Profile
 
-RESUME, START, BEFORE_LAYER = "resume", "start", "before_layer"
+RESUME, BEFORE_LAYER = "resume", "before_layer"
 MOST_QUOTED = 3
 OTHER_WORD = {"S": "P", "P": "S"}  # what a temperature stands behind in the other kind of firmware
 WITH_E = {"G76", "M66", "M67", "M68"}  # the commands of CNC programs that use an E
@@ -89,7 +89,7 @@ def _values(profile: Profile, block: str) -> dict[str, object]:
 def filled_start(profile: Profile) -> list[str]:
     """The lines of the start block with its placeholders filled in, comments left out. Raises ProfileError."""
     machine = profile.machine
-    lines = fill_block(machine.gcode.start, START, _values(profile, START), dialect_of(machine))
+    lines = fill_block(machine.gcode.start, "start", _values(profile, "start"), dialect_of(machine))
     return [command for line in lines if (command := read_line(line).command)]
 
 
@@ -141,29 +141,15 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
     first = parts[0] if parts else None
     pose = first.pose if first else level(machine)
     return {
-        **_axes(machine),
-        "nozzle_c": material.nozzle_c,
-        "first_layer_nozzle_c": material.first_layer_nozzle_c,
-        "homing_nozzle_c": material.homing_nozzle_c,
-        "bed_c": material.bed_c,
-        "nozzle_mm": machine.head.nozzle_mm,
-        "layer_height_mm": process.layer_height_mm,
-        "parts": len(parts),
-        "layers": sum(part.layers for part in parts),
-        "part": first.index if first else 0,
-        "part_layers": first.layers if first else 0,
-        "tilt_deg": pose.tilt_deg,
-        "turn_deg": pose.turn_deg,
-        "z_mm": 0.0,
-        "time": duration(seconds),
-        "time_s": round(seconds),
-        "filament_mm": round(filament_mm, 2),
-        "filament_g": round(filament_g(filament_mm, material), 2),
+        **_axes(machine), "nozzle_c": material.nozzle_c, "first_layer_nozzle_c": material.first_layer_nozzle_c,
+        "homing_nozzle_c": material.homing_nozzle_c, "bed_c": material.bed_c, "nozzle_mm": machine.head.nozzle_mm,
+        "layer_height_mm": process.layer_height_mm, "parts": len(parts), "layers": sum(part.layers for part in parts),
+        "part": first.index if first else 0, "part_layers": first.layers if first else 0,
+        "tilt_deg": pose.tilt_deg, "turn_deg": pose.turn_deg, "z_mm": 0.0, "time": duration(seconds), "time_s": round(seconds),
+        "filament_mm": round(filament_mm, 2), "filament_g": round(filament_g(filament_mm, material), 2),
         "model": "".join(c if "!" <= c <= "~" and c not in "(){};*" else "_" for c in name),
-        "material": material.name,
-        "process": process.name,
-        "machine": machine.name,
-    }
+        "material": material.name, "process": process.name, "machine": machine.name,
+    }  # fmt: skip
 
 
 def resume_placeholders(machine: Machine, tip_mm: Sequence[float] | Floats, pose: Pose, clear_z_mm: float) -> dict[str, object]:
@@ -177,15 +163,11 @@ def resume_placeholders(machine: Machine, tip_mm: Sequence[float] | Floats, pose
 def _axes(machine: Machine) -> dict[str, object]:
     """What all blocks may say of the rotary axes."""
     return {
-        "tilt": machine.tilt.letter,
-        "turn": machine.turn.letter,
-        "tilt_stepper": stepper_name(machine.tilt),
-        "turn_stepper": stepper_name(machine.turn),
-        "tilt_speed": machine.tilt.speed_deg_s,
-        "turn_speed": machine.turn.speed_deg_s,
-        "tilt_acceleration": machine.tilt.acceleration_deg_s2,
-        "turn_acceleration": machine.turn.acceleration_deg_s2,
-    }
+        "tilt": machine.tilt.letter, "turn": machine.turn.letter,
+        "tilt_stepper": stepper_name(machine.tilt), "turn_stepper": stepper_name(machine.turn),
+        "tilt_speed": machine.tilt.speed_deg_s, "turn_speed": machine.turn.speed_deg_s,
+        "tilt_acceleration": machine.tilt.acceleration_deg_s2, "turn_acceleration": machine.turn.acceleration_deg_s2,
+    }  # fmt: skip
 
 
 def fill_block(block: str, name: str, values: Mapping[str, object], dialect: Dialect) -> list[str]:

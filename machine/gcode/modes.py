@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any, NamedTuple
 
-from machine.firmware import dialect_of
-from machine.firmware.dialect import FilamentMode
+from machine.firmware import Dialect, dialect_of, dialects
 from machine.firmware.klipper import stepper_name
 from machine.gcode.commands import EVERY, PATHS, command_named
 from machine.gcode.words import Word, read_letters, read_number, read_values, read_words, split_command
@@ -33,10 +32,7 @@ class Axes(NamedTuple):
 
     letters: tuple[str, ...] = ("X", "Y", "Z", "A", "C", "E")  # in the order of a place
     words: Mapping[str, int] = {"X": 0, "Y": 1, "Z": 2, "A": 3, "C": 4, "E": E_AXIS}  # those that a move may have
-    filament_mode: FilamentMode = "set"
-    bare_g92: bool = False
-    follow_on: str = "G43.4"  # X Y Z are places on the table from here on (TCP)
-    follow_off: str = "G49"
+    dialect: Dialect = dialects()["marlin"]
     steppers: tuple[str, str] = ("", "")  # Klipper's names of those that tilt and turn, in capitals
 
     def __deepcopy__(self, memo: object) -> "Axes":
@@ -50,15 +46,9 @@ def axes_of(machine: Machine | None) -> Axes:
     dialect = dialect_of(machine)
     rotary = {machine.tilt.letter: 3, machine.turn.letter: 4} if machine.tilts and not dialect.steppers else {}
     filament = next(letter for letter in dialect.filament if letter not in rotary)
-    return Axes(
-        letters=("X", "Y", "Z", machine.tilt.letter, machine.turn.letter, "E"),
-        words={"X": 0, "Y": 1, "Z": 2, **rotary, filament: E_AXIS},
-        filament_mode=dialect.filament_mode,
-        bare_g92=dialect.bare_g92,
-        follow_on=dialect.follow_on,
-        follow_off=dialect.follow_off,
-        steppers=(stepper_name(machine.tilt).upper(), stepper_name(machine.turn).upper()),
-    )
+    letters = ("X", "Y", "Z", machine.tilt.letter, machine.turn.letter, "E")
+    steppers = (stepper_name(machine.tilt).upper(), stepper_name(machine.turn).upper())
+    return Axes(letters, {"X": 0, "Y": 1, "Z": 2, **rotary, filament: E_AXIS}, dialect, steppers)
 
 
 @dataclass(slots=True)
@@ -88,11 +78,11 @@ class Modes:
             return
         if name in ("G90", "G91"):
             self.relative = name == "G91"
-            if self.axes.filament_mode == "set":
+            if self.axes.dialect.filament_mode == "set":
                 self.filament_relative = self.relative
         else:
             self.filament_relative = name == "M83"
-        follows = self.relative and self.axes.filament_mode == "carried"
+        follows = self.relative and self.axes.dialect.filament_mode == "carried"
         self.steps[:] = [*[self.relative] * E_AXIS, self.filament_relative or follows]
 
     @property
@@ -113,8 +103,11 @@ class Modes:
             if axis is None:
                 if letter == "F" and value > 0:
                     self.feed = value if self.inverse_time else value * units[0]
+                elif self.strict and letter == "F":
+                    raise GcodeError(f"F is {value:g}: a feed must be above 0")
                 elif self.strict:
-                    raise self._refusal(letter, value)
+                    known = " ".join(axes)
+                    raise GcodeError(f"word {letter}{value:g} of a move is not known: this machine has {known} F")
                 continue
             moved = True
             value *= units[axis]
@@ -124,16 +117,11 @@ class Modes:
                 coordinates[axis] += value
         return moved
 
-    def _refusal(self, letter: str, value: float) -> GcodeError:
-        if letter == "F":
-            return GcodeError(f"F is {value:g}: a feed must be above 0")
-        return GcodeError(f"word {letter}{value:g} of a move is not known: this machine has {' '.join(self.axes.words)} F")
-
     def named(self, words: Iterable[Word]) -> list[tuple[int, float]]:
         """The axes and coordinates, mm or deg, of a G92."""
         axes = self.axes.words
         coordinates = [(axes[letter], value * self.units[axes[letter]]) for letter, value in words if letter in axes]
-        return coordinates or [(axis, 0.0) for axis in axes.values() if self.axes.bare_g92]
+        return coordinates or [(axis, 0.0) for axis in axes.values() if self.axes.dialect.bare_g92]
 
 
 @dataclass
@@ -163,7 +151,7 @@ class ModalState:
     @property
     def follows(self) -> bool:
         """Whether X Y Z are places on the table now (TCP)."""
-        return self.settings.get("follow") == self.axes.follow_on != ""
+        return self.settings.get("follow") == self.axes.dialect.follow_on != ""
 
     def take(self, command: str) -> bool:
         """Take note of a command; True when it moves an axis or filament."""
@@ -197,7 +185,7 @@ class ModalState:
             self.nozzle_c = self.bed_c = 0.0
         elif name in ("M106", "M107"):
             self.fans[f"{dict(words).get('P', 0.0):g}"] = f"{name} {rest.strip()}".strip()
-        elif name and name in (axes.follow_on, axes.follow_off):
+        elif name and name in (axes.dialect.follow_on, axes.dialect.follow_off):
             self.settings["follow"] = name
             return True
         elif command_named(name).modal:

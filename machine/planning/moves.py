@@ -101,18 +101,9 @@ class MachineProgram:
         ways = np.concatenate([np.zeros((0, 4)), *(piece.ways for piece in pieces)])
         rows = np.concatenate([np.zeros((0, 6)), *(piece.rows for piece in pieces)])
         what, points, speed, width_mm, fan, acceleration = np.ascontiguousarray(rows.T)
-        return cls(
-            name=name,
-            points_mm=np.ascontiguousarray(ways[:, :3]),
-            starts=np.concatenate([[0], np.cumsum(points.astype(np.int64))]),
-            filament_mm=np.ascontiguousarray(ways[:, 3]),
-            what=what.astype(np.int8),
-            speed=speed,
-            width_mm=width_mm,
-            fan=fan,
-            acceleration_mm_s2=acceleration,
-            marks=tuple(marks),
-        )
+        starts = np.concatenate([[0], np.cumsum(points.astype(np.int64))])
+        points_mm, filament_mm = np.ascontiguousarray(ways[:, :3]), np.ascontiguousarray(ways[:, 3])
+        return cls(name, points_mm, starts, filament_mm, what.astype(np.int8), speed, width_mm, fan, acceleration, tuple(marks))
 
     def __len__(self) -> int:
         return len(self.what)

@@ -1,4 +1,4 @@
 """Reader: what a firmware would understand of a G-code text, command by command.
 
-`parse.parse_gcode` gives a `parsed.ParsedProgram`, one row a move; `gcode_file.GcodeFile` is a file of them.
+`parse.parse_gcode` gives a `parsed.ParsedProgram`, one row a move; `machine.gcode.lines.GcodeFile` is a file of text.
 """

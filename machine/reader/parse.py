@@ -2,6 +2,10 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from machine.gcode.commands import PATHS
 from machine.gcode.line_text import FREE_TEXT, begins_layer, begun_part, command_name, read_line, to_ascii
@@ -9,13 +13,15 @@ from machine.gcode.lines import Lines
 from machine.gcode.modes import COMMANDS
 from machine.gcode.settings import PART_TOTALS, read_totals
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, Word, quote, read_words
+from machine.kinematics.coordinates import axis_positions
 from machine.reader.codes import BARE_WORDS, VALUED, dispatch, flush, macro
-from machine.reader.parsed import ParsedProgram, Unheld
+from machine.reader.parsed import MoveKind, ParsedProgram, Remarks, Unheld, pieces
 from machine.reader.plain_moves import read_plain_moves
-from machine.reader.program import program_of
 from machine.reader.state import Reader, reader_of
+from mdp.mesh import Floats, Indices
 from profiles.errors import GcodeError
 from profiles.machine import Machine
+from slicer.estimate.timing import axis_speeds, lengths
 
 LONGEST_LINE = 2000
 CONDITIONS = ("IF", "ELIF", "ELSE", "WHILE")
@@ -23,6 +29,8 @@ SECOND = re.compile(r"[GM] *[0-9]+")  # a second command of a line
 STRING = re.compile(r'"[^"]*"')
 PLACED = (*PATHS, "G4", "G10", "G28", "G92")
 STOPS = ("M0", "M1", "M2", "M30")
+STILL = 1e-9
+SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded places, lets the head leave its place by less
 
 
 def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
@@ -49,7 +57,7 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
         at = after
     if reader.turning:
         flush(reader)
-    return program_of(reader)
+    return _program_of(reader)
 
 
 def _line(reader: Reader, line: str) -> None:
@@ -188,3 +196,100 @@ def _check_alone(name: str, rest: str, text: str) -> None:
 
 def _name(letter: str, value: float) -> str:
     return f"{letter}{value:g}"
+
+
+def _program_of(reader: Reader) -> ParsedProgram:
+    """All that a reader has read."""
+    columns, count = reader.columns, reader.rows
+    begins, remark = columns.starts if len(columns.starts) else columns.places, columns.remark_rows[: reader.remarks].T
+    program = ParsedProgram(
+        line=columns.line[:count], start=begins[:count], end=columns.places[1 : count + 1], e_mm=columns.e_mm[:count],
+        feed=columns.feed[:count], kind=np.empty(count, np.int8), remark=columns.remark[:count],
+        remarks=Remarks(*remark[:3].astype(np.int32), *remark[3:]), types=tuple(reader.types), events=tuple(reader.events),
+        ignored=reader.ignored, replaced=tuple(reader.replaced), layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)),
+        unsupported=tuple(reader.unsupported), announced=reader.announced, part_totals=tuple(reader.part_totals),
+    )  # fmt: skip
+    followed = np.searchsorted(reader.switches, np.arange(count), side="right") % 2 == 1 if reader.switches else np.zeros(0, bool)
+    program = _in_axis_positions(program, np.flatnonzero(followed), reader)
+    for some in pieces(len(program.line)):
+        change, pushed = np.abs(program.end[some] - program.start[some]) > STILL, program.e_mm[some]
+        moved, turned = change[:, :3].any(axis=1), change[:, 3:].any(axis=1)
+        does = [turned, moved & (pushed > STILL), ~moved & (np.abs(pushed) > STILL)]
+        program.kind[some] = np.select(does, [MoveKind.ROTATE, MoveKind.EXTRUDE, MoveKind.RETRACT], MoveKind.TRAVEL)
+    return program
+
+
+def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader) -> ParsedProgram:
+    """The program whose (m,) followed rows are axis positions too, with feeds by the measure of NIST."""
+    asked = (program.feed < 0.0) | np.isinf(program.feed)
+    asked[followed] = True
+    if reader.dialect.largest_delta:
+        asked |= (program.start[:, 3:] != program.end[:, 3:]).any(axis=1)
+    odd = np.flatnonzero(asked)
+    length, keep = _feed_length(program.changes(odd), reader.dialect.largest_delta), None
+    if len(followed):
+        program = replace(program, start=program.start.copy(), end=program.end.copy())
+        for side in (program.start, program.end):
+            side[followed, :3] = axis_positions(reader.machine, side[followed])
+        keep = _turn_starts(program, followed)
+    program.feed[odd] = _feeds(program.feed[odd], length, program.changes(odd), axis_speeds(reader.machine))
+    return program if keep is None else _merge_turns(keep, program)
+
+
+def _feed_length(change: Floats, largest: bool = False) -> Floats:
+    """(n,) what F counts along (n, 6) changes, by the rule of NIST RS274.
+
+    largest: of a pure turn only the axis that goes farthest (Klipper).
+    """
+    length, measure = lengths(change)
+    return np.where(measure == 1, np.abs(change[:, 3:5]).max(axis=1, initial=0.0), length) if largest else length
+
+
+def _feeds(given: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floats:
+    """Units per minute along what NIST counts, from feeds along another measure, inverse time, or as fast as the axes can."""
+    length = _feed_length(change)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fastest = 60.0 * length / (np.abs(change) / speeds).max(axis=1)
+        minutes = np.where(given < 0, -1.0 / given, asked / given)
+        along = np.where(minutes > 0, length / minutes, fastest)
+    along = np.where(np.isinf(given), fastest, along)
+    along = np.where(np.isfinite(along) & (along > 0), along, 1.0)
+    differs = (given < 0) | np.isinf(given) | (np.abs(asked - length) > STILL)
+    return np.where(differs, along, given)
+
+
+def _turn_starts(program: ParsedProgram, followed: Indices) -> NDArray[np.bool_]:
+    """(n,) False for a row that only goes on with the turn of the row before: the head stays, the direction too."""
+    start, end = program.start, program.end
+    turn = end[:, 3:] - start[:, 3:]
+    size = np.hypot(turn[:, 0], turn[:, 1])
+    sway = np.abs(end[followed, :3] - start[followed, :3]).max(axis=1, initial=0.0)
+    pure = np.zeros(len(size), dtype=np.bool_)
+    pure[followed] = (size[followed] > STILL) & (program.e_mm[followed] == 0.0) & (sway < SWAY_MM)
+    heading = turn / np.maximum(size, STILL)[:, None]
+    goes_on = np.zeros(len(size), dtype=np.bool_)
+    goes_on[1:] = pure[1:] & pure[:-1] & (np.abs(heading[1:] - heading[:-1]).max(axis=1, initial=0.0) < 0.01)
+    goes_on[1:] &= np.abs(start[1:] - end[:-1]).max(axis=1, initial=0.0) < SWAY_MM
+    goes_on[[event.row for event in program.events if event.row < len(size)]] = False
+    end[pure, :3] = start[pure, :3]
+    for row in np.flatnonzero(goes_on):
+        start[row, :3] = end[row, :3] = start[row - 1, :3]
+    return ~goes_on
+
+
+def _merge_turns(keep: NDArray[np.bool_], program: ParsedProgram) -> ParsedProgram:
+    """The program with each turn in one row, at the pace of the whole."""
+    first = np.flatnonzero(keep)
+    last = np.append(first[1:], len(keep)) - 1
+    minutes = np.add.reduceat(_feed_length(program.changes()) / program.feed, first)
+    merged_row = np.append(np.cumsum(keep) - 1, len(first))
+    names = ("line", "start", "e_mm", "feed", "kind", "remark")
+    merged = replace(
+        program,
+        **{name: getattr(program, name)[first] for name in names},
+        end=program.end[last],
+        events=tuple(replace(event, row=int(merged_row[event.row])) for event in program.events),
+    )
+    joined = first < last
+    merged.feed[joined] = _feed_length(merged.changes())[joined] / minutes[joined]
+    return merged

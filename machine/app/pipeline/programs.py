@@ -11,9 +11,8 @@ from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.findings import Finding
-from machine.gcode.lines import Lines
+from machine.gcode.lines import GcodeFile, Lines
 from machine.program import Program
-from machine.reader.gcode_file import GcodeFile
 from profiles.errors import GcodeError, MoveError, PlanError
 from profiles.profile import Profile
 

@@ -10,8 +10,8 @@ from time import time
 
 from machine.app.file_roles import PROGRAM, program_beside
 from machine.app.output import write_lines
+from machine.gcode.lines import GcodeFile
 from machine.link.journal import LONGEST_BYTES, Checkpoint, Journal, JournalHeading, is_being_printed, read_journal
-from machine.reader.gcode_file import GcodeFile
 from profiles.errors import JournalError, OutputError, reason
 from profiles.folders import state_folder
 from profiles.profile import Profile

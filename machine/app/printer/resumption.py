@@ -24,6 +24,7 @@ from machine.app.serving.watch_page import serve_watch_page
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialect_of
+from machine.gcode.lines import GcodeFile
 from machine.link.journal import (
     Checkpoint,
     Journal,
@@ -47,7 +48,6 @@ from machine.link.resume import (
 )
 from machine.link.status import PrinterStatus
 from machine.program import Program
-from machine.reader.gcode_file import GcodeFile
 from profiles.errors import JournalError, ProfileError
 from profiles.profile import Profile, profile_of_tables
 

@@ -14,6 +14,7 @@ import pytest
 from machine.app.cli import main
 from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import tap
+from machine.gcode.lines import GcodeFile
 from machine.gcode.modes import ModalState, axes_of
 from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
@@ -25,7 +26,6 @@ from machine.link.protocol.framing import frame
 from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, heights_mm, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
-from machine.reader.gcode_file import GcodeFile
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter

@@ -7,7 +7,7 @@ import pytest
 
 from machine.kinematics.collision import hull
 from machine.link.pause.return_path import return_moves
-from machine.planning import travel
+from machine.planning import layer
 from machine.planning.fit import standing_at
 from machine.planning.moves import Pause
 from machine.planning.plan import plan
@@ -50,7 +50,7 @@ def test_the_tip_rises_only_to_cross_from_one_limb_to_the_other() -> None:
 
 
 def test_the_dry_run_refuses_the_same_limbs_without_the_lifts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(travel, "clear_height_mm", lambda standing, way_mm, height_mm: height_mm)
+    monkeypatch.setattr(layer, "clear_height_mm", lambda standing, way_mm, height_mm: height_mm)
     codes = {finding.code for finding in printed("outer posts")[1].errors}
     assert codes == {"contact"}
 

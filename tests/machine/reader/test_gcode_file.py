@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from machine.dryrun.dryrun import dry_run
+from machine.gcode.lines import GcodeFile
 from machine.link.protocol.framing import command_of
 from machine.network.gcode_upload import GcodeUpload
-from machine.reader.gcode_file import GcodeFile
 from profiles.errors import GcodeError
 from profiles.profile import load
 

@@ -17,7 +17,7 @@ from machine.calibration.piece.pads import Piece, read_piece
 from machine.calibration.piece.page import piece_page
 from machine.calibration.piece.readings import EXPECTED, parse_pad, parse_readings
 from machine.calibration.saved import found_tables
-from machine.reader.gcode_file import GcodeFile
+from machine.gcode.lines import GcodeFile
 from machine.reader.parse import parse_gcode
 from profiles.errors import ProfileError
 from profiles.machine import Machine

@@ -20,8 +20,8 @@ from machine.app.commands.resume import list_resumable
 from machine.app.printer.journal_folder import new_journal, resumable_journals
 from machine.app.printer.resumption import read_resumption
 from machine.app.requests import PrintRequest
+from machine.gcode.lines import GcodeFile
 from machine.link.journal import BLOCK_BYTES, FORMAT, SLOTS
-from machine.reader.gcode_file import GcodeFile
 from profiles.errors import UserError
 from profiles.folders import state_folder
 from profiles.profile import load
